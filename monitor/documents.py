@@ -6,7 +6,7 @@ the same record is restored to the last bit of every number. Four marks of a fie
 gives it a key that is no Python name, ``OMITTED`` leaves it out where it is None, ``INLINED`` writes the fields of a
 record into the document of its owner, and ``WORDED`` writes a kind as the sentence that people read and, beside it, as
 the data from which it is restored. Of several kinds of record that may be inlined, the first is restored whose
-keys the document has: name the one with most keys first.
+keys the document has: name the one with most keys first. A ``Sentence`` is written as its words alone.
 """
 
 from __future__ import annotations
@@ -20,13 +20,24 @@ from datetime import date, datetime
 from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from monitor.exceptions import StoreError
 
 Record = TypeVar("Record")
+
+
+class Sentence:
+    """A kind with its numbers that a document holds as the sentence (``str``) that people read.
+
+    The document restores the sentence: what may hold either is ``Said``.
+    """
+
+
+#: A sentence as data, or as a document of before has it.
+Said: TypeAlias = Sentence | str
 
 #: Metadata of a field that is left out of the document where it is None: ``field(default=None, metadata=OMITTED)``.
 OMITTED: Mapping[str, Any] = {"omitted": True}
@@ -82,6 +93,8 @@ def data_key(field: dataclasses.Field[Any]) -> str:
 
 
 def _plain(value: object) -> Any:
+    if isinstance(value, (Sentence, Path)):
+        return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _plain_record(value)
     if isinstance(value, Enum):
@@ -96,8 +109,6 @@ def _plain(value: object) -> Any:
         return [_plain(element) for element in value]
     if isinstance(value, date):
         return value.isoformat()
-    if isinstance(value, Path):
-        return str(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -1,7 +1,6 @@
 """What a calibration campaign is: frozen records in internal units (mm, rad, s, °C).
 
-Readers make them, the store keeps them, the methods read them. Recorded conditions and channels keep the
-unit that their name ends in (``ambient_degC``, ``warm_up_min``).
+Recorded conditions and channels keep the unit that their name ends in (``ambient_degC``, ``warm_up_min``).
 """
 
 from __future__ import annotations
@@ -261,7 +260,7 @@ class Setup:
     ``direction`` and ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
-    that in which a vector is read; ``known`` names the unknowns that are held at what is stated.
+    that in which a vector is read; ``known`` names the unknowns held as stated; ``certificate`` is the instrument's.
     """
 
     id: str
@@ -280,6 +279,7 @@ class Setup:
     frame: Branch = "work"
     known: tuple[str, ...] = ()
     turn_uncertainty: float | None = None
+    certificate: str | None = None
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,17 @@ CONTRIBUTING = Path(__file__).resolve().parents[1] / "CONTRIBUTING.md"
 
 # What every room may import. `from monitor import __version__` is for everyone: the package itself imports nothing.
 # `sources` is read, stored, propagated and printed: four rooms that may not know each other.
-GROUND = {"__init__", "exceptions", "units", "records", "documents", "refusal", "sources", "bounded"}
+GROUND = {
+    "__init__",
+    "exceptions",
+    "units",
+    "records",
+    "documents",
+    "refusal",
+    "sources",
+    "bounded",
+    "stopping",
+}
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.
 ROOMS: dict[str, set[str]] = {
@@ -77,6 +87,7 @@ KEEPERS: dict[str, set[str]] = {
     "rich": {"cli"},
     "shtab": {"cli"},
     "openpyxl": {"store", "readers"},
+    "lxml": {"readers"},
 }
 
 # Packed folder -> the rooms that may look into it.

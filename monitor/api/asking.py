@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,9 @@ from monitor.api.answer import Answer
 from monitor.exceptions import InputError, did_you_mean
 from monitor.store import Database
 from monitor.workflow.contract import QUESTIONS
+
+#: An option of the command line in a message, such as ``--digits`` or ``-p``.
+_OPTION = re.compile(r"(?<![\w-])--?([a-z][a-z-]*)(?![\w-])")
 
 
 class Ask:
@@ -21,10 +27,31 @@ class Ask:
     def __call__(self, question: str, **values: Any) -> Any:
         """Return the typed answer. Raises InputError for an option that the question does not have."""
         asked = QUESTIONS[question]
-        request = asked.request
-        arguments = [] if request is None else [request_of(request, values)]
-        self.db.forget_campaigns()
-        return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
+        with options_as_arguments(asked.request):
+            arguments = [] if asked.request is None else [request_of(asked.request, values)]
+            self.db.forget_campaigns()
+            return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
+
+
+@contextmanager
+def options_as_arguments(request: Any) -> Iterator[None]:
+    """Let messages of this block name the arguments of a request where they name options of the command line.
+
+    ``--holds-for`` is ``holds_for``, ``--peak`` is ``peak_um``; what is no field of the request stays as it is.
+    """
+    names = [] if request is None else [field.name for field in fields(request) if field.init]
+
+    def argument(option: re.Match[str]) -> str:
+        name = option[1].replace("-", "_")
+        return next((field for field in names if field == name or field.startswith(f"{name}_")), option[0])
+
+    try:
+        yield
+    except InputError as fault:
+        fault.args = tuple(
+            _OPTION.sub(argument, part) if isinstance(part, str) else part for part in fault.args
+        )
+        raise
 
 
 def request_of(kind: Any, values: dict[str, Any]) -> Any:

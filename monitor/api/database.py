@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from monitor import store
 from monitor.api.answer import Answer
-from monitor.api.asking import Ask, drawn, request_of
+from monitor.api.asking import Ask, drawn, options_as_arguments, request_of
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
@@ -149,4 +149,5 @@ def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:
     """
     from monitor.workflow.simulation import SimulateRequest, simulate
 
-    return Answer(simulate(request_of(SimulateRequest, {**options, "out": Path(out)})))
+    with options_as_arguments(SimulateRequest):
+        return Answer(simulate(request_of(SimulateRequest, {**options, "out": Path(out)})))

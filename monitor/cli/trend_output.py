@@ -143,9 +143,12 @@ def _table(answer: TrendAnswer) -> None:
     slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
         f"{answer.machine}: {_size(answer)}{slopes}",
-        ["parameter", *(_HEADINGS.get(heading, heading) for heading in columns)],
-        [list(row) for row in zip(answer.parameters, *columns.values(), strict=True)],
-        text_columns=2,
+        ["parameter", "relative to", *(_HEADINGS.get(heading, heading) for heading in columns)],
+        [
+            [name, answer.refers_to.get(name, ""), *cells]
+            for name, *cells in zip(answer.parameters, *columns.values(), strict=True)
+        ],
+        text_columns=3,
     )
 
 
@@ -255,6 +258,7 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
     if ahead.why is not None or ahead.predicted_interval_um is None:
         if ahead.limit_um is not None and ahead.why is not None:
             yield str(ahead.why)
+            yield _mapped(ahead.mapped_um, ahead.limit_um)
         return
     low, high = ahead.predicted_interval_um
     beyond = None not in (ahead.latest_um, ahead.limit_um) and (ahead.latest_um or 0.0) > (
@@ -275,6 +279,17 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
             f"  {ahead.backtest.inside} of {ahead.backtest.made} past days, each foretold by the days before it, lay "
             f"in the interval ({_three(ahead.backtest.rms_um)} µm off, root mean square)"
         )
+
+
+def _mapped(worst: float | None, limit: float) -> str:
+    """The volumetric error where nothing is foretold: of the last map that is stored, as the fleet has it."""
+    if worst is None:
+        return (
+            f"the limit of the volumetric error, {_three(limit)} µm, is not judged: no map is stored; type "
+            "`monitor map CAMPAIGN`"
+        )
+    verdict = "out of tolerance" if worst >= limit else "within it"
+    return f"volumetric error: {_three(worst)} µm at worst in the last map stored, limit {_three(limit)} µm: {verdict}"
 
 
 def _reaches(ahead: VolumetricForecast, beyond: bool, latest: str) -> str:

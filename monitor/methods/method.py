@@ -8,7 +8,7 @@ and never for a name.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -24,7 +24,7 @@ from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.chain.results import AdviceOf, identification
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.model import Model
-from monitor.records import Array, Campaign, CurveCampaign
+from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
@@ -132,6 +132,49 @@ class AngleCandidates(Protocol):
         """Every single angle added to the present plan, best first, and the best ``count`` angles."""
 
 
+class PlannedTest(Protocol):
+    """A test that could be made: its setup, the positions (m, J) of the joints, whether the campaign has it."""
+
+    @property
+    def setup(self) -> Setup: ...
+    @property
+    def positions(self) -> Array: ...
+    @property
+    def available(self) -> bool: ...
+
+
+@dataclass(frozen=True)
+class ExpectedTest:
+    """What a test promises beside the readings that are there: standard uncertainties in internal units by parameter,
+    NaN where there is no number."""
+
+    test: PlannedTest
+    u: Mapping[str, float]
+
+
+class TestForecast(Protocol):
+    """Tests that could follow a run, and what they promise."""
+
+    def unit_of(self, parameter: str) -> Unit:
+        """The display unit of a parameter that the run or a test has."""
+
+    def present(self) -> Mapping[str, float]:
+        """Standard uncertainties of the run as it was measured."""
+
+    def expected(self) -> Iterable[ExpectedTest]:
+        """What every single test promises."""
+
+    def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
+        """What several tests promise together."""
+
+
+@dataclass(frozen=True)
+class InstrumentPlan(Able):
+    """Plans are tests of instruments, of which ``forecast`` weighs those that the limits of the joints allow."""
+
+    forecast: Callable[[Campaign, Model, int, Mapping[str, tuple[float, float]]], TestForecast]
+
+
 @dataclass(frozen=True)
 class AxisTest:
     """A test of positioning in one setup and run: ``position`` (n,) and ``deviation`` (n,) in mm, or in rad where
@@ -230,7 +273,7 @@ class Method:
     statistics: Able | Unable
     coordinates: Able | Unable
     uncertainty: Able | Unable
-    plan: TouchPlan | AnglePlan | Unable
+    plan: TouchPlan | AnglePlan | InstrumentPlan | Unable
     stepwise: Stepwise | Unable
     map: Able | Unable
     trend: Able | Unable
@@ -253,7 +296,9 @@ def _suspected(problem: ChainProblem) -> str:
     if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
         return ""
     rows = ", ".join(
-        f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
+        f"run {reading.run}, sequence {reading.sequence} ({reading.target})"
+        + "".join(f" or sequence {other} of that run" for other in reading.others)
+        for reading in gross
     )
     subject = "this reading" if len(gross) == 1 else "these readings"
     return f". First look at {subject}, which the others contradict: {rows}" if gross else ""
@@ -290,8 +335,8 @@ NO_STANDARDS = Unable(
 ONE_INSTRUMENT = Unable("one instrument measured all of it; uncertainty has the budget of its sources")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
-    "plan works for touches of balls and for angles of a workpiece's table only; identify lists what the present "
-    "plan cannot separate, and what to do about it"
+    "plan works for touches of balls, angles of a workpiece's table and instruments only; identify lists what the "
+    "present plan cannot separate, and what to do about it"
 )
 
 
@@ -318,7 +363,7 @@ class ChainMethod(Method):
     statistics: Able | Unable = Able()
     coordinates: Able | Unable = Able()
     uncertainty: Able | Unable = Able()
-    plan: TouchPlan | AnglePlan | Unable = NO_TOUCH_PLAN
+    plan: TouchPlan | AnglePlan | InstrumentPlan | Unable = NO_TOUCH_PLAN
     stepwise: Stepwise | Unable = NO_STEPWISE
     map: Able | Unable = Able()
     trend: Able | Unable = Able()
@@ -366,7 +411,7 @@ class CurveMethod(Method):
     uncertainty: Able | Unable = Unable(
         "it is a curve, not a machine; identify gives the uncertainties of its coefficients"
     )
-    plan: TouchPlan | AnglePlan | Unable = NO_MACHINE
+    plan: TouchPlan | AnglePlan | InstrumentPlan | Unable = NO_MACHINE
     stepwise: Stepwise | Unable = NO_STEPWISE
     map: Able | Unable = NO_MACHINE
     trend: Able | Unable = NO_MACHINE

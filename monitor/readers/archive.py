@@ -19,8 +19,10 @@ UNPACKED_BYTES = 512 * 2**20
 MOST_FILES = 2000
 LONGEST_NAME = 200
 _CHUNK = 2**20
-#: The file that makes a folder a campaign.
-CAMPAIGN_FILE = "campaign.toml"
+#: The files that make a folder a campaign: its own, or the mapping of what instruments wrote.
+CAMPAIGN_FILES = ("campaign.toml", "mapping.toml")
+#: How the names of workbooks end.
+WORKBOOK = ".xlsx"
 
 
 @dataclass(frozen=True)
@@ -34,22 +36,31 @@ class UploadedFile:
 def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
     """Write uploaded files below ``folder`` and return the campaign folders among them, in the order of their names.
 
-    Raises InputError for a zip that cannot be trusted or read, and where no folder holds a campaign.toml.
+    Raises InputError for a zip that cannot be trusted or read, and where no folder holds a campaign.
     """
     if not files:
         raise InputError("choose the folder of a campaign, its files, or a zip of it")
     room = _Room(folder)
     for file in files:
-        if zipfile.is_zipfile(file.content):
+        # A workbook of Excel is a zip too, of files that are nothing by themselves.
+        if zipfile.is_zipfile(file.content) and not file.name.lower().endswith(WORKBOOK):
             file.content.seek(0)
             _unpack_zip(file, room)
         else:
             file.content.seek(0)
+            if file.name.lower().endswith(".zip"):
+                raise InputError(f"{file.name} is no zip that can be read; pack the folder again")
             room.write(_safe_path(file.name), file.content)
-    campaigns = tuple(sorted(path.parent for path in folder.rglob(CAMPAIGN_FILE)))
+    campaigns = tuple(sorted({path.parent for name in CAMPAIGN_FILES for path in folder.rglob(name)}))
     if not campaigns:
+        if any(file.name.lower().endswith(WORKBOOK) for file in files):
+            raise InputError(
+                f"a workbook of Excel holds the tables of a campaign, and {CAMPAIGN_FILES[0]} says of which machine "
+                "and method they are: choose both files together (docs/campaign-format.md)"
+            )
         raise InputError(
-            f"no folder of the upload has a {CAMPAIGN_FILE}; choose the folder of a campaign or a zip of it "
+            f"no folder of the upload has a {CAMPAIGN_FILES[0]} or a {CAMPAIGN_FILES[1]}; choose the folder of a "
+            "campaign or a zip of it "
             "(docs/campaign-format.md says which files it has)"
         )
     return campaigns

@@ -8,13 +8,14 @@ from pathlib import Path
 from monitor.bounded import read_bounded
 from monitor.readers.files import LARGEST_TOML
 
-_FILE = "campaign.toml"
+_FILES = ("campaign.toml", "mapping.toml")
 
 
 def names_in(folder: Path) -> tuple[str | None, str | None]:
-    """Return the names of campaign and machine in ``campaign.toml``; None where it cannot be read that far."""
+    """Return the names of campaign and machine in the file of a folder, or in a mapping; None if unreadable."""
     try:
-        document = tomllib.loads(read_bounded(folder / _FILE, LARGEST_TOML).decode("utf-8-sig"))
+        path = next((folder / name for name in _FILES if (folder / name).is_file()), folder)
+        document = tomllib.loads(read_bounded(path, LARGEST_TOML).decode("utf-8-sig"))
     except (OSError, ValueError, RecursionError):  # not TOML and not UTF-8 are ValueErrors
         return None, None
     machine = document.get("machine")

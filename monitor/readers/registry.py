@@ -1,7 +1,8 @@
 """Registers the formats and the rules of the methods, and reads a campaign in any of the formats.
 
-Built-in formats and methods are the files of ``formats`` and ``methods``; a plug-in gives a ``Reader`` or a
-``MethodRules`` through an entry point of the group ``monitor.readers``.
+Built-in formats and methods are the files of ``formats`` and ``methods``, files of instruments those of ``exports``; a
+plug-in gives a ``Reader``, a ``MethodRules`` or an ``ExportFormat`` through an entry point of the group
+``monitor.readers``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from monitor.exceptions import CampaignError, Fault, InputError
+from monitor.readers.export import ExportFormat
 from monitor.readers.method_rules import MethodRules
 from monitor.records import Campaign, CurveCampaign
 
@@ -31,7 +33,7 @@ class Reader:
     read: Callable[[Path], Campaign | CurveCampaign]
 
 
-T = TypeVar("T", Reader, MethodRules)
+T = TypeVar("T", Reader, MethodRules, ExportFormat)
 
 
 def read_campaign(folder: Path) -> Campaign | CurveCampaign:
@@ -47,7 +49,10 @@ def read_campaign(folder: Path) -> Campaign | CurveCampaign:
     if not is_folder:
         message = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
         if _exists(folder):
-            message = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
+            message = (
+                "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv, or say with "
+                "--mapping FILE what the columns of an instrument's file are (docs/files-as-they-come.md)"
+            )
         raise CampaignError(str(folder), [Fault(str(folder), None, None, message)])
     formats = readers()
     reader = next((reader for reader in formats if reader.recognises(folder)), formats[-1])
@@ -67,6 +72,13 @@ def method_rules() -> dict[str, MethodRules]:
     return {rule.name: rule for rule in rules}
 
 
+@cache
+def export_formats() -> dict[str, ExportFormat]:
+    """Return the formats of instruments' own files, by their names."""
+    formats = (*_built_in("exports", "EXPORT", ExportFormat), *_plugged_in(ExportFormat))
+    return {format.name: format for format in formats}
+
+
 def _built_in(room: str, attribute: str, kind: type[T]) -> Iterator[T]:
     package = importlib.import_module(f"monitor.readers.{room}")
     for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda module: module.name):
@@ -81,8 +93,10 @@ def _plugged_in(kind: type[T]) -> Iterator[T]:
             entry = point.load()
         except Exception as error:
             raise InputError(f"the plug-in {point.name} ({point.value}) cannot be loaded: {error}") from error
-        if not isinstance(entry, Reader | MethodRules):
-            raise InputError(f"the plug-in {point.name} ({point.value}) must be a Reader or a MethodRules")
+        if not isinstance(entry, Reader | MethodRules | ExportFormat):
+            raise InputError(
+                f"the plug-in {point.name} ({point.value}) must be a Reader, a MethodRules or an ExportFormat"
+            )
         if isinstance(entry, kind):
             yield entry
 

@@ -118,6 +118,7 @@ def _setup(table: Table) -> Setup | None:
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
         known=_known(table, form),
         turn_uncertainty=_stated(table, "urad") if form.turns else None,
+        certificate=table.text("certificate"),
     )
     table.finish()
     return None if len(table.faults) > before else setup

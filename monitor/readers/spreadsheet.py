@@ -27,6 +27,8 @@ WORKBOOK = "campaign.xlsx"
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
 _TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
+#: Unpacked, a workbook of a million rows has some 200 MiB; what is larger is an attack on memory.
+UNPACKED_BYTES = 512 * 2**20
 #: Columns of true and false.
 _OF_TRUTHS = ("warm_up",)
 
@@ -93,6 +95,26 @@ def _written(rows: Iterable[Sequence[str]]) -> str:
 
 
 def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | None:
+    rows = sheet_rows(file, content, stem, faults, or_first=file != WORKBOOK)
+    if rows is None:
+        return None
+    width = max((index + 1 for index, cell in enumerate(rows[0] if rows else []) if cell), default=0)
+    # A row ends with its last cell that was ever filled; what stands beside the table is a fault of its row.
+    cut = [
+        [*row, *[""] * (width - len(row))][:width] + [cell for cell in row[width:] if cell] for row in rows
+    ]
+    text = _written(cut).rstrip("\n")
+    if not text:
+        faults.add(file, None, None, f"the sheet of '{stem}' is empty; its first row names the columns")
+        return None
+    return text + "\n"
+
+
+def sheet_rows(
+    file: str, content: bytes, sheet: str | None, faults: Faults, *, or_first: bool = False
+) -> list[list[str]] | None:
+    """Return the cells of a sheet as CSV writes them, of the first sheet where none is named (``or_first``: or none has
+    that name); None with the fault noted."""
     try:
         from openpyxl import load_workbook
     except ImportError:
@@ -102,6 +124,13 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
         )  # fmt: skip
         return None
     try:
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            unpacked = sum(member.file_size for member in packed.infolist())
+        if unpacked > UNPACKED_BYTES:
+            faults.add(
+                file, None, None, f"the workbook unpacks to more than {UNPACKED_BYTES // 2**20} MiB; split it"
+            )
+            return None
         with warnings.catch_warnings():
             # What openpyxl does not keep (drop-down lists, colours) is not read either.
             warnings.simplefilter("ignore")
@@ -112,27 +141,18 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
         )
         return None
     names = {name.casefold(): name for name in book.sheetnames}
-    sheet = names.get(stem, None if file == WORKBOOK else book.sheetnames[0])
-    if sheet is None:
+    first = book.sheetnames[0] if book.sheetnames else None
+    title = first if sheet is None else names.get(sheet.casefold(), first if or_first else None)
+    if title is None:
         listed = ", ".join(book.sheetnames)
         faults.add(
             file,
             None,
             None,
-            f"there is no sheet '{stem}'; name the sheet of that table so; there are {listed}",
+            f"there is no sheet '{sheet}'; name the sheet of that table so; there are {listed}",
         )
         return None
-    rows = [[_cell(value) for value in row] for row in book[sheet].iter_rows(values_only=True)]
-    width = max((index + 1 for index, cell in enumerate(rows[0] if rows else []) if cell), default=0)
-    # A row ends with its last cell that was ever filled; what stands beside the table is a fault of its row.
-    cut = [
-        [*row, *[""] * (width - len(row))][:width] + [cell for cell in row[width:] if cell] for row in rows
-    ]
-    text = _written(cut).rstrip("\n")
-    if not text:
-        faults.add(file, None, None, f"the sheet '{sheet}' is empty; its first row names the columns")
-        return None
-    return text + "\n"
+    return [[_cell(value) for value in row] for row in book[title].iter_rows(values_only=True)]
 
 
 def _cell(value: Any) -> str:

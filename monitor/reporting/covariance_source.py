@@ -17,6 +17,8 @@ class CovarianceKind(Enum):
     ALL_RUNS = "all_runs"
     STATED_BY_PROBE = "stated_by_probe"
     REPEATABILITY = "repeatability"
+    STATED_BY_SETUPS = "stated_by_setups"
+    REPEATABILITY_OF_SETUPS = "repeatability_of_setups"
 
 
 class TakenAsKnown(Enum):
@@ -31,7 +33,8 @@ class CovarianceSource:
     """Where the covariance of the readings comes from.
 
     ``runs`` and ``dof``, the degrees of freedom, belong to a covariance that was estimated from repeated runs, ``u_um``
-    to one that was stated or is the repeatability, in µm. ``selection`` names the stored selection (or campaign) whose
+    to one that was stated or is the repeatability, in µm, ``times`` to a repeatability as a multiple of what each
+    setup of an instrument states. ``selection`` names the stored selection (or campaign) whose
     runs were taken. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known`` whose
     errors are no part of u.
     """
@@ -43,6 +46,7 @@ class CovarianceSource:
     selection: str | None = None
     linear_axes: bool = False
     taken_as_known: tuple[TakenAsKnown, ...] = ()
+    times: float | None = field(default=None, metadata=OMITTED)
 
 
 def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) -> str:
@@ -51,7 +55,8 @@ def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) ->
     # Two digits: that is how well the repeatability of few runs is known at most.
     digits = ".2g" if source.kind is CovarianceKind.REPEATABILITY else "g"
     u = "" if source.u_um is None else f"{source.u_um:{digits}}".replace(".", say.decimal_sign)
-    sentence = say(f"covariance.{source.kind.value}", runs=source.runs, dof=source.dof, u=u)
+    times = "" if source.times is None else f"{source.times:.2g}".replace(".", say.decimal_sign)
+    sentence = say(f"covariance.{source.kind.value}", runs=source.runs, dof=source.dof, u=u, times=times)
     if source.selection is not None:
         sentence = say("covariance.selection", name=source.selection, sentence=sentence)
     if source.linear_axes:

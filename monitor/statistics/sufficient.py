@@ -13,7 +13,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.days.block_lines import Blocks, block_lines
+from monitor.statistics.days.block_lines import DEPENDENT, Blocks, block_lines
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
 
@@ -148,6 +148,26 @@ def drift_from_sums(
     u = np.sqrt(_quotient(np.maximum(smm - slope * stm, 0.0) / dof, np.where(enough, stt, np.nan)))
     p_value = 2.0 * student_tail(np.abs(_quotient(slope, u)), dof)
     return CellDrift(slope, u, p_value, np.full(count, np.nan))
+
+
+def slope_beside(
+    groups: Array,
+    squares: tuple[Array, Array],
+    products: tuple[Array, Array, Array],
+    sums: tuple[Array, Array, Array],
+) -> Array:
+    """Slope (c,) of m over t with a column g fitted beside it, from sums over ``groups``; NaN where g and t are one.
+
+    ``squares`` are the sums of t² and g², ``products`` those of t g, t m and g m, ``sums`` those of t, g and m.
+    """
+    t, g, m = sums
+    stt, sgg = squares[0] - t * t / groups, squares[1] - g * g / groups
+    stg, stm, sgm = products[0] - t * g / groups, products[1] - t * m / groups, products[2] - g * m / groups
+    determinant = stt * sgg - stg * stg
+    # What rounding leaves of the time once the column is taken out of it.
+    return _quotient(
+        stm * sgg - sgm * stg, np.where(determinant > DEPENDENT**2 * stt * sgg, determinant, np.nan)
+    )
 
 
 def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = None) -> CellDrift:

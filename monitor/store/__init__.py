@@ -83,11 +83,13 @@ from monitor.store.past.machine_runs import (
     campaign_tolerances,
     check_campaigns,
     identified_runs,
+    latest_frames,
     machine_descriptions,
     machine_runs,
     parameter_frames,
     probing_counts,
 )
+from monitor.store.recalling import Recalled
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import (
@@ -122,6 +124,7 @@ __all__ = [
     "MachineModel",
     "Patience",
     "QueryResult",
+    "Recalled",
     "RecordedRun",
     "Restored",
     "RunRow",
@@ -175,6 +178,7 @@ __all__ = [
     "last_identification",
     "last_used_campaign",
     "latest_documents",
+    "latest_frames",
     "latest_maps",
     "latest_tolerances",
     "list_backups",

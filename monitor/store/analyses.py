@@ -165,17 +165,20 @@ def stored_analyses(
     return tuple(_stored(row) for row in rows)
 
 
-def latest_maps(db: Database) -> dict[str, float]:
-    """By machine, the worst volumetric error in µm of the map of its latest mapped run, partial maps among them."""
+def latest_maps(db: Database, machine: str | None = None) -> dict[str, float]:
+    """By machine, the worst volumetric error in µm of the map of its latest mapped run, partial maps among them; of one
+    ``machine`` alone where it is named."""
     rows = db.rows(
         """
         SELECT c.machine, CAST((a.document ->> '$.worst.error_um') AS DOUBLE)
         FROM analysis AS a JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id, run)
         WHERE a.kind IN ('volumetric map', 'partial volumetric map') AND c.campaign IS NOT NULL
+              AND ($machine IS NULL OR c.machine = $machine)
         QUALIFY row_number() OVER (PARTITION BY c.machine ORDER BY r.started_at DESC, a.analysis_id DESC) = 1
-        """
+        """,
+        {"machine": machine},
     )
-    return {machine: float(worst) for machine, worst in rows}
+    return {name: float(worst) for name, worst in rows}
 
 
 def _stored(row: tuple[Any, ...]) -> StoredAnalysis:

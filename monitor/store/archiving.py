@@ -78,11 +78,11 @@ def archive_files(
     files = size = 0
     for number, (campaign_id, campaign) in enumerate(campaigns, start=1):
         taken = [file for file in source_files(db, campaign_id) if file.content]
-        place = folder / str(campaign_id)
+        target = folder / str(campaign_id)
         try:
-            _write(place, taken)
+            _write(target, taken)
         except OSError as fault:
-            raise StoreError(f"{place} could not be written, its campaign stays whole: {fault}") from fault
+            raise StoreError(f"{target} could not be written, its campaign stays whole: {fault}") from fault
         listed = [{"file": file.name, "sha256": file.sha256, "bytes": len(file.content)} for file in taken]
         document = {"campaign_id": campaign_id, "campaign": campaign, "rule": rule, "files": listed}
         with db.transaction():
@@ -130,28 +130,30 @@ def _documents(db: Database) -> list[dict[str, Any]]:
     return [json.loads(document) for (document,) in rows]
 
 
-def _write(place: Path, files: list[SourceFile]) -> None:
+def _write(target: Path, files: list[SourceFile]) -> None:
     """Write files and the list of their hashes, to the disk, and read each back."""
     # Only the last part of a stored name: nothing is written outside the folder.
     names = [Path(file.name).name for file in files]
     if len({*names, _SUMS}) != len(names) + 1:
         raise StoreError(
-            f"files of the campaign {place.name} would have one name in {place}: {', '.join(names)}"
+            f"files of the campaign {target.name} would have one name in {target}: {', '.join(names)}"
         )
-    place.mkdir(parents=True, exist_ok=True)
+    target.mkdir(parents=True, exist_ok=True)
     for name, file in zip(names, files, strict=True):
-        path = place / name
+        path = target / name
         if path.exists() and path.read_bytes() == file.content:
             continue
         _write_new(path, file.content)
     sums = "".join(f"{file.sha256}  {name}\n" for name, file in zip(names, files, strict=True))
-    if not (place / _SUMS).exists() or (place / _SUMS).read_text("utf-8") != sums:
-        _write_new(place / _SUMS, sums.encode())
-    for folder in (place, place.parent):
+    if not (target / _SUMS).exists() or (target / _SUMS).read_text("utf-8") != sums:
+        _write_new(target / _SUMS, sums.encode())
+    for folder in (target, target.parent):
         sync_folder(folder)
     for name, file in zip(names, files, strict=True):
-        if hashlib.sha256((place / name).read_bytes()).hexdigest() != file.sha256:
-            raise StoreError(f"{place / name} does not read back as it was written; its campaign stays whole")
+        if hashlib.sha256((target / name).read_bytes()).hexdigest() != file.sha256:
+            raise StoreError(
+                f"{target / name} does not read back as it was written; its campaign stays whole"
+            )
 
 
 def _write_new(path: Path, content: bytes) -> None:

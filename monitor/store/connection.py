@@ -13,7 +13,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,15 +23,17 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import duckdb
 
 from monitor.exceptions import StoreError
-from monitor.store import migrations
+from monitor.stopping import checkpoint
+from monitor.store import bound_values, migrations
+from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
 from monitor.store.opening import connect, damaged, is_missing, make, make_log
+from monitor.store.recalling import Recalled
 from monitor.store.turns import Patience
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Parameters = Sequence[Any] | Mapping[str, Any]
 Record = TypeVar("Record")
 
 
@@ -62,6 +64,8 @@ class Database:
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
         self._remembered: list[str] = []
+        #: What was read and may be read again, where this process alone has the file and says so; None: read anew.
+        self.recalled: Recalled | None = None
         self._check_name()
         self._available = migrations.available()
         self._connection: duckdb.DuckDBPyConnection | None = None
@@ -103,6 +107,7 @@ class Database:
     @contextmanager
     def _used(self) -> Iterator[duckdb.DuckDBPyConnection]:
         """Yield the connection to one thread at a time; faults of the file in words, Ctrl-C as what it is."""
+        checkpoint()
         with self._lock:
             if self._connection is None:
                 raise StoreError(f"{self.path} is closed")
@@ -148,30 +153,36 @@ class Database:
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
+        self._forget()
         with self._used() as connection:
-            connection.execute(sql, parameters)
+            bound_values.execute(connection, sql, parameters)
+
+    def set_variables(self, values: Mapping[str, Any]) -> None:
+        """Give values to variables, which ``getvariable`` reads in statements that cannot be prepared."""
+        with self._used() as connection:
+            bound_values.set_variables(connection, values)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
         """Return the rows of a query as tuples."""
         with self._used() as connection:
-            return connection.execute(sql, parameters).fetchall()
+            return bound_values.execute(connection, sql, parameters).fetchall()
 
     def records(self, kind: type[Record], sql: str, parameters: Parameters = ()) -> tuple[Record, ...]:
         """Return the rows of a query as records of a kind, whose fields are named as the columns."""
         with self._used() as connection:
-            cursor = connection.execute(sql, parameters)
+            cursor = bound_values.execute(connection, sql, parameters)
             names = [column[0] for column in cursor.description or ()]
             return tuple(kind(**dict(zip(names, row, strict=True))) for row in cursor.fetchall())
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
         """Return the rows of a query as a table, for views that people read."""
         with self._used() as connection:
-            return connection.execute(sql, parameters).df()
+            return bound_values.execute(connection, sql, parameters).df()
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
         """Return the columns of a query as numpy arrays, masked where NULL."""
         with self._used() as connection:
-            columns: dict[str, Any] = connection.execute(sql, parameters).fetchnumpy()
+            columns: dict[str, Any] = bound_values.execute(connection, sql, parameters).fetchnumpy()
             return columns
 
     def insert(
@@ -181,10 +192,12 @@ class Database:
         # Loaded where something is written: whoever only reads does not wait for it.
         import pandas as pd
 
+        self._forget()
+
         with self._used() as connection:
             connection.register("incoming", pd.DataFrame(incoming))
             try:
-                connection.execute(sql, parameters)
+                bound_values.execute(connection, sql, parameters)
             finally:
                 connection.unregister("incoming")
 
@@ -192,7 +205,21 @@ class Database:
     def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
         """Yield DuckDB's connection for this block; no other thread uses the database meanwhile."""
         with self._used() as connection:
-            yield connection
+            try:
+                yield connection
+            finally:
+                self._forget()
+
+    def recall(self, key: Hashable, read: Callable[[], Record]) -> Record:
+        """Return what ``read`` read before under a key, if nothing was written since; a transaction reads anew."""
+        if self.recalled is None or self._in_transaction:
+            return read()
+        answer: Record = self.recalled.answer(key, read)
+        return answer
+
+    def _forget(self) -> None:
+        if self.recalled is not None:
+            self.recalled.forget()
 
     def next_number(self, table: str, column: str) -> int:
         """Return one more than the largest number in use; call it inside the transaction that uses it."""
@@ -244,6 +271,7 @@ class Database:
                     raise
                 finally:
                     self._in_transaction = False
+                    self._forget()
 
     def _fit(self, connection: duckdb.DuckDBPyConnection) -> None:
         """Bring the schema to the present one; refuse a database that does not fit this software."""

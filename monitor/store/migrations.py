@@ -69,17 +69,21 @@ def available() -> tuple[Migration, ...]:
 
 def applied(connection: duckdb.DuckDBPyConnection) -> list[tuple[int, str, str, str]]:
     """Number, name, checksum and software version of every applied migration, in order."""
-    tables = connection.execute(
-        "SELECT table_name FROM duckdb_tables() WHERE database_name = current_database() ORDER BY ALL"
-    ).fetchall()
-    if not tables:
-        return []
-    if ("schema_migration",) not in tables:
+    try:
+        return connection.execute(
+            "SELECT number, name, sha256, software_version FROM schema_migration ORDER BY number"
+        ).fetchall()
+    except duckdb.CatalogException:
+        # Asked only now: the list of tables takes a third as long as opening the file, and every verb opens one.
+        tables = connection.execute(
+            "SELECT table_name FROM duckdb_tables() WHERE database_name = current_database() ORDER BY ALL"
+        ).fetchall()
+        if not tables:
+            return []
+        if ("schema_migration",) in tables:
+            raise
         names = ", ".join(name for (name,) in tables[:5])
-        raise StoreError(f"this is a DuckDB file of something else: it has the tables {names}")
-    return connection.execute(
-        "SELECT number, name, sha256, software_version FROM schema_migration ORDER BY number"
-    ).fetchall()
+        raise StoreError(f"this is a DuckDB file of something else: it has the tables {names}") from None
 
 
 def pending(connection: duckdb.DuckDBPyConnection, migrations: Sequence[Migration]) -> tuple[Migration, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +11,9 @@ import duckdb
 
 from monitor.exceptions import InputError
 from monitor.store.connection import Database
+
+#: What DuckDB calls a moment with a time zone, such as ``now()``.
+_ZONED = "TIMESTAMP WITH TIME ZONE"
 
 
 @dataclass(frozen=True)
@@ -38,28 +41,62 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
     Raises InputError for anything else, and for what DuckDB does not understand, with its own words.
     """
     with db.connected() as connection:
-        try:
-            statements = connection.extract_statements(text)
-        except duckdb.Error as fault:
-            raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
-        if len(statements) != 1:
-            count = f"these are {len(statements)}" if statements else "there is none"
-            raise InputError(f"type one query, such as SELECT * FROM v_machines; {count}")
-        # EXPLAIN ANALYZE would run what it explains.
-        if statements[0].type != duckdb.StatementType.SELECT:
-            raise InputError(
-                "a query may only read: begin it with SELECT, WITH, FROM, SHOW, DESCRIBE or SUMMARIZE"
-            )
+        statement = _only_query(connection, text)
         with _reading(connection):
             try:
-                cursor = connection.execute(statements[0])
+                cursor = connection.execute(statement)
+                columns = tuple(str(column[0]) for column in cursor.description or ())
+                types = tuple(str(column[1]) for column in cursor.description or ())
+                zoned = _with_zones_as_text(statement.query, columns, types)
+                cursor = cursor if zoned is None else connection.execute(zoned)
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
+                if "'pytz'" in str(fault):
+                    raise InputError(
+                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in "
+                        "SELECT CAST(now() AS TIMESTAMP): that is its moment in UTC"
+                    ) from fault
                 raise InputError(f"the query cannot be answered: {fault}") from fault
-            columns = tuple(str(column[0]) for column in cursor.description or ())
-            types = tuple(str(column[1]) for column in cursor.description or ())
     truncated = limit is not None and len(rows) > limit
     return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)
+
+
+def _only_query(connection: duckdb.DuckDBPyConnection, text: str) -> duckdb.Statement:
+    """Return the one statement of a text that only reads. Raises InputError for any other text."""
+    try:
+        statements = connection.extract_statements(text)
+    except duckdb.Error as fault:
+        raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
+    if len(statements) != 1:
+        count = f"these are {len(statements)}" if statements else "there is none"
+        raise InputError(f"type one query, such as SELECT * FROM v_machines; {count}")
+    # EXPLAIN ANALYZE would run what it explains.
+    if statements[0].type != duckdb.StatementType.SELECT:
+        raise InputError(
+            "a query may only read: begin it with SELECT, WITH, FROM, SHOW, DESCRIBE or SUMMARIZE"
+        )
+    return statements[0]
+
+
+def _with_zones_as_text(query: str, columns: Sequence[str], types: Sequence[str]) -> str | None:
+    """Return a query of the same rows whose moments with a zone are texts: DuckDB's Python needs pytz for them.
+
+    None where there are none. Raises InputError where one stands inside a list or structure.
+    """
+    if not any(_ZONED in kind for kind in types):
+        return None
+    for name, kind in zip(columns, types, strict=True):
+        if _ZONED in kind and kind != _ZONED:
+            raise InputError(
+                f"the column {name} holds moments with a time zone inside a {kind}; write them as text or without a "
+                "zone, such as CAST(moment AS TIMESTAMP)"
+            )
+    aliases = [f"column{number}" for number in range(len(columns))]
+    listed = ", ".join(
+        f"CAST({alias} AS VARCHAR)" if kind == _ZONED else alias
+        for alias, kind in zip(aliases, types, strict=True)
+    )
+    return f"SELECT {listed} FROM (\n{query.rstrip().rstrip(';')}\n) AS asked({', '.join(aliases)})"
 
 
 def campaign_readings(db: Database, campaign: str) -> QueryResult:

@@ -31,7 +31,10 @@ def row_covariances(run: MeasuredRun, unknowns: Array, axes: LinearAxes) -> dict
     assert pose.by_error is not None
     covariances: dict[str, Array] = {}
 
+    is_number = problem.is_number.ravel()
+
     def add(source: str, columns: Array) -> None:
+        columns = columns[is_number]
         square = columns @ columns.T
         covariances[source] = covariances.get(source, 0.0) + 0.5 * (square + square.T)
 

@@ -67,7 +67,7 @@ FILES: Mapping[str, FileFields] = {
     "digital certificate page": FileFields(download="path"),
     "explain": _FIGURES,
     "export": FileFields(download="folder"),
-    "import": FileFields(upload="folders"),
+    "import": FileFields(upload="folders", uploads=("mapping",)),
     "issue certificate": FileFields(upload="laboratory", download="out", uploads=("fonts",)),
     "issued certificate": FileFields(download="path"),
     "map": FileFields(download="out", downloads=("figures",)),

@@ -6,6 +6,7 @@ import logging
 from pathlib import Path
 
 from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
@@ -31,6 +32,7 @@ from monitor.web.pages import (
 )
 from monitor.web.pages import fleet as fleet_page
 from monitor.web.pages import machine as machine_page
+from monitor.web.previews import Previews
 from monitor.web.rendering import refusal_page
 from monitor.web.sessions import Sessions
 from monitor.web.settings import ServerSettings
@@ -67,12 +69,14 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     app.state.asker = asker
     desk = Desk(asker)
     app.state.desk = desk
+    app.state.previews = Previews()
     app.state.working_folder = working_folder
     app.include_router(static_routes())
     app.include_router(interface(asker, working_folder))
     for room in _PAGES:
         app.include_router(room.routes())
     app.add_exception_handler(HTTPException, _of_http)
+    app.add_exception_handler(RequestValidationError, _of_address)
     app.add_exception_handler(MonitorError, _of_question)
     app.add_exception_handler(Exception, _of_question)
     # Around everything, what answers a fault of the software included.
@@ -87,6 +91,15 @@ async def _of_http(request: Request, error: Exception) -> Response:
         405: f"{request.url.path} is not asked with {request.method}",
     }.get(error.status_code, str(error.detail))
     return _refused(request, Refusal(error.status_code, text))
+
+
+async def _of_address(request: Request, error: Exception) -> Response:
+    """Answer an address that lacks a part, or has one of another kind."""
+    assert isinstance(error, RequestValidationError)
+    faults = (f"'{fault['loc'][-1]}': {str(fault['msg']).lower()}" for fault in error.errors())
+    return _refused(
+        request, Refusal(400, f"the address {request.url.path} is not complete: {'; '.join(faults)}")
+    )
 
 
 async def _of_question(request: Request, error: Exception) -> Response:

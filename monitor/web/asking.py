@@ -26,6 +26,13 @@ class ForbiddenError(MonitorError):
     """A question that the user's role may not ask."""
 
 
+class _AnsweredError(Exception):
+    """Ends a transaction of which nothing is to be stored; ``answer`` is that of its question."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+
 class Asker:
     """Asks questions of the served database; ``freshness`` says which answers still hold.
 
@@ -40,14 +47,18 @@ class Asker:
     def __call__(
         self, user: User, question: str, document: Mapping[str, Any] | None = None,
         files: Mapping[str, Any] | None = None, tolerances: Mapping[str, Mapping[str, float]] | None = None,
+        *, storing: bool = True,
     ) -> Any:  # fmt: skip
         """Return the typed answer; ``files`` are paths that the server itself fills in.
 
         ``tolerances`` are limits by machine type of whoever asks (None: those of the server's configuration).
+        Without ``storing`` all that the question stores is undone once it is answered.
 
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
+        if not storing:
+            return self._tried(user, question, document or {}, files or {})
         if question not in REMEMBERED or files or tolerances is not None:
             return self._asked(user, question, document or {}, files or {}, tolerances)
         key, answer = self.freshness.recall(question, document or {})
@@ -55,6 +66,16 @@ class Asker:
             answer = self._asked(user, question, document or {}, {}, None)
             self.freshness.remember(key, answer)
         return answer
+
+    def _tried(self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any]) -> Any:
+        """Ask in a transaction that is taken back: who writes meanwhile waits."""
+        request = request_of(question, document, files)
+        with closing(self._db.session(user.name)) as session:
+            try:
+                with session.transaction():
+                    raise _AnsweredError(QUESTIONS[question].load()(session, request))
+            except _AnsweredError as answered:
+                return answered.answer
 
     def _asked(
         self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any],

@@ -12,12 +12,14 @@ from collections.abc import Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as StillWorking
 from dataclasses import dataclass, field
-from threading import Lock
+from threading import Event, Lock
 from typing import Any
 
-from monitor.web.asking import Asker, check_role
+from monitor.exceptions import NotFoundError
+from monitor.stopping import StoppedError, stoppable
+from monitor.web.asking import Asker, ForbiddenError, check_role
 from monitor.web.freshness import Stamp
-from monitor.web.users import User
+from monitor.web.users import Role, User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
 WORKERS = 2
@@ -36,7 +38,10 @@ class Ticket:
     document: Mapping[str, Any]
     user: User
     future: Future[Any]
+    stop: Event
     asked_at: float = field(default_factory=time.monotonic)
+    #: Who took it back; empty as long as nobody did.
+    taken_back_by: str = ""
 
     @property
     def seconds(self) -> float:
@@ -45,13 +50,29 @@ class Ticket:
 
     @property
     def is_done(self) -> bool:
-        """Whether there is an answer, or a refusal."""
-        return self.future.done()
+        """Whether there is an answer, or a refusal; what was taken back has neither until it is asked again."""
+        return self.future.done() and not self.is_taken_back
+
+    @property
+    def is_taken_back(self) -> bool:
+        """Whether somebody took it back before there was an answer."""
+        if not self.taken_back_by or not self.future.done():
+            return False
+        return self.future.cancelled() or isinstance(self.future.exception(), StoppedError)
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether it was taken back and still goes on to its next checkpoint."""
+        return bool(self.taken_back_by) and not self.future.done()
 
     @property
     def is_good(self) -> bool:
-        """Whether it is under way, or has an answer: what was cancelled or refused is asked anew."""
+        """Whether it is under way, was taken back, or has an answer: what was refused is asked anew."""
         return not self.is_done or not (self.future.cancelled() or self.future.exception())
+
+    def may_be_taken_back_by(self, user: User) -> bool:
+        """Whether this user asked it, or is an approver."""
+        return user.name == self.user.name or user.role >= Role.APPROVER
 
     @property
     def is_running(self) -> bool:
@@ -59,13 +80,13 @@ class Ticket:
         return self.future.running()
 
     def answer(self, patience: float = PATIENCE_S) -> Any:
-        """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised.
+        """Return the answer, None where it is not there yet or was taken back. Raises what the question raised.
 
         The patience counts from when it was asked first, so that a page with four questions waits once.
         """
         try:
             return self.future.result(timeout=max(patience - self.seconds, 0.0))
-        except (StillWorking, CancelledError):
+        except (StillWorking, CancelledError, StoppedError):
             return None
 
 
@@ -80,37 +101,80 @@ class Desk:
         self._count = 0
 
     def ask(
-        self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any] | None = None
-    ) -> Ticket:
+        self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any] | None = None,
+        *, anew: bool = False,
+    ) -> Ticket:  # fmt: skip
         """Return the ticket of a question, a new one where nobody asked it since the last change.
 
+        What was taken back stays so until ``ask_again``: a page that loads itself again does not start it; ``anew``
+        does.
         ``files`` are paths that the server itself fills in; they are no part of what is asked.
         """
         check_role(user, question)
-        key = (
-            question,
-            json.dumps(document, sort_keys=True, default=str),
-            self.asker.freshness.stamp(question, document),
-        )
+        key = self._key(question, document)
         with self._lock:
             ticket = self._tickets.get(key)
-            if ticket is not None and ticket.is_good:
+            if ticket is not None and ticket.is_good and not (anew and ticket.is_taken_back):
                 return ticket
             self._count += 1
-            future = self._pool.submit(self.asker, user, question, document, files)
-            self._tickets[key] = ticket = Ticket(self._count, question, document, user, future)
+            stop = Event()
+            future = self._pool.submit(self._answered, stop, user, question, document, files)
+            self._tickets[key] = ticket = Ticket(self._count, question, document, user, future, stop)
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
 
+    def standing(self, question: str, document: Mapping[str, Any]) -> Ticket | None:
+        """Return the ticket of a question that was asked since the last change, None where nobody did; asks nothing."""
+        with self._lock:
+            ticket = self._tickets.get(self._key(question, document))
+        return ticket if ticket is not None and ticket.is_good else None
+
+    def _key(self, question: str, document: Mapping[str, Any]) -> tuple[str, str, Stamp]:
+        return (
+            question,
+            json.dumps(document, sort_keys=True, default=str),
+            self.asker.freshness.stamp(question, document),
+        )
+
+    def _answered(
+        self,
+        stop: Event,
+        user: User,
+        question: str,
+        document: Mapping[str, Any],
+        files: Mapping[str, Any] | None,
+    ) -> Any:
+        with stoppable(stop):
+            return self.asker(user, question, document, files)
+
     def under_way(self) -> list[Ticket]:
         """Return what is not answered yet, in the order of asking."""
         with self._lock:
-            return [ticket for ticket in self._tickets.values() if not ticket.is_done]
+            return [ticket for ticket in self._tickets.values() if not ticket.future.done()]
 
-    def cancel(self, number: int) -> bool:
-        """Take back a question that still waits; one that is being computed ends by itself."""
-        return any(ticket.future.cancel() for ticket in self.under_way() if ticket.number == number)
+    def take_back(self, user: User, number: int) -> None:
+        """Take back a question: one that waits at once, one that is being computed at its next checkpoint.
+
+        Raises NotFoundError where it is answered already, ForbiddenError for whoever neither asked it nor approves.
+        """
+        ticket = next((ticket for ticket in self.under_way() if ticket.number == number), None)
+        if ticket is None:
+            raise NotFoundError("this is answered already, or was taken back: there is nothing to stop")
+        if not ticket.may_be_taken_back_by(user):
+            raise ForbiddenError(
+                f"{ticket.user.name} asked this: {ticket.user.name} or an approver can take it back"
+            )
+        ticket.taken_back_by = user.name
+        ticket.stop.set()
+        ticket.future.cancel()
+
+    def ask_again(self, number: int) -> None:
+        """Forget that a question was taken back: the next page that needs it asks it anew."""
+        with self._lock:
+            for key, ticket in list(self._tickets.items()):
+                if ticket.number == number and ticket.is_taken_back:
+                    del self._tickets[key]
 
     def close(self) -> None:
         """Wait for what is being computed, so that nothing is left half; take back what waits."""

@@ -67,3 +67,8 @@ def whole_number(name: str, text: str) -> int:
     if not text.isdecimal() or len(text) > 9:
         raise InputError(f"'{name}' is a whole number, such as 20, not '{text}'")
     return int(text)
+
+
+def own_address(address: str) -> str:
+    """Return an address of this server, the first page for any other."""
+    return address if address.startswith("/") and not address.startswith(("//", "/\\")) else "/"

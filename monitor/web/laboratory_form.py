@@ -26,7 +26,7 @@ _NUMBERS = frozenset(f"temperature.{key}" for key in SECTIONS["temperature"] if 
 OPTIONAL = frozenset(
     {
         "laboratory.accreditation", "laboratory.country", "laboratory.dcc_version", "item.description",
-        "item.identification", "traceability.scale_bar",
+        "item.identification", "traceability.scale_bar", "traceability.instruments",
         *(f"{section}.{key}" for section in ("accreditation", "standards", "temperature") for key in SECTIONS[section]),
     }
 )  # fmt: skip

@@ -27,6 +27,7 @@ def page(request: Request, template: str, *, status: int = 200, **context: Any) 
     text = _environment().get_template(template).render(
         user=getattr(request.state, "user", None),
         path=request.url.path,
+        here=f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path,
         proof=sessions.proof(session) if session else "",
         logs_in=sessions.users is not None,
         reads_only=request.app.state.settings.reading_only,

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.documents import data_key
+from monitor.documents import Sentence, data_key
 
 Schema = dict[str, Any]
 
@@ -46,7 +46,7 @@ class Schemas:
         """Return the schema of a type, a reference where it is a record."""
         origin, members = typing.get_origin(hint), typing.get_args(hint)
         if origin in (typing.Union, types.UnionType):
-            return {"anyOf": [self.of(member) for member in members]}
+            return self._of_alternatives(members)
         if origin is typing.Literal:
             return {"enum": list(members)}
         if origin is np.ndarray:
@@ -62,6 +62,11 @@ class Schemas:
         if isinstance(hint, type) and issubclass(hint, Enum):
             return {"enum": [member.value for member in hint]}
         return dict(_SCALARS.get(hint, {}))
+
+    def _of_alternatives(self, members: tuple[Any, ...]) -> Schema:
+        """The schema of a union; the document of a sentence is the text that stands beside it."""
+        written = [self.of(member) for member in members if member is not Sentence]
+        return {"anyOf": written} if len(written) > 1 else written[0]
 
     def _of_fixed_length(self, members: tuple[Any, ...]) -> Schema:
         """The schema of a pair or triple; tools that know no prefixItems understand one of members of one type."""

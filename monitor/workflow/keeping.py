@@ -10,6 +10,7 @@ from typing import Literal
 
 from monitor.documents import OMITTED
 from monitor.exceptions import InputError
+from monitor.reporting import messages
 from monitor.store import (
     AuditEntry,
     Database,
@@ -81,10 +82,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
             anchored = anchored_entry(db, request.anchor)
             entry = None if anchored is None else anchored.entry
             if anchored is None:
-                faults.append(
-                    f"no entry of the audit has the hash {request.anchor.strip()}, which was kept elsewhere: the "
-                    "database was rewritten since, put back to an earlier state, or it is another database"
-                )
+                faults.append(messages.anchor_unknown(request.anchor.strip()))
     # Computed outside: nobody waits for a fit.
     recomputed, different = recompute(db, verification.last_sha256, request.recompute)
     faults += different
@@ -191,16 +189,17 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     rows = sum(count for count, _ in copy.tables.values())
     span = copy.span
     assert span is not None  # of those made by this version
-    entries = f"entries {span.first_entry} to {span.last_entry} of the audit"
-    what = f"{len(copy.tables)} tables, {rows} rows"
-    if span.previous is not None:
-        what = f"{entries}, {rows} rows" if span.last_entry >= span.first_entry else "nothing new"
-        what += f" since {span.previous}, which has to stay beside it"
+    if span.previous is None:
+        message = messages.backup_made(request.target, len(copy.tables), rows)
+    else:
+        message = messages.increment_made(
+            request.target, (span.first_entry, span.last_entry), rows, span.previous
+        )
     return BackupAnswer(
         file=request.target,
         sha256=copy.sha256,
         rows=rows,
-        message=f"{request.target}: {what}, checked; its manifest lies beside it",
+        message=message,
         first_entry=span.first_entry,
         last_entry=span.last_entry,
         follows=span.previous,
@@ -243,12 +242,9 @@ def restore_backup(request: RestoreRequest) -> RestoreAnswer:
     """Make a database from a backup. Raises StoreError where the backup is not what its manifest says."""
     restored = restore(request.source, request.target, request.at)
     made_at = restored.backup.made_at[:19].replace("T", " ")
-    message = f"{request.target} is the backup of {made_at} UTC"
-    if request.at is not None:
-        message = f"{request.target} is the database as it was at {request.at:%Y-%m-%d %H:%M:%S%z}"
+    message = messages.backup_restored(request.target, made_at, request.at)
     if restored.last_entry is not None:
-        message += f", up to entry {restored.last_entry} of the audit, from {', '.join(restored.files)}"
-        message += "; it was verified" if not restored.faults else "; its verification found:"
+        message += messages.restored_up_to(restored.last_entry, restored.files, verified=not restored.faults)
     return RestoreAnswer(
         request.target,
         restored.backup.sha256,

@@ -22,6 +22,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.likeness import Likeness
 from monitor.readers import read_campaign, write_campaign
 from monitor.records import Array, Campaign, CurveCampaign
+from monitor.reporting import messages
 from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.simulation import PEAK_UM
@@ -174,9 +175,8 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
         writer = csv.writer(stream)
         writer.writerow(_TrueValue.__dataclass_fields__)
         writer.writerows([getattr(row, key) for key in _TrueValue.__dataclass_fields__] for row in truth)
-    message = (
-        f"{request.out}: {len(folders)} campaigns of {len(request.machines)} machines like {pattern.name} "
-        f"({method.name}); {TRUTH} has the true values"
+    message = messages.likenesses_written(
+        request.out, len(folders), len(request.machines), (pattern.name, method.name), TRUTH
     )
     return LikeAnswer(tuple(folders), str(file), request.seed, message)
 

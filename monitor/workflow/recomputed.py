@@ -8,6 +8,7 @@ import numpy as np
 
 from monitor import __version__
 from monitor.exceptions import MonitorError
+from monitor.reporting import messages
 from monitor.store import (
     Database,
     StoredIdentification,
@@ -35,9 +36,7 @@ def recompute(db: Database, seed: str, count: int) -> tuple[int, tuple[str, ...]
             fault = _difference(db, number)
             computed += 1
             if fault is not None:
-                faults.append(
-                    f"identification {number} cannot be reproduced from the stored readings: {fault}"
-                )
+                faults.append(messages.not_reproduced(number, fault))
     return computed, tuple(faults)
 
 
@@ -59,7 +58,7 @@ def _first_difference(stored: StoredIdentification, again: StoredIdentification)
     if stored.parameters != again.parameters or [run.run for run in stored.runs] != [
         run.run for run in again.runs
     ]:
-        return "its runs or parameters are others"
+        return messages.OTHER_RUNS_OR_PARAMETERS
     for before, after in zip(stored.runs, again.runs, strict=True):
         u = np.sqrt(np.diag(after.covariance))
         off = np.abs(before.estimate - after.estimate) / np.where(u > 0.0, u, 1.0)
@@ -67,5 +66,5 @@ def _first_difference(stored: StoredIdentification, again: StoredIdentification)
         worst = int(np.argmax(np.where(refused, np.inf, np.nan_to_num(off))))
         if refused[worst] or off[worst] > TOLERANCE_U:
             name = stored.parameters[worst]
-            return f"{name} of run {before.run} of {stored.campaign} differs by {off[worst]:.2g} standard uncertainties"
+            return messages.parameter_differs(name, before.run, stored.campaign, float(off[worst]))
     return None

@@ -83,9 +83,9 @@ def compact_database(db: Database) -> CompactAnswer:
     """Write the database file anew without gaps. Raises StoreError, BusyError; InputError for a lake."""
     if not db.keeps_answers:
         raise InputError(f"{db.path} is a lake: merge its files (docs/scale.md)")
-    done = compact(db)
+    result = compact(db)
     message = (
-        f"{db.path}: {done.bytes_before / 1e6:.1f} MB before, {done.bytes_after / 1e6:.1f} MB now; {done.rows} rows, "
-        "all compared"
+        f"{db.path}: {result.bytes_before / 1e6:.1f} MB before, {result.bytes_after / 1e6:.1f} MB now; {result.rows} "
+        "rows, all compared"
     )
-    return CompactAnswer(Path(db.path), done.bytes_before, done.bytes_after, done.rows, message)
+    return CompactAnswer(Path(db.path), result.bytes_before, result.bytes_after, result.rows, message)

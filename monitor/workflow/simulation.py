@@ -11,6 +11,7 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.methods import Rehearsal, methods
 from monitor.readers import write_campaign
+from monitor.reporting import messages
 from monitor.units import MICROMETRE
 
 #: Largest displacement of a hidden effect where the request names none, µm.
@@ -92,11 +93,7 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
     )
     write_campaign(campaign, request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
-    hidden = (
-        f"{request.effect} with a peak of {request.peak:g} µm is hidden"
-        if request.effect
-        else "nothing is hidden"
-    )
+    hidden = (request.effect, request.peak) if request.effect else None
     return SimulateAnswer(
         folder=str(request.out),
         campaign=campaign.name,
@@ -106,5 +103,5 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         seed=request.seed,
         runs=runs,
         probings=probings,
-        message=f"{request.out}: {runs} run{'s' if runs > 1 else ''} of {probings // runs} probings; {hidden}",
+        message=messages.virtual_written(request.out, runs, probings // runs, hidden),
     )

@@ -95,11 +95,68 @@ function drawScene(canvas, chart) {
   let data = coloured(chart.data).map((trace) => effect === null || trace.meta !== effect.axis || !trace.meta ? trace
     : { ...trace, line: { ...trace.line, color: colour("orange"), width: 9 }, textfont: { color: colour("orange"), size: 17 } });
   data = data.concat(traces(arrows(vectors, vectors.residual, run, pose), step, "left by the model", colour("blue"), true));
+  if (effect !== null && effect.motion) {
+    chart.data.filter((trace) => effect.motion.axes.includes(trace.meta)).forEach((trace) => data.push({
+      ...trace, ...displaced(trace, effect.motion, 1), mode: "lines", text: undefined, hoverinfo: "skip", showlegend: false, meta: undefined,
+      line: { color: colour("orange"), width: 4, dash: "dash" },
+    }));
+  }
   if (effect !== null) {
     data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + effect.effect, colour("orange"), true));
     data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + effect.effect, colour("teal"), "legendonly"));
   }
-  return Plotly.react(canvas, data, coloured(chart.layout), SETTINGS).then(() => { canvas.dataset.drawn = "1"; });
+  return Plotly.react(canvas, data, coloured(chart.layout), SETTINGS).then(() => {
+    canvas.dataset.drawn = "1";
+    if (effect !== null && scene.swung !== effect) {
+      scene.swung = effect;
+      swing(canvas, coloured(chart.data), effect);
+    }
+  });
+}
+
+// The points of a line of the machine, moved by a share of an effect's motion; a turn is small and drawn as its first order.
+function displaced(trace, motion, share) {
+  const moved = { x: [], y: [], z: [] };
+  trace.x.forEach((_, index) => {
+    const arm = [trace.x[index], trace.y[index], trace.z[index]];
+    const from = arm.map((number, axis) => number - motion.about[axis]);
+    ["x", "y", "z"].forEach((name, axis) => {
+      const [second, third] = [(axis + 1) % 3, (axis + 2) % 3];
+      const turned = motion.turn[second] * from[third] - motion.turn[third] * from[second];
+      moved[name].push(arm[axis] === null ? null : arm[axis] + share * (motion.shift[axis] + turned));
+    });
+  });
+  return moved;
+}
+
+// What an effect moves swings twice and stands still again; whoever asked for less motion sees the end of it, dashed.
+function swing(canvas, lines, effect) {
+  cancelAnimationFrame(scene.frame);
+  const motion = effect.motion;
+  if (!motion || window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
+    return;
+  }
+  const rows = lines.map((_, row) => row).filter((row) => motion.axes.includes(lines[row].meta));
+  const begin = performance.now();
+  let drawing = false;
+  const step = (now) => {
+    if (scene.effect !== effect) {
+      return;
+    }
+    const seconds = (now - begin) / 1000;
+    const share = seconds < 3.2 ? Math.sin(2 * Math.PI * seconds / 1.6) : 0;
+    if (!drawing) {
+      drawing = true;
+      const moved = rows.map((row) => displaced(lines[row], motion, share));
+      const update = Object.fromEntries(["x", "y", "z"].map((name) => [name, moved.map((line) => line[name])]));
+      Plotly.restyle(canvas, update, rows).then(() => { drawing = false; canvas.dataset.swung = String(Number(canvas.dataset.swung || 0) + 1); });
+      if (share === 0 && seconds >= 3.2) {
+        return;
+      }
+    }
+    scene.frame = requestAnimationFrame(step);
+  };
+  scene.frame = requestAnimationFrame(step);
 }
 
 // The arrows of an effect, asked for once; while they are computed the server is asked again.
@@ -122,6 +179,7 @@ function pointAt(effect, redraw) {
   scene.pointed = effect;
   if (effect === null) {
     scene.effect = scene.vectors.tried;
+    scene.swung = scene.effect;
     redraw();
     return;
   }
@@ -131,7 +189,8 @@ function pointAt(effect, redraw) {
       return;
     }
     status.textContent = answer === null ? effect + " cannot be tried in this model"
-      : "Orange: what " + effect + " explains. Blue: what the model leaves. Where the arrows agree, it explains the residual.";
+      : "Orange: what " + effect + " explains. Blue: what the model leaves. Where the arrows agree, it explains the residual." +
+        (answer.motion ? " " + answer.motion.sentence + "; the motion is drawn far larger than it is." : "");
     if (answer !== null) {
       scene.effect = answer;
       redraw();

@@ -119,6 +119,17 @@ def test_sql_reads_and_never_writes(db: mm.Database, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the query cannot be answered: .*v_nothing"):
         db.sql("SELECT * FROM v_nothing")
     assert not file.exists()
+    # Moments with a zone: DuckDB's Python would ask for a library that is not installed.
+    moments = db.sql(
+        "SELECT t AS moment, n FROM (VALUES (TIMESTAMPTZ '2026-03-01 12:00:00+02', 2),"
+        " (TIMESTAMPTZ '2026-03-01 09:30:00+00', 1)) AS v(t, n) ORDER BY n -- the later last"
+    )
+    assert [moment.to_pydatetime() for moment in moments["moment"]] == [
+        datetime(2026, 3, 1, hour, minute, tzinfo=UTC) for hour, minute in ((9, 30), (10, 0))
+    ]
+    assert len(db.sql("SELECT now()")) == 1
+    with pytest.raises(InputError, match=r"the column l holds moments with a time zone inside a TIMESTAMP"):
+        db.sql("SELECT [now()] AS l")
     # The connection still writes after a query that failed.
     assert len(db.sql("SELECT * FROM v_runs", limit=3)) == 3
     assert (
@@ -148,6 +159,13 @@ def test_wrong_names_are_answered_with_the_right_ones(db: mm.Database, tmp_path:
         _ = mm.opem  # type: ignore[attr-defined]
     with pytest.raises(InputError, match=r"^there is no option 'peak'; did you mean 'peak_um'\? there are "):
         mm.simulate(tmp_path / "rehearsal", effect="EXX:reversal", peak=8.0)
+    # Options of the command line are arguments here.
+    with pytest.raises(InputError, match=r"^p 1.5: a coverage probability lies between 0 and 1$"):
+        db.campaign("five-days").uncertainty(p=1.5)
+    with pytest.raises(InputError, match=r"^holds_for week: choose run, day or campaign$"):
+        db.campaign("five-days").uncertainty(holds_for="week")
+    with pytest.raises(InputError, match=r"^peak_um 8 needs effect, the effect that has it$"):
+        mm.simulate(tmp_path / "rehearsal", peak_um=8.0)
     assert set(mm.__all__) <= set(dir(mm))
     with pytest.raises(CampaignError, match=r"campaign.toml: the file is missing"):
         mm.read(tmp_path)

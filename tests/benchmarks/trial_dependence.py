@@ -1,6 +1,7 @@
 """False alarms and power where days and runs are not alike and not independent, as tables of Markdown.
 
-``python tests/benchmarks/trial_dependence.py``; last results in docs/trials-statistics.md. Five minutes and no test.
+``python tests/benchmarks/trial_dependence.py``; last results in docs/trials-statistics.md. Ten minutes and no test.
+Names choose some of the tables, a number the seed: ``trial_dependence.py events changes 8``.
 """
 
 from __future__ import annotations
@@ -42,6 +43,12 @@ def table(title: str, head: list[str], rows: list[list[object]]) -> None:
         print(
             "| " + " | ".join(f"{x:.3f}" if isinstance(x, float) else str(x) for x in row) + " |", flush=True
         )
+
+
+def interval(calls: int, count: int) -> str:
+    """A share in percent with its exact 95 % interval (Clopper and Pearson)."""
+    low, high = stats.binomtest(calls, count).proportion_ci(0.95, "exact")
+    return f"{100.0 * calls / count:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
 def first_order(rng: np.random.Generator, count: int, n: int, r: float) -> np.ndarray:
@@ -241,8 +248,8 @@ def charts(rng: np.random.Generator) -> None:
     )
 
 
-#: Histories of 20 day means of a cell; of 52 half, of 104 a quarter.
-HISTORIES = 800
+#: Histories of 20 day means of a cell, of days of several runs too; of 52 half, of 104 a quarter.
+HISTORIES = 1200
 
 
 def changes(rng: np.random.Generator) -> None:
@@ -257,6 +264,7 @@ def changes(rng: np.random.Generator) -> None:
             "r = 0.6": first_order(rng, count, n, 0.6),
             "r = 0.8": first_order(rng, count, n, 0.8),
             "yearly cycle of one scatter": rng.normal(size=(count, n)) + wave,
+            "the same, r = 0.6": first_order(rng, count, n, 0.6) + wave,
             "Student, 4 degrees of freedom": rng.standard_t(4, (count, n)),
             "Student, 3": rng.standard_t(3, (count, n)),
             "exponential": rng.exponential(size=(count, n)),
@@ -274,27 +282,28 @@ def changes(rng: np.random.Generator) -> None:
     for days, runs in ((5, 4), (10, 4)):
         day = np.repeat(np.arange(days), runs)
         for component in (0.0, 1.0, 2.0):
-            series = rng.normal(size=(500, len(day))) + component * rng.normal(size=(500, days))[:, day]
+            series = rng.normal(size=(HISTORIES, len(day)))
+            series += component * rng.normal(size=(HISTORIES, days))[:, day]
             t = day + np.tile(np.arange(runs) / 24.0, days)
             rates = [_called(series, t, day, level, rng) for level in (0.01, 0.01 / 13)]
             rows.append([f"{days} days of {runs}, day component {component:g}", *rates])
-    table("Changes called at 1 %", ["history", "one parameter", "one of 13 (nominal 0.0008)"], rows)
+    table("Changes called at 1 %, in %", ["history", "one parameter", "one of 13 (nominal 0.08)"], rows)
 
 
 def _called(
     series: np.ndarray, t: np.ndarray, days: np.ndarray | None, level: float, rng: np.random.Generator
-) -> float:
-    """Share of histories with any change or trend; they share the simulated series, of which there are more."""
+) -> str:
+    """Share of histories with any change or trend, in percent; they share the simulated series."""
     search = _Search(rng, 9999 if level > 0.005 else 29999)
     calls = 0
     for y in series:
         steps, trends = search.pieces([(_Series("a", y, t, None, _repeated(days), YEAR), 0)], level)
         calls += bool(steps or trends)
-    return calls / len(series)
+    return interval(calls, len(series))
 
 
 #: Machines of a cell of that table.
-MACHINES = 600
+MACHINES = 400
 #: Days of runs before and after, and those of the machine's other campaigns.
 EVENTS = (
     ((4,), (4,), ()),
@@ -329,7 +338,7 @@ def _differences(
     shift: float,
     after_scatter: float = 1.0,
 ) -> str:  # type: ignore[type-arg]
-    """Shares of machines whose difference is called, and called or not decided."""
+    """Shares in percent of machines whose difference is called, with its interval, and called or not decided."""
     before, after, rest = case
     called = undecided = 0
     for _ in range(MACHINES):
@@ -348,7 +357,7 @@ def _differences(
         called, undecided = called + (agree is False), undecided + (agree is None)
     if undecided == MACHINES:
         return "not decided"
-    return f"{called / MACHINES:.3f} / {(called + undecided) / MACHINES:.3f}"
+    return f"{interval(called, MACHINES)} / {100.0 * (called + undecided) / MACHINES:.0f}"
 
 
 def events(rng: np.random.Generator) -> None:
@@ -376,7 +385,8 @@ def events(rng: np.random.Generator) -> None:
         row.append(_differences(lambda n: rng.normal(size=n), case, rng, 0.0, 3.0))
         rows.append(row)
     table(
-        "Before and after an event: called / called or not decided; changed by standard deviations of the difference",
+        "Before and after an event: called / called or not decided, in %; changed by standard deviations of the "
+        "difference",
         [
             "days of runs before",
             "after",
@@ -470,6 +480,6 @@ def means(rng: np.random.Generator) -> None:
 
 if __name__ == "__main__":
     every = (slopes, means, events, conditions, charts, forecasts, changes)
-    # Names choose some of them: ``trial_dependence.py slopes events``.
+    seed = next((int(text) for text in sys.argv[1:] if text.isdecimal()), SEED)
     for trial in [trial for trial in every if trial.__name__ in sys.argv[1:]] or every:
-        trial(np.random.default_rng(SEED))
+        trial(np.random.default_rng(seed))

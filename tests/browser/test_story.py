@@ -15,6 +15,12 @@ import pytest
 
 from tests.browser.visits import EXAMPLES, Site, Visit, picture
 
+#: How far the drawn spindle is from where its figure says, in mm.
+MOVED = """() => { const drawn = document.getElementById('chart-scene').data.find((trace) => trace.meta === 'C1');
+  const figure = document.querySelector('figure[data-key="scene"] script.figure');
+  const still = JSON.parse(figure.textContent).data.find((trace) => trace.meta === 'C1');
+  return Math.max(...drawn.z.map((z, index) => z === null ? 0 : Math.abs(z - still.z[index]))); }"""
+
 
 def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(site: Site) -> None:
     with Visit(site) as visit:
@@ -34,6 +40,10 @@ def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(sit
         page.locator("#scene-effect", has_text="Orange: what EZC1:const@warmup explains").wait_for()
         assert "explained by EZC1:const@warmup" in visit.drawn("scene")
         assert _lit(page) == ["C1"]
+        # It swings along Z with the spindle, and stands where it stood.
+        page.wait_for_function("Number(document.getElementById('chart-scene').dataset.swung || 0) >= 3")
+        assert "C1 shifts along Z and the tool" in page.locator("#scene-effect").inner_text()
+        page.wait_for_function(f"() => ({MOVED})() === 0")
         page.mouse.move(5, 5)
         assert "explained by EZC1:const@warmup" not in visit.drawn("scene")
         effect.focus()
@@ -59,6 +69,22 @@ def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(sit
         page.get_by_role("button", name="undo: take EZC1:const@warmup out").click()
         visit.settle()
         assert "does not fit" in page.locator("#verdict").inner_text()
+        assert visit.faults() == []
+
+
+def test_story_who_asked_for_less_motion_sees_where_it_moves_and_no_motion(site: Site) -> None:
+    with Visit(site) as visit:
+        page = visit.page
+        page.emulate_media(reduced_motion="reduce")
+        visit.open("/model?campaign=hidden-spindle-growth")
+        visit.settle()
+        page.locator(".effect").first.hover()
+        page.locator("#scene-effect", has_text="C1 shifts along Z").wait_for()
+        page.wait_for_timeout(1500)
+        assert page.evaluate("document.getElementById('chart-scene').dataset.swung || 0") == 0
+        assert page.evaluate(
+            "document.getElementById('chart-scene').data.some((trace) => trace.line && trace.line.dash === 'dash')"
+        )
         assert visit.faults() == []
 
 

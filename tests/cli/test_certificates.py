@@ -10,24 +10,11 @@ from typing import Any
 
 import pypdf
 import pytest
+from by_path import simulator
 
 from monitor.store import Database
 
-THIRTEEN = [
-    "EA0B",
-    "EC0B",
-    "EX0C",
-    "EA0C",
-    "EB0C",
-    "EB0Z",
-    "EA0Y",
-    "EC0Y",
-    "EX0C1",
-    "EY0C1",
-    "EXX",
-    "EYY",
-    "EZZ",
-]
+THIRTEEN = list(simulator().SAMBA_PARAMETERS)
 # ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1: what only a laboratory can say.
 STATED_BY_THE_LABORATORY = (
     "7.8.2.1 a", "7.8.2.1 b", "7.8.2.1 c", "7.8.2.1 e", "7.8.2.1 f", "7.8.2.1 g", "7.8.2.1 h", "7.8.2.1 k", "7.8.2.1 l",

@@ -10,22 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from by_path import simulator
 
-THIRTEEN = [
-    "EA0B",
-    "EC0B",
-    "EX0C",
-    "EA0C",
-    "EB0C",
-    "EB0Z",
-    "EA0Y",
-    "EC0Y",
-    "EX0C1",
-    "EY0C1",
-    "EXX",
-    "EYY",
-    "EZZ",
-]
+THIRTEEN = list(simulator().SAMBA_PARAMETERS)
 MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy import stats
 
 from monitor.discovery import Verdict, compare, fit
 from monitor.discovery.machine.compare import lack_of_fit
+from monitor.discovery.machine.noise.correlation import Correlation
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.search.comparison import split
 from monitor.methods.samba.method import problem_of
 
@@ -55,6 +58,31 @@ def test_numbers_are_those_of_the_residual_vectors(compared):
     assert found.sum_of_squares == pytest.approx(chi_square, rel=1e-9)
     assert answer.residual_deviation == pytest.approx(1e-3 * np.sqrt(chi_square / 3060), rel=1e-9)
     assert answer.excess_p_value == pytest.approx(stats.chi2.sf(chi_square, 3060), rel=1e-6)
+
+
+@pytest.mark.parametrize("correlation", [None, Correlation(0.7, 0.5)])
+def test_the_rms_of_explain_is_that_of_compare_for_readings_of_mixed_uncertainty(
+    virtual_campaigns, correlation
+):
+    """One definition: root mean square in mm of every coordinate, whatever its uncertainty and its neighbours."""
+    campaign, _ = virtual_campaigns.virtual(6, [simulator().Effect("EXX:reversal", peak_um=30.0)], runs=4)
+    problem = problem_of(campaign)
+    mixed = np.where(np.arange(len(problem.sigma))[:, None] % 3 == 0, 5.0, 1.0) * problem.sigma
+    mixed[7] = np.inf
+    fitted = fit(replace(problem, sigma=mixed))
+    weighted = fitted.sigma * np.sqrt(fitted.sum_of_squares / fitted.readings)
+    scene = scene_of(fitted.with_correlation(correlation), [])
+    left = scene.fit.rms_of(scene.residual)
+    # Correlated neighbours move the unknowns of a run a little.
+    assert left == pytest.approx(fitted.rms, rel=1e-9 if correlation is None else 0.15)
+    assert abs(weighted / fitted.rms - 1.0) > 0.2
+    if correlation is not None:
+        has_weight = scene.fit.problem.padded(np.isfinite(mixed).astype(float)) > 0.5
+        whole = np.array(fitted.solution.last.residual)
+        whole[:, : has_weight.shape[1]] *= has_weight
+        np.testing.assert_allclose(
+            scene.fit.whitening.undone(scene.fit.whitening(whole)), whole, atol=1e-3 * np.abs(whole).max()
+        )
 
 
 def test_repeatability_and_lack_of_fit_from_the_means_over_runs(compared):

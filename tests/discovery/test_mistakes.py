@@ -18,7 +18,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
-from monitor.store import Database, import_campaign
+from monitor.store import Database, StoredModel, import_campaign
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
@@ -35,9 +35,15 @@ def one_run(example: str) -> Campaign:
     return only_run(found, found.runs[0].run)
 
 
-def maker(campaign: Campaign) -> Callable[[Campaign], ChainProblem]:
+@cache
+def plain_model(method: str) -> StoredModel:
+    """The model that a method has of itself; every database has it."""
     with Database(":memory:") as db:
-        model = as_model(resolve(db, None, campaign.method))
+        return resolve(db, None, method)
+
+
+def maker(campaign: Campaign) -> Callable[[Campaign], ChainProblem]:
+    model = as_model(plain_model(campaign.method))
     return lambda one: campaign_method(campaign).problem_of(one, model)
 
 
@@ -122,9 +128,9 @@ def test_exchanged_columns_of_the_angle_sensor() -> None:
     assert what == "the columns plane_u_um and plane_v_um were exchanged"
 
 
-def test_explain_says_it_first_and_tells_nothing_else() -> None:
+def test_explain_says_it_first_and_tells_nothing_else(tmp_path: Path) -> None:
     campaign = recorded("tracked-robot", exchanged("F1", "F2", slice(0, 2)))
-    with Database(":memory:") as db:
+    with Database(tmp_path / "mistaken.duckdb") as db:
         import_campaign(db, campaign)
         answer = explain(db, ExplainRequest(campaign.name)).explanation
     assert isinstance(answer, MachineExplanation)
@@ -136,9 +142,9 @@ def test_explain_says_it_first_and_tells_nothing_else() -> None:
     assert mistake.rms_undone_um < 100.0 < 2000.0 < mistake.rms_as_recorded_um
 
 
-def test_explain_names_it_where_no_machine_fits() -> None:
+def test_explain_names_it_where_no_machine_fits(tmp_path: Path) -> None:
     campaign = recorded("five-days", readings(X="Y", Y="X"))
-    with Database(":memory:") as db:
+    with Database(tmp_path / "mistaken.duckdb") as db:
         import_campaign(db, campaign)
         with pytest.raises(DataError, match="It looks as if the columns x_mm and y_mm were exchanged"):
             explain(db, ExplainRequest(campaign.name))

@@ -67,6 +67,34 @@ def campaigns() -> Callable[[bytes], object]:
     return read
 
 
+def exports() -> Callable[[bytes], object]:
+    """A file of an instrument and its mapping: the first byte says which sample's place it takes."""
+    import shutil
+
+    from monitor.readers import read_campaign
+
+    samples = _samples()
+    room = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+    for folder in {path.parent for path in samples}:
+        shutil.copytree(folder, room / folder.name)
+
+    def read(content: bytes) -> object:
+        sample = samples[content[0] % len(samples) if content else 0]
+        spoilt = room / sample.parent.name / sample.name
+        spoilt.write_bytes(content[1:])
+        try:
+            return read_campaign(spoilt.parent)
+        finally:
+            shutil.copyfile(sample, spoilt)
+
+    return read
+
+
+def _samples() -> list[Path]:
+    folders = [CHECKOUT / "examples" / name for name in ("files-as-they-come", "files-of-a-plate")]
+    return [path for folder in folders for path in sorted(folder.iterdir()) if path.name != "README.md"]
+
+
 def requests() -> Callable[[bytes], object]:
     """A question and the JSON of its request, as they come over HTTP."""
     from monitor.exceptions import InputError
@@ -95,6 +123,7 @@ TARGETS = {
     "topologies": topologies,
     "conditions": conditions,
     "campaigns": campaigns,
+    "exports": exports,
     "requests": requests,
 }
 
@@ -111,6 +140,9 @@ def seeds(target: str) -> Iterator[bytes]:
                 yield b"\0".join(
                     (toml, b"\n".join(runs.splitlines()[:4]), b"\n".join(probings.splitlines()[:9]))
                 )
+    elif target == "exports":
+        for number, path in enumerate(_samples()):
+            yield bytes([number]) + path.read_bytes()
     elif target == "requests":
         from monitor.web.asking import taken_fields
         from monitor.workflow.contract import QUESTIONS

@@ -27,6 +27,10 @@ NOTE = re.compile(r"^```\s*\n\s*\n<!-- not run: (?P<why>.+?) -->$", re.MULTILINE
 #: Page and first line of every block that is not run.
 NOT_RUN = {
     ("command-line.md", "$ monitor watch /srv/measured --out reports-out --mail mail.toml"),
+    (
+        "files-as-they-come.md",
+        "$ monitor import week-12/*.csv --mapping shop.toml --campaign week-12 --dry-run",
+    ),
     ("howto-shop-floor.md", "$ monitor serve"),
     ("howto-sql-and-python.md", "$ monitor --db shop.duckdb serve"),
     (

@@ -11,66 +11,17 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
+from by_path import TESTS, load
 
 from monitor.readers import read_campaign
-from monitor.records import (
-    Array,
-    Artefact,
-    AxisSettings,
-    Ball,
-    Campaign,
-    Machine,
-    Probe,
-    Probings,
-    Run,
-    ScaleBar,
-)
+from monitor.records import Array, Campaign
 
 
 @pytest.fixture(scope="session")
 def recorded() -> Callable[..., Campaign]:
     """Builds the campaign record of what the simulator told, as a reader would."""
-
-    def build(
-        plan: Any,
-        machine: Any,
-        schedule: Any,
-        told: dict[str, Any],
-        *,
-        keep: npt.NDArray[np.bool_] | None = None,
-    ) -> Campaign:
-        turning = {axis.name for axis in machine.chain.rotary}
-        probings = Probings(
-            told["run"],
-            told["sequence"],
-            told["time_s"],
-            told["target"],
-            {name: np.radians(r) if name in turning else r for name, r in told["readings"].items()},
-            told["channels"],
-        )
-        bar = plan.bar and ScaleBar(plan.bar, plan.bar_length_mm, plan.bar_uncertainty_mm, "simulated")
-        runs = zip(schedule.started_at, schedule.day, schedule.warm_up, schedule.ambient_degC, strict=True)
-        return Campaign(
-            "simulated",
-            "samba",
-            Machine(
-                "S",
-                machine.topology,
-                axes={name: AxisSettings(name, int(sign)) for name, sign in machine.signs.items()},
-            ),
-            Probe("P", "p", plan.probe_uncertainty_um * 1e-3),
-            Artefact(
-                "A", tuple(Ball(name, tuple(p), plan.ball_diameter_mm) for name, p in plan.balls.items()), bar
-            ),
-            tuple(
-                Run(number, start, day, warm, {"ambient_degC": float(ambient)})
-                for number, (start, day, warm, ambient) in enumerate(runs, 1)
-            ),
-            probings if keep is None else probings.rows(keep),
-        )
-
+    build: Callable[..., Campaign] = load("virtual_campaigns", TESTS / "discovery" / "virtual.py").as_campaign
     return build
 
 

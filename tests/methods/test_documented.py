@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from monitor.methods import Able, AnglePlan, Method, TouchPlan, Unable, methods
+from monitor.methods import Able, AnglePlan, InstrumentPlan, Method, TouchPlan, Unable, methods
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 README, DOCUMENT = CHECKOUT / "README.md", CHECKOUT / "docs" / "methods.md"
@@ -39,7 +39,12 @@ def cell(ability: Ability) -> str:
     """A method's answer to a verb in a table."""
     if isinstance(ability, Unable):
         return "-"
-    return {TouchPlan: "balls, indexations", AnglePlan: "angles of the table"}.get(type(ability), "yes")
+    words = {
+        TouchPlan: "balls, indexations",
+        AnglePlan: "angles of the table",
+        InstrumentPlan: "tests of instruments",
+    }
+    return words.get(type(ability), "yes")
 
 
 def method_table() -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -556,6 +557,21 @@ def test_six_instruments_together_tell_what_none_tells_alone(tmp_path: Path) -> 
     assert {name for name in values if np.isfinite(values[name])} == set(truth)
     off = {name: (values[name] - true) / u[name] for name, true in truth.items()}
     assert max(map(abs, off.values())) < 4.0, off
+
+
+@pytest.mark.parametrize("words", ["ball bar", "three bars"])
+def test_the_length_of_one_bar_is_one_unknown_in_all_its_planes(words: str) -> None:
+    """A bar of 100 mm that is 0.3 µm too long makes every gain 3 µm/m wrong, in however many planes it is swung; three
+    bars of their own make their mean wrong by 3 / sqrt(3) µm/m."""
+    campaign = example("ball-bar")
+    if words == "three bars":
+        setups = tuple(replace(setup, instrument=setup.id) for setup in campaign.artefact.setups)
+        campaign = replace(campaign, artefact=replace(campaign.artefact, setups=setups))
+    result = campaign_method(campaign).identify(campaign)
+    gains = [result.parameters.index(name) for name in ("EXX", "EYY", "EZZ")]
+    covariance = result.runs[0].covariance[np.ix_(gains, gains)]
+    expected = 3.0 if words == "ball bar" else 3.0 / np.sqrt(3.0)
+    assert 1e6 * np.sqrt(covariance.sum()) / 3.0 == pytest.approx(expected, rel=0.02)
 
 
 def test_what_is_written_reads_back_the_same(tmp_path: Path) -> None:

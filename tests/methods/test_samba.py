@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from by_path import simulator
 from scipy import stats
 
 from monitor.methods.samba.method import METHOD as samba
@@ -15,10 +16,7 @@ from monitor.records import Array
 from monitor.reporting.refused import refusal_sentence
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-THIRTEEN = (
-    *("EA0B", "EC0B", "EX0C", "EA0C", "EB0C", "EB0Z", "EA0Y", "EC0Y", "EX0C1", "EY0C1"),
-    *("EXX", "EYY", "EZZ"),
-)
+THIRTEEN = simulator().SAMBA_PARAMETERS
 # Conventions, section What SAMBA identifies, computed independently of the project: 4 balls, the 15 indexations
 # of the five-day plan, a bar and 1 µm of white noise on every reading; in µrad, µm and µm/m.
 FIGURES = {

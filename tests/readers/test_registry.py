@@ -75,6 +75,7 @@ def test_a_plug_in_that_fails_is_named(plugged, small):
 def test_a_plug_in_of_another_kind_is_named(plugged, small):
     plugged(42)
     with pytest.raises(
-        InputError, match=r"the plug-in mine \(mine:READER\) must be a Reader or a MethodRules"
+        InputError,
+        match=r"the plug-in mine \(mine:READER\) must be a Reader, a MethodRules or an ExportFormat",
     ):
         read_campaign(small)

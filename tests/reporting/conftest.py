@@ -8,6 +8,7 @@ from datetime import date, datetime
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 from monitor.records import Artefact, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
@@ -26,21 +27,7 @@ from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.texts import texts_of
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
 
-NAMES = [
-    "EA0B",
-    "EC0B",
-    "EX0C",
-    "EA0C",
-    "EB0C",
-    "EB0Z",
-    "EA0Y",
-    "EC0Y",
-    "EX0C1",
-    "EY0C1",
-    "EXX",
-    "EYY",
-    "EZZ",
-]
+NAMES = list(simulator().SAMBA_PARAMETERS)
 UNITS = [MICRORADIAN] * 2 + [MICROMETRE] + [MICRORADIAN] * 5 + [MICROMETRE] * 2 + [MICROMETRE.per(METRE)] * 3
 #: Standard uncertainties in display units, of the size that docs/conventions.md gives for SAMBA.
 U = np.array([1.9, 1.7, 0.28, 2.0, 1.7, 2.3, 2.7, 2.2, 0.33, 0.36, 6.2, 5.7, 6.3])

@@ -11,6 +11,7 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
 from monitor.reporting.health.records import (
     Change,
@@ -85,7 +86,8 @@ def fleet(*machines: MachineHealth) -> tuple[Fleet, list[MachineHealth]]:
 
 
 CHANGED = machine(
-    "Stepped", "changed", parameter("EA0C", value=3.0, per_month=0.0),
+    "Stepped", "changed",
+    replace(parameter("EA0C", value=3.0, per_month=0.0), changed_at=(datetime(2026, 3, 4),)),
     since=datetime(2026, 3, 4), next_check="by 2026-05-01: EA0C stays in tolerance with 95 % until then",
     changes=(
         Change(ChangeKind.CHANGE, datetime(2026, 2, 27), datetime(2026, 3, 4), "EA0C stepped by +12 µrad", 1e-5, True),
@@ -129,9 +131,26 @@ def test_a_quiet_week_says_so() -> None:
     ("health", "kind", "sentence"),
     [
         (CHANGED, "since", "Between 2026-02-27 and 2026-03-04."),
-        (machine("M", "not evaluated"), "do", "Mend what its page names and measure again now."),
+        (machine("M", "out of tolerance"), "do", "Adjust or compensate its errors and measure again now."),
+        (
+            machine("M", "not evaluated", next_check="now: the last run could not be evaluated"),
+            "do",
+            "Mend what its page names and measure again (next check now: the last run could not be evaluated).",
+        ),
         (machine("M", "may be out of tolerance"), "since", "Not known: this is not stated run by run."),
-        (AWAY, "worst", "None: no machine that was measured needs attention."),
+        (AWAY, "worst", "Not known: no machine was measured this week."),
+        (AWAY, "why", "No machine was measured this week, so nothing is known of its state."),
+        (
+            GOOD,
+            "why",
+            "No parameter is out of its tolerance, none changed, and the models explain the measurements.",
+        ),
+        (
+            machine("M", "no change seen"),
+            "why",
+            "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain "
+            "the measurements.",
+        ),
         (AWAY, "fine", "No machine could be stated to be fine."),
         (machine("M", "no change seen"), "unjudged", "Not against every tolerance: M."),
     ],
@@ -193,6 +212,20 @@ def test_no_page_but_the_last_is_more_than_half_empty() -> None:
 
         page.extract_text(visitor_text=note)
         assert min(y for y in lowest if y > 60.0) < 0.5 * float(page.mediabox.height)
+
+
+def test_a_short_report_is_set_closer_where_that_saves_an_almost_empty_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    machines = [
+        replace(GOOD, machine=f"M{index}", parameters=(parameter(value=2.0, per_month=0.0, runs=20),) * 13)
+        for index in range(2)
+    ]
+    assert len(pages_of(*machines)) == 2
+    monkeypatch.setattr(render, "_LAID_OUT_AGAIN", 0)
+    *_, last = pages_of(*machines)
+    assert len(pages_of(*machines)) == 3
+    assert len(last) < 600  # signs: what is left over of the second machine
 
 
 def test_a_narrow_screen_gets_one_column_with_the_names_of_the_cells() -> None:

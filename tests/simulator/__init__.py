@@ -3,7 +3,7 @@
 from .campaign import cooling, ramps, simulate
 from .effects import Effect
 from .folder import write_campaign
-from .machine import SAMBA_TERMS, SimulatedMachine, hu40, wandering
+from .machine import SAMBA_PARAMETERS, SAMBA_TERMS, SimulatedMachine, hu40, wandering
 from .plans import (
     Plan,
     Schedule,
@@ -16,6 +16,7 @@ from .plans import (
 from .touch import travel_signs
 
 __all__ = [
+    "SAMBA_PARAMETERS",
     "SAMBA_TERMS",
     "Effect",
     "Plan",

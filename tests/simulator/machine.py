@@ -28,6 +28,9 @@ SAMBA_TERMS = {
 }
 """A made-up state of the HU40-T's thirteen parameters (mm, rad, mm/mm), of an ordinary size."""
 
+SAMBA_PARAMETERS = tuple(name.partition(":")[0] for name in SAMBA_TERMS)
+"""Their names as a SAMBA result has them, in the order of docs/conventions.md, section What SAMBA identifies."""
+
 
 @dataclass(frozen=True)
 class SimulatedMachine:

@@ -19,7 +19,7 @@ import pytest
 
 from monitor.documents import from_document
 from monitor.reporting.certificate.laboratory import read_laboratory
-from monitor.web.charts.machine import machine_traces
+from monitor.web.charts.machine import machine_traces, motion_of
 from monitor.web.charts.residuals import scene_vectors
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
 from monitor.workflow.explain.residual_vectors import ResidualsAnswer
@@ -83,6 +83,42 @@ def test_what_an_effect_explains_is_what_it_takes_off_the_residual(residuals: di
     rms = np.sqrt(np.mean(explained**2, axis=0))
     assert rms[2] > 5.0 * max(rms[0], rms[1])
     assert np.sqrt(np.mean(remaining**2)) < np.sqrt(np.mean(left**2))
+
+
+@pytest.mark.parametrize(
+    ("effect", "axis", "moved", "along", "words"),
+    [
+        ("EZC1:const@warmup", "C1", ("C1",), ("shift", 2), "C1 shifts along Z and the tool"),
+        ("EB0C:const", "C", ("C",), ("turn", 1), "C turns about Y and the workpiece"),
+        (
+            "EAX:linear",
+            "X",
+            ("X", "B", "C"),
+            ("turn", 0),
+            "X turns about X, and with it B, C and the workpiece",
+        ),
+        ("EYY:linear", "Y", ("Y", "C1"), ("shift", 1), "Y shifts along Y, and with it C1 and the tool"),
+    ],
+)
+def test_an_effect_moves_its_axis_and_what_that_carries(
+    residuals: dict[str, Any],
+    effect: str,
+    axis: str,
+    moved: tuple[str, ...],
+    along: tuple[str, int],
+    words: str,
+) -> None:
+    answer = from_document(ResidualsAnswer, {**residuals, "effect": effect, "effect_axis": axis})
+    motion = motion_of(answer)
+    assert motion is not None
+    assert (motion.axes, motion.sentence) == (moved, words)
+    for kind in ("shift", "turn"):
+        directions = np.flatnonzero(getattr(motion, kind)).tolist()
+        assert directions == ([along[1]] if kind == along[0] else [])
+    assert (
+        motion_of(from_document(ResidualsAnswer, {**residuals, "effect": "ball:scale", "effect_axis": None}))
+        is None
+    )
 
 
 def test_residuals_by_driver_are_the_residuals_in_groups(local: Any, residuals: dict[str, Any]) -> None:
@@ -245,7 +281,10 @@ def test_a_certificate_is_issued_amended_and_withdrawn_by_form(
         # Only a ground that is there may be accepted.
         accepted = {}
         preview = served.client.post("/certificate/new", data={**form, "button": "preview"})
-    assert "nothing was issued" in preview.text
+    assert "nothing was issued, and nothing stored" in preview.text
+    assert served.client.get("/certificate/preview.pdf").content.startswith(b"%PDF")
+    assert served.ask("certificates")[1]["certificates"] == []
+    assert served.ask("verify")[0] == 200
     issued = served.client.post("/certificate/new", data={**form, **accepted, "button": "issue"})
     number = re.findall(r"Certificate (\S+) is issued", issued.text)[0]
     pdf = served.client.get(f"/certificate.pdf?number={number}")

@@ -19,6 +19,7 @@ FORMS = {
     "/model/add": Role.ENGINEER,
     "/model/undo": Role.ENGINEER,
     "/work/cancel": Role.VIEWER,
+    "/work/again": Role.VIEWER,
     "/certificate/new": Role.APPROVER,
     "/certificates/withdraw": Role.APPROVER,
     "/certificates/verify": Role.VIEWER,

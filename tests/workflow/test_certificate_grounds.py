@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from dataclasses import replace
 from datetime import date
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,7 @@ from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
-from monitor.store import Database, import_campaign, load_certificate
+from monitor.store import Database, StoredModel, import_campaign, load_certificate
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
@@ -43,9 +45,15 @@ def five_days() -> Campaign:
     return campaign
 
 
-def grounds(campaign: Campaign, run: int = 20):
+@cache
+def plain_model(method: str) -> StoredModel:
+    """The model that a method has of itself; every database has it."""
     with Database(":memory:") as db:
-        return grounds_against(campaign, resolve(db, None, campaign.method), {run: None})
+        return resolve(db, None, method)
+
+
+def grounds(campaign: Campaign, run: int = 20):
+    return grounds_against(campaign, plain_model(campaign.method), {run: None})
 
 
 def with_bar(campaign: Campaign, more_mm: float) -> Campaign:
@@ -98,6 +106,34 @@ def test_residuals_far_beyond_the_statements(five_days: Campaign) -> None:
     freedom = 3 * int(rows.sum()) + 1 - unknowns
     assert ground.size == pytest.approx(np.sqrt(squares / freedom), rel=1e-3)
     assert ground.size > ground.limit == MOST_TIMES
+
+
+def test_lack_of_fit_by_a_hidden_reversal_is_a_ground_or_within_what_is_certified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The simulator hid a reversal of X. A model that has it says what the parameters are; the model without it, which
+    a certificate may rest on at 1.8 times the statements, has to hold them within its U by its line for lack of fit."""
+    hidden = read_campaign(EXAMPLES / "hidden-reversal-x")
+    assert isinstance(hidden, Campaign)
+    # The ground: with a probe that is stated three and a half times as sharp the same residuals are too many.
+    sharper = replace(hidden, probe=replace(hidden.probe, standard_uncertainty=1e-3 / 3.5))
+    assert [each.kind for each in grounds(sharper)] == [GroundKind.LACK_OF_FIT]
+    asked = ["--db", str(tmp_path / "m.duckdb")]
+    assert main([*asked, "import", str(EXAMPLES / "hidden-reversal-x")]) == 0
+    assert main([*asked, "model", "add", "EXX:reversal", "--to", "samba", "--as", "right"]) == 0
+
+    def stated(*options: str) -> dict[str, dict[str, float]]:
+        capsys.readouterr()
+        evaluate = ["uncertainty", "hidden-reversal-x", "--run", "20", "--method", "guf", "--json", *options]
+        assert main([*asked, *evaluate]) == 0
+        return json.loads(capsys.readouterr().out)["guf"]
+
+    right, certified, bare = stated("--model", "right"), stated(), stated("--no-model-uncertainty")
+    away = {name: abs(certified["estimate"][name] - right["estimate"][name]) for name in right["estimate"]}
+    away = {name: distance for name, distance in away.items() if name in certified["estimate"]}
+    assert len(away) == 13
+    assert max(away[name] / certified["expanded"][name] for name in away) < 1.0
+    assert max(away[name] / bare["expanded"][name] for name in away) > 3.0
 
 
 def test_a_gross_reading_of_any_run(five_days: Campaign) -> None:

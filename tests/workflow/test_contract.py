@@ -18,10 +18,12 @@ import numpy as np
 import pytest
 
 import monitor
+from monitor.documents import Sentence
 from monitor.workflow.contract import QUESTIONS, Question
 
 PACKAGE = Path(monitor.__file__).parent
-SCALARS = (str, int, float, bool, datetime, date, Path, type(None))
+#: What a document holds as it is; a sentence as its text.
+SCALARS = (Sentence, str, int, float, bool, datetime, date, Path, type(None))
 #: What is handed out as it was stored, whatever it holds: the record of a certificate of any version.
 AS_STORED = ["show certificate.record[]: typing.Any"]
 #: What the command line takes from the workflow besides questions, and why.

@@ -33,18 +33,18 @@ def with_a_copy(folder: Path, of: int, to: int) -> Path:
 def test_a_copied_run_is_refused_in_words(tmp_path: Path) -> None:
     folder = with_a_copy(tmp_path / "cold-cold", 2, 5)
     with (
-        Database(":memory:") as db,
+        Database(tmp_path / "shop.duckdb") as db,
         pytest.raises(CampaignError, match=r"runs 2 and 5 are equal in every reading of their \d+ probings"),
     ):
         import_folders(db, ImportRequest([folder]))
-    with Database(":memory:") as db:
+    with Database(tmp_path / "shop.duckdb") as db:
         import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
         assert len(list_campaigns(db)) == 1
 
 
 def test_the_refusal_is_recorded(tmp_path: Path) -> None:
     folder = with_a_copy(tmp_path / "cold-cold", 2, 5)
-    with Database(":memory:") as db:
+    with Database(tmp_path / "shop.duckdb") as db:
         with pytest.raises(CampaignError, match=r"remove the copies here and from runs\.csv"):
             import_folders(db, ImportRequest([folder]))
         assert db.rows("SELECT campaign, fault_count FROM v_refused_imports") == [("cold-cold", 1)]
@@ -53,7 +53,7 @@ def test_the_refusal_is_recorded(tmp_path: Path) -> None:
 def test_runs_without_noise_are_equal_by_right(tmp_path: Path) -> None:
     exact = virtual_campaign("exact", np.random.default_rng(1), noise=0.0)
     write_campaign(exact, tmp_path / "exact")
-    with Database(":memory:") as db:
+    with Database(tmp_path / "shop.duckdb") as db:
         (found,) = import_folders(db, ImportRequest([tmp_path / "exact"])).imported
         assert found.state == "imported"
         assert len(found.notes) == 1
@@ -67,7 +67,7 @@ def test_a_campaign_that_came_in_under_another_name_is_told(tmp_path: Path) -> N
         file.read_text(encoding="utf-8").replace('campaign = "cold-cold"', 'campaign = "again"'),
         encoding="utf-8",
     )
-    with Database(":memory:") as db:
+    with Database(tmp_path / "shop.duckdb") as db:
         first, second = import_folders(
             db, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "again"])
         ).imported

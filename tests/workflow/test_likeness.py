@@ -24,9 +24,19 @@ START = date(2024, 1, 31)
     [
         "tilting-table",
         "mount-gem-28",
+        "r-test",
         *(
             pytest.param(name, marks=pytest.mark.all_seeds)
-            for name in ("cold-cold", "free-form-pins", "free-form-pocket", "l-shape", "tracked-robot")
+            for name in (
+                "four-instruments",
+                "laser",
+                "ball-bar",
+                "cold-cold",
+                "free-form-pins",
+                "free-form-pocket",
+                "l-shape",
+                "tracked-robot",
+            )
         ),
     ],
 )

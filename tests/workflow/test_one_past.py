@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from by_path import load
 from scipy import stats
 
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, machine_history
+from monitor.store.events import record_event
+from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.report import report, stored_health
@@ -188,6 +191,87 @@ def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -
     assert crossing.timestamp() / DAY_S == pytest.approx(
         latest.timestamp() / DAY_S + row.years_to_limit * 365.25, abs=1.0
     )
+
+
+def _touched_at(db: Database, degrees: np.ndarray) -> None:
+    """Two touches a run, in the order of the runs, whose channel is half a kelvin above and below ``degrees``."""
+    runs = db.rows("SELECT campaign_id, run FROM run ORDER BY ALL")
+    frame = pd.DataFrame(runs, columns=["number", "run"]).assign(degc=degrees.ravel())
+    for touch, away in ((1, 0.5), (2, -0.5)):
+        db.insert(
+            f"INSERT INTO probing SELECT number, {touch}, run, {touch}, 0.0, '', MAP {{}}, "
+            f"MAP {{'B_axis_degC': degc + {away}}} FROM incoming",
+            frame,
+        )
+
+
+@pytest.mark.parametrize("weeks", [12, 40, 70])
+@pytest.mark.parametrize("source", ["runs", "touches", "one run without"])
+def test_fleet_and_page_fit_the_same_temperature_beside_the_line(
+    tmp_path: Path, weeks: int, source: str
+) -> None:
+    """A recorded temperature is in the null of both, whether of the runs or of the touches, and since an event."""
+    rng = np.random.default_rng(weeks)
+    week = np.arange(weeks)[:, np.newaxis]
+    degrees = (21.0 + 2.0 * np.sin(week / 9.0) + 0.5 * rng.normal(size=(weeks, 1))) * np.ones((1, 4))
+    values = {
+        "EX0B": 1.5 * (degrees - 20.0) + 0.5 * rng.normal(size=(weeks, 4)),
+        "EX0C": 0.1 * week + 1.5 * (degrees - 20.0) + 0.5 * rng.normal(size=(weeks, 4)),
+    }
+    with Database(tmp_path / "warm.duckdb") as db:
+        synthetic.add_machine(db, "M", values, degrees)
+        if source != "runs":
+            # A run without a temperature of its own; touches have one for every run, or there is none for all.
+            without = "campaign_id > 0" if source == "touches" else "campaign_id = 3 AND run = 2"
+            db.execute(f"UPDATE run SET conditions = MAP {{}} WHERE {without}")
+            db.execute("DELETE FROM campaign_runs")
+            synthetic.gather_runs(db)
+        if source == "touches":
+            _touched_at(db, degrees)
+        tables = {}
+        for kind in ("whole", "since"):
+            if kind == "since":
+                third = synthetic.START + timedelta(weeks=weeks // 3, days=-1)
+                record_event(db, "M", third.replace(tzinfo=UTC), "repair", "new scales")
+            page = trend(db, TrendRequest("M"))
+            tables[kind] = page, {row.parameter: row for row in fleet(db, FleetRequest(top=0)).table}
+    thermometer = {"runs": "ambient_degC", "touches": "B_axis_degC", "one run without": None}[source]
+    for kind, (page, table) in tables.items():
+        # The third campaign lies before the event.
+        beside = "ambient_degC" if kind == "since" and thermometer is None else thermometer
+        for name, parameter in page.parameters.items():
+            row, drift = table[name], parameter.drift
+            if parameter.changes:
+                continue
+            assert (row.temperature, drift.temperature) == (beside, beside)
+            # With the wave of a year the fleet's line is that of the blocks.
+            near = 1.5 * drift.u_slope if weeks > 52 else 1e-6
+            assert row.slope_per_year == pytest.approx(drift.slope_per_year, rel=1e-6, abs=near)
+            assert row.u_slope == pytest.approx(drift.u_slope, rel=2e-3)
+        assert any(not parameter.changes for parameter in page.parameters.values())
+
+
+def test_a_machine_that_follows_its_temperature_does_not_drift_in_the_fleet(tmp_path: Path) -> None:
+    """Thirty machines follow a season of two kelvin over 26 weeks: no temperature in the null calls a fifth of them."""
+    rng = np.random.default_rng(4)
+    weeks, machines = 26, 30
+    with Database(tmp_path / "season.duckdb") as db:
+        for i in range(machines):
+            phase = rng.uniform(0.0, 2.0 * np.pi)
+            degrees = 20.0 + 2.0 * np.cos(2.0 * np.pi * np.arange(weeks)[:, np.newaxis] / 52.0 + phase)
+            degrees = (degrees + 0.5 * rng.normal(size=(weeks, 1))) * np.ones((1, 4))
+            values = 2.0 * (degrees - 20.0) + rng.normal(size=(weeks, 1)) + rng.normal(size=(weeks, 4))
+            synthetic.add_machine(db, f"M{i}", {"EXX": values}, degrees)
+        with_it = fleet(db, FleetRequest(top=0)).table
+        db.execute("UPDATE run SET conditions = MAP {}")
+        without = fleet(db, FleetRequest(top=0)).table
+
+    def called(rows: tuple[FleetTableRow, ...]) -> int:
+        return sum(row.drift_p is not None and row.drift_p < 0.05 for row in rows)
+
+    assert called(without) >= 6
+    # 1.5 of 30 expected; more than 5 in 0.3 % of such samples.
+    assert called(with_it) <= 5
 
 
 def _following(rng: np.random.Generator, weeks: int, correlation: float) -> np.ndarray:

@@ -120,12 +120,46 @@ def test_statistics_and_trend_say_it(
     assert len(answer["refers_to"]) >= 10
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_map_says_what_its_parameters_and_its_vectors_refer_to(
+    identified_examples: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    asked = ["--db", str(identified_examples), "map", name, "--points", "2"]
+    assert main([*asked, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    topology = read_campaign(EXAMPLES / name).machine.topology
+    named = [*answer["parameters"], *(left["parameter"] for left in answer["left_out"])]
+    said = {symbol: expected(symbol, topology) for symbol in named}
+    assert answer["refers_to"] == {symbol: frame for symbol, frame in said.items() if frame}
+    assert set(answer["worst"]["by_parameter_um"]) <= set(answer["refers_to"])
+    assert "relative to the workpiece, along X, Y and Z of the machine" in answer["vectors_refer_to"]
+
+
+@pytest.mark.parametrize("verb", [("stats", "five-days"), ("trend", "HU40-T"), ("fleet", "--top", "0")])
+def test_the_tables_say_it_in_every_row(
+    identified_examples: Path, capsys: pytest.CaptureFixture[str], verb: tuple[str, ...]
+) -> None:
+    assert main(["--db", str(identified_examples), *verb]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (head,) = [line for line in lines if "relative to" in line and "unit" in line]
+    left = head.index("relative to")
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    of_machine = [line for line in lines if verb[0] != "fleet" or " HU40-T " in line]
+    said = {}
+    for line in of_machine:
+        symbol = next((word for word in line.split()[:3] if re.fullmatch(r"E[XYZABC]\w+", word)), None)
+        if symbol and expected(symbol, topology):
+            said[symbol] = re.split(r"\s{2,}", line[left:])[0].strip()
+    assert len(said) >= 10
+    assert said == {symbol: expected(symbol, topology) for symbol in said}
+
+
 def test_limits_say_it(tmp_path: Path) -> None:
     folder = tmp_path / "five-days"
     shutil.copytree(EXAMPLES / "five-days", folder)
     with (folder / "campaign.toml").open("a", encoding="utf-8") as file:
         file.write("\n[machine.tolerances]\nEA0C = 20.0\nEA0B = 20.0\n")
-    with Database(":memory:") as db:
+    with Database(tmp_path / "limits.duckdb") as db:
         import_folders(db, ImportRequest((folder,)))
         assert db.rows("SELECT DISTINCT refers_to FROM v_tolerances") == [(None,)]
         identify(db, IdentifyRequest("five-days"))

@@ -1,5 +1,7 @@
 """A limit of the volumetric error binds the weekly report and the fleet as it does the trend page."""
 
+import json
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from scipy import stats
 
+from monitor.cli import main
 from monitor.cli.trend_output import _volumetric
 from monitor.documents import from_document, to_document
 from monitor.readers import read_campaign
@@ -99,6 +102,29 @@ def test_beyond_the_limit_is_said_as_since_when_and_not_as_a_day_that_is_past():
     assert first.endswith("limit 60 µm; already beyond it since 2026-02-20")
     later = replace(ahead, latest_um=55.0, crosses_limit_at="2026-05-01T00:00:00", beyond_since=None)
     assert "reaches its limit on 2026-05-01" in next(_volumetric(later, "2026-03-06T12:00:00"))
+
+
+def test_trend_judges_the_last_map_where_it_foretells_nothing(tmp_path, capsys):
+    """Five days have no drift of a year: the page said only that, beside 187 µm of 150."""
+    folder = tmp_path / "five-days"
+    shutil.copytree(EXAMPLE, folder)
+    with (folder / "campaign.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[machine.tolerances]\nvolumetric = 150.0\n")
+    asked = ["--db", str(tmp_path / "m.duckdb")]
+
+    def said(*words: str) -> str:
+        capsys.readouterr()
+        assert main([*asked, *words]) == 0
+        return capsys.readouterr().out
+
+    said("import", str(folder))
+    said("identify", "five-days")
+    assert "150 µm, is not judged: no map is stored; type `monitor map CAMPAIGN`" in said("trend", "HU40-T")
+    mapped = json.loads(said("map", "five-days", "--points", "2", "--json"))["worst"]["error_um"]
+    assert f"{mapped:.0f} µm at worst in the last map stored, limit 150 µm: out of tolerance" in said(
+        "trend", "HU40-T"
+    )
+    assert json.loads(said("trend", "HU40-T", "--json"))["volumetric_error"]["mapped_um"] == mapped
 
 
 def test_a_report_of_before_the_limit_is_still_read(limited):

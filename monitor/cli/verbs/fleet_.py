@@ -51,9 +51,9 @@ def run(options: Namespace) -> int:
     output.table(
         f"{answer.machines} machine{'' if answer.machines == 1 else 's'}, {answer.values} values; "
         "q: false discovery rate over all rows",
-        ["rank", "machine", "parameter", "attention", "unit", "latest", "mean", "s runs", "s days", "a year", "limit",
-         "Bartlett q", "ANOVA q", "drift q"],
-        [_cells(row) for row in answer.table], text_columns=5,
+        ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
+         "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
+        [_cells(row) for row in answer.table], text_columns=6,
     )  # fmt: skip
     for attention, count in answer.attention.items():
         if count:
@@ -82,7 +82,8 @@ def run(options: Namespace) -> int:
 
 def _cells(row: FleetTableRow) -> list[str]:
     return [
-        str(row.rank), row.machine, row.parameter, row.attention, row.unit, _three(row.latest), _three(row.mean),
+        str(row.rank), row.machine, row.parameter, row.attention, row.refers_to or "", row.unit,
+        _three(row.latest), _three(row.mean),
         "-" if row.sd_pooled is None else output.two_digits(row.sd_pooled),
         "-" if row.between_days is None else output.two_digits(row.between_days),
         _three(row.slope_per_year), "-" if row.limit is None else f"{row.limit:g}",

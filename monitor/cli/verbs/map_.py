@@ -89,10 +89,13 @@ def _say(answer: VolumetricAnswer) -> None:
     output.table(
         "", ["length of the error", "µm", "u / µm", f"U / µm (k = {answer.k:.2f}, p = {answer.p:g})"], rows
     )
-    output.say(f"worst at {_place(worst.at)}: {_vector(worst.vector_um)}")
+    output.say(f"worst at {_place(worst.at)}: {_vector(worst.vector_um)} ({answer.vectors_refer_to})")
     shares = (worst.by_parameter_um or {}).items()
     largest = sorted(shares, key=lambda share: -abs(share[1]))[:4]
     output.say("most of it from " + ", ".join(f"{name} ({share:+.1f} µm)" for name, share in largest))
+    output.say(
+        "these refer to: " + ", ".join(f"{name}: {answer.refers_to.get(name, '-')}" for name, _ in largest)
+    )
     if answer.datum is not None:
         output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
     for omitted in answer.left_out:

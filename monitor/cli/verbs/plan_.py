@@ -10,9 +10,16 @@ from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.residual_output import files
 from monitor.cli.screen import on_screen
-from monitor.cli.verbs import plan_angles
+from monitor.cli.verbs import plan_angles, plan_instruments
 from monitor.exceptions import InputError
-from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlan, BallPlanAnswer, PlannedParameter, Pose
+from monitor.workflow.plan.answer import (
+    AnglePlanAnswer,
+    BallPlan,
+    BallPlanAnswer,
+    InstrumentPlanAnswer,
+    PlannedParameter,
+    Pose,
+)
 from monitor.workflow.plan.plan import plan
 from monitor.workflow.plan.request import PlanRequest
 
@@ -34,8 +41,12 @@ def options(parser: ArgumentParser) -> None:
         "--poses",
         type=int,
         metavar="N",
-        help="the best N indexations (free-form: the next N angles of the table)",
+        help="the best N indexations (free-form: the next N angles of the table; instruments: the next N tests)",
     )
+    parser.add_argument(
+        "--for", action="append", default=[], metavar="PARAMETER", dest="parameters",
+        help="of instruments: the parameter for which the next test is sought (default: all); may be repeated",
+    )  # fmt: skip
     parser.add_argument(
         "--wanted", action="append", default=[], metavar="PARAMETER=U",
         help="a standard uncertainty in µm, µrad or µm/m; the quickest plan that reaches all; may be repeated",
@@ -76,7 +87,7 @@ def _separate(text: str | None) -> tuple[str, str] | None:
 def run(options: Namespace) -> int:
     request = PlanRequest(
         options.campaign, options.model, options.balls, options.poses, _wanted(options.wanted),
-        _separate(options.separate), figures=options.figures,
+        _separate(options.separate), figures=options.figures, parameters=tuple(options.parameters),
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("planning"):
@@ -85,6 +96,8 @@ def run(options: Namespace) -> int:
         output.document(answer)
     elif isinstance(answer, AnglePlanAnswer):
         plan_angles.tables(on_screen(answer))
+    elif isinstance(answer, InstrumentPlanAnswer):
+        plan_instruments.tables(on_screen(answer))
     else:
         _tables(on_screen(answer))
     return 0

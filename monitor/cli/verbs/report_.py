@@ -102,17 +102,17 @@ def _say(answer: ReportAnswer) -> None:
             [
                 row.machine,
                 row.state,
-                row.changed,
+                str(row.changed),
                 "-" if row.since is None else f"{row.since:%Y-%m-%d}",
                 "-" if row.probability_out is None else f"{row.probability_out:.2g}",
-                row.next_check,
+                str(row.next_check),
             ]
             for row in answer.machines
         ],
         text_columns=6,
     )
     if answer.message:
-        output.say(answer.message)
+        output.say(str(answer.message))
     for file in answer.files:
         output.say(file)
     for address in answer.mailed_to or ():

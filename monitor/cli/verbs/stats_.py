@@ -87,6 +87,7 @@ def _parameters(answer: StatisticsAnswer) -> None:
         [
             name,
             parameter.unit,
+            answer.refers_to.get(name, ""),
             output.rounded(parameter.mean, parameter.u_all),
             output.two_digits(parameter.u_all),
             output.two_digits(parameter.u_pooled),
@@ -99,9 +100,20 @@ def _parameters(answer: StatisticsAnswer) -> None:
     ]
     output.table(
         f"{answer.campaign}, runs by {answer.by} ({groups})",
-        ["parameter", "unit", "mean", "u all", "u pooled", "Bartlett p", "ANOVA p", "ANOVA q", "normal p"],
+        [
+            "parameter",
+            "unit",
+            "relative to",
+            "mean",
+            "u all",
+            "u pooled",
+            "Bartlett p",
+            "ANOVA p",
+            "ANOVA q",
+            "normal p",
+        ],
         rows,
-        text_columns=2,
+        text_columns=3,
     )
 
 

@@ -112,6 +112,14 @@ class Fit:
             return residual
         return project_out(self.nuisance.basis, self.whitening(residual)[..., None])[..., 0]
 
+    def rms_of(self, white: Array) -> float:
+        """Root mean square in mm of all coordinates with weight, as ``rms``, from what is left (R N,) of ``white``."""
+        numbers = white.reshape(self.solution.last.residual.shape)
+        if self.whitening is not None:
+            numbers = self.whitening.undone(numbers)
+        sigma = self.problem.padded(np.where(self.has_weight, self.problem.sigma, 0.0)[:, :, None])[..., 0]
+        return float(np.sqrt(np.sum((numbers[:, : sigma.shape[1]] * sigma) ** 2) / self.readings))
+
     def correlation(self) -> Correlation | None:
         """The correlation of neighbours that the residuals show; None where they show none.
 

@@ -269,8 +269,7 @@ def _p_and_q(
 
 def _rms(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float:
     """Root mean square in mm of all coordinates with candidates in the model."""
-    residual = scene.remainders.beside(candidates).residual
-    return scene.fit.sigma * float(np.sqrt(np.sum(residual**2) / scene.fit.readings))
+    return scene.fit.rms_of(scene.remainders.beside(candidates).residual)
 
 
 def _held_out(

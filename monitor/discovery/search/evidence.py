@@ -88,8 +88,12 @@ class Pool(Generic[CandidateT]):
         """By number of coefficients: products (n, k, k) of the columns scaled to unit length."""
         grams = {}
         for size, (_, rows) in self.by_size.items():
-            part = self.rows[rows] / self.lengths[rows][..., None]
-            grams[size] = part @ np.swapaxes(part, -1, -2)
+            grams[size] = np.empty((len(rows), size, size))
+            # Candidate by candidate: all columns once more would be fetched from the system page by page.
+            for gram, first in zip(grams[size], rows[:, 0], strict=True):
+                columns = slice(first, first + size)
+                part = self.rows[columns] / self.lengths[columns, None]
+                gram[...] = part @ part.T
         return grams
 
     @cached_property

@@ -20,6 +20,7 @@ from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
 from monitor.discovery.search.steps import step_by_step
 from monitor.statistics import control_false_discoveries
+from monitor.stopping import checkpoint
 
 # More than this many effects hidden together in one campaign are beyond what a plan can separate.
 MOST_EFFECTS = 6
@@ -108,6 +109,7 @@ class _Steps(Generic[CandidateT]):
 
     def weighed(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
         """Evidence for the candidates of the pool that can be separated from the selected ones, given these."""
+        checkpoint()
         weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, self.pool, selected))
         return self.rules.separable(selected, weighed)
 

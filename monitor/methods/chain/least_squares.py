@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.stopping import checkpoint
 
 # Columns are scaled to unit length first. Unknowns that a plan separates leave singular values above 1e-3 on
 # the plans tried; those that it cannot separate leave products of errors of second order, below 1e-6 for
@@ -147,6 +148,7 @@ def solve(
     space, spanned = eliminate(current.local), current.local
     before = np.inf
     for iteration in range(1, most + 1):
+        checkpoint()
         if current.local is not spanned:
             space, spanned = eliminate(current.local), current.local
         whole = np.concatenate([current.common, current.residual[..., None]], axis=-1)

@@ -52,8 +52,9 @@ class Likeness:
         self.problem = method.problem_of(campaign, method.own_model)
         method.refuse(campaign, self.problem)
         self.solution: Solution = solve_problem(self.problem)
-        self.kept = _kept_numbers(self.problem, campaign.probings.channels)
-        self.frames = None if self.kept else _frames(self.problem, campaign.probings)
+        knows_columns = bool(self.problem.read_columns)
+        self.kept = {} if knows_columns else _kept_numbers(self.problem, campaign.probings.channels)
+        self.frames = None if knows_columns or self.kept else _frames(self.problem, campaign.probings)
         self.columns = self._measured_columns()
 
     @property
@@ -120,6 +121,9 @@ class Likeness:
         joints = self.problem.context.chain.joints
         if self.problem.measured_joints:
             return tuple(joints[index].name for index in self.problem.measured_joints)
+        if self.problem.read_columns:
+            channels = self.campaign.probings.channels
+            return tuple(name for name in self.problem.read_columns if name in channels)
         if self.kept:
             return tuple(self.kept)
         if self.frames is not None:
@@ -144,6 +148,8 @@ class Likeness:
                 joint = context.chain.joints[index]
                 positions[:, index] = joint.sign * probings.readings[joint.name]
             return replace(self.problem, context=replace(context, positions=positions))
+        if self.problem.read_columns:
+            return self.problem.with_read(probings.channels)
         if self.frames is not None:
             nominal = self.problem.context.nominal + self.frames.moved(probings, self.campaign.probings)
             return replace(self.problem, context=replace(self.problem.context, nominal=nominal))
@@ -164,7 +170,7 @@ class Likeness:
     ) -> Array:
         """Derivatives (n, d) of the rows by the numbers of a column, each by its own row's."""
         numbers = {**probings.channels, **probings.readings}[column]
-        step = STEP * max(1.0, float(np.median(np.abs(numbers))))
+        step = STEP * max(1.0, float(np.nanmedian(np.abs(numbers))))
         above, below = (
             self._left(_moved(probings, {column: np.full(len(probings), way * step)}), local, common, effects)
             for way in (1.0, -1.0)

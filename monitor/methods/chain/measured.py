@@ -8,9 +8,10 @@ part of the vector between them a reading measures (``observe``), which calibrat
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -78,6 +79,20 @@ class MeasuredChain(ABC):
     def components(self) -> tuple[str, ...]:
         """Names of the d numbers of a row."""
         return ("x", "y", "z")
+
+    @property
+    def is_number(self) -> npt.NDArray[np.bool_]:
+        """Which entries (n, d) of the rows are numbers that were read; rows of some kinds have fewer than d."""
+        return np.ones(self.sigma.shape, dtype=bool)
+
+    @property
+    def read_columns(self) -> tuple[str, ...]:
+        """The recorded columns that are the readings, where ``with_read`` changes them; none for other methods."""
+        return ()
+
+    def with_read(self, channels: Mapping[str, Array]) -> Self:
+        """Return the problem with other numbers in ``read_columns``; its unknowns are counted from where they were."""
+        raise NotImplementedError
 
     @property
     def measured_joints(self) -> tuple[int, ...]:

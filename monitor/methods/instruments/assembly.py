@@ -12,19 +12,16 @@ from monitor.exceptions import DataError, EffectError
 from monitor.machine import Chain, evaluate
 from monitor.methods.instruments.base import instrument_base
 from monitor.methods.instruments.problem import InstrumentProblem, Part
-from monitor.methods.instruments.reading import LEVER, Reading, Rows
+from monitor.methods.instruments.reading import LEVER, Reading, Rows, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign, Setup
-from monitor.units import MICROMETRE, MICRORADIAN
 
 NAME = "instruments"
 DEFAULT_MODEL = Model(NAME)
 #: The column of a row's setup, counted from 1 in the order of the file, and those of a row's own uncertainty.
 SETUP, U_LENGTH, U_ANGLE = "setup", "u_um", "u_urad"
-#: The factor from a column of the file to mm, by the end of its name; a component of a direction has none.
-TO_MM = {"um": MICROMETRE.factor, "mm": 1.0, "urad": MICRORADIAN.factor * LEVER}
 
 
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentProblem:
@@ -104,7 +101,7 @@ def _places(context: Context, parts: tuple[Part, ...]) -> Array:
 def _column(context: Context, name: str) -> Array:
     """A column in mm (a component of a direction as it is); NaN where it is empty or not there."""
     values = context.columns.get(name, np.full(len(context), np.nan))
-    return values * TO_MM.get(name.rpartition("_")[2], 1.0)
+    return in_mm(name, values)
 
 
 def _sigma(

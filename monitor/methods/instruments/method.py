@@ -11,10 +11,11 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.forecast import InstrumentForecast
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.shares import shares
 from monitor.methods.instruments.standard_tests import standard_tests
-from monitor.methods.method import ChainMethod, Instruments, Nouns, StandardTests, Unable
+from monitor.methods.method import ChainMethod, InstrumentPlan, Instruments, Nouns, StandardTests, Unable
 from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
 
@@ -64,9 +65,6 @@ METHOD = ChainMethod(
     taken_up=without_numbers,
     instruments=Instruments(shares),
     standards=StandardTests(standard_tests),
+    plan=InstrumentPlan(InstrumentForecast),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),
-    certificate=Unable(
-        "a certificate states a probe and an artefact, and does not know several instruments yet; identify, "
-        "uncertainty and trend give the numbers"
-    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -13,10 +13,9 @@ import numpy.typing as npt
 from monitor.effects import ArtefactEffect, ChainEffect, Effect
 from monitor.effects.catalogue import of_drives, of_sight
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
-from monitor.methods.chain.added_effects import columns_of
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, in_mm
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -72,22 +71,35 @@ class InstrumentProblem(ChainProblem):
     def own_names(self) -> tuple[str, ...]:
         """The unknowns of every setup; with several setups each begins with the setup's id."""
         several = len(self.parts) > 1
-        return tuple(
-            f"{part.id} {name}" if several else name for part in self.parts for name in part.reading.unknowns
-        )
+        names: dict[int, str] = {}
+        for part, columns in zip(self.parts, self.own_columns, strict=True):
+            for name, column in zip(part.reading.unknowns, columns.tolist(), strict=True):
+                names.setdefault(column, f"{part.id} {name}" if several else name)
+        return tuple(names.values())
 
     @cached_property
-    def own_columns(self) -> tuple[slice, ...]:
-        """Where the unknowns of each setup stand among a run's own."""
-        return columns_of(len(part.reading.unknowns) for part in self.parts)
+    def own_columns(self) -> tuple[npt.NDArray[np.int64], ...]:
+        """Where the unknowns of each setup stand among a run's own; what setups share stands there once."""
+        column_of: dict[Hashable, int] = {}
+        return tuple(
+            np.array(
+                [
+                    column_of.setdefault((name, part.reading.shared.get(name, index)), len(column_of))
+                    for name in part.reading.unknowns
+                ],
+                dtype=np.int64,
+            )
+            for index, part in enumerate(self.parts)
+        )
 
     @cached_property
     def own_start(self) -> Array:
         """The first guesses (R, q)."""
         runs = len(self.runs)
-        return np.concatenate(
-            [np.zeros((runs, 0)), *(part.reading.start(runs) for part in self.parts)], axis=1
-        )
+        start = np.zeros((runs, len(self.own_names)))
+        for part, columns in zip(self.parts, self.own_columns, strict=True):
+            start[:, columns] = part.reading.start(runs)
+        return start
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -96,6 +108,31 @@ class InstrumentProblem(ChainProblem):
         if len(names) == 1:
             return next(iter(names))
         return tuple(f"number {number + 1}" for number in range(self.sigma.shape[1]))
+
+    @cached_property
+    def is_number(self) -> npt.NDArray[np.bool_]:
+        """The entries (n, d) that the kind of a row has."""
+        numbers = np.zeros(self.sigma.shape, dtype=bool)
+        for part in self.parts:
+            numbers[part.at, : len(part.reading.numbers)] = True
+        return numbers
+
+    @cached_property
+    def read_columns(self) -> tuple[str, ...]:
+        """The columns of all kinds that there are."""
+        return tuple(dict.fromkeys(name for part in self.parts for name in part.reading.columns))
+
+    def with_read(self, channels: Mapping[str, Array]) -> Self:
+        """Return the problem with other numbers in the columns of its kinds; frames and centres stay."""
+        parts = []
+        for part in self.parts:
+            measured = part.rows.measured.copy()
+            for index, name in enumerate(part.reading.columns[: measured.shape[1]]):
+                if name in channels:
+                    measured[:, index] = in_mm(name, channels[name][part.at])
+            measured[np.isnan(part.rows.measured)] = np.nan
+            parts.append(replace(part, rows=replace(part.rows, measured=measured)))
+        return replace(self, parts=tuple(parts))
 
     @property
     def largest_error(self) -> float:
@@ -197,7 +234,7 @@ class InstrumentProblem(ChainProblem):
             kinds = shown.residual.shape[1]
             residual[at, :kinds] = np.nan_to_num(shown.residual)
             if shown.by_own is not None:
-                by_own[at, :kinds, columns] = shown.by_own
+                by_own[np.ix_(at, np.arange(kinds), columns)] = shown.by_own
             if by_error is not None:
                 derivatives = self._by_error(shown, pose, sides, at)
                 by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
@@ -284,11 +321,12 @@ class InstrumentProblem(ChainProblem):
     @cached_property
     def _priors(self) -> tuple[tuple[int, float], ...]:
         """Own unknowns that are known with a standard uncertainty."""
-        return tuple(
-            (columns.start + index, u)
+        u_of = {
+            int(columns[index]): u
             for part, columns in zip(self.parts, self.own_columns, strict=True)
             for index, u in part.reading.prior()
-        )
+        }
+        return tuple(u_of.items())
 
     @property
     def extra_names(self) -> tuple[str, ...]:

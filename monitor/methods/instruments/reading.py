@@ -8,6 +8,7 @@ campaign stand in one table.
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from monitor.machine import Chain
 from monitor.records import Array, Setup
+from monitor.units import MICROMETRE, MICRORADIAN
 
 #: mm at which an angle is a length.
 LEVER = 1000.0
@@ -24,6 +26,15 @@ TURN, SHIFT = ("frame a", "frame b", "frame c"), ("frame x", "frame y", "frame z
 
 #: The unknown of a beam that acts as a gain: known beforehand, or no gain of an axis had a number.
 COSINE = "cosine error"
+
+
+#: The factor from a column of the file to mm, by the end of its name; a component of a direction has none.
+TO_MM = {"um": MICROMETRE.factor, "mm": 1.0, "urad": MICRORADIAN.factor * LEVER}
+
+
+def in_mm(name: str, values: Array) -> Array:
+    """The numbers of a column in mm; a component of a direction as it is."""
+    return values * TO_MM.get(name.rpartition("_")[2], 1.0)
 
 
 @dataclass(frozen=True)
@@ -118,6 +129,11 @@ class Reading(Protocol):
         """Names of the q unknowns of each run."""
         ...
 
+    @property
+    def shared(self) -> Mapping[str, Hashable]:
+        """Unknowns of what several setups use (a bar), by name: setups with the same value have them in common."""
+        ...
+
     def start(self, runs: int) -> Array:
         """Where the search for the unknowns begins (R, q)."""
         ...
@@ -156,6 +172,10 @@ class Plain:
     @property
     def unknowns(self) -> tuple[str, ...]:
         return ()
+
+    @property
+    def shared(self) -> Mapping[str, Hashable]:
+        return {}
 
     def start(self, runs: int) -> Array:
         return np.zeros((runs, len(self.unknowns)))

@@ -18,6 +18,7 @@ from monitor.exceptions import DataError, InputError, did_you_mean
 from monitor.methods.planning.candidates import Candidates, Choice
 from monitor.methods.planning.expected import Sums, expected, information, sums_by_pose, sums_of
 from monitor.records import Array
+from monitor.stopping import checkpoint
 
 MOST_POSES, MOST_BALLS = 40, 24
 # So much of the information of all candidates keeps a plan that has too few touches yet comparable with others.
@@ -69,8 +70,10 @@ class _Search:
         selected = tuple(dict.fromkeys((*bar, *start)))[: max(count, len(bar))]
         single = self._by_pose(balls)
         while len(selected) < count:
+            checkpoint()
             selected = (*selected, int(self._with_each(selected, balls, single).argmin()))
         for _ in range(MOST_PASSES):
+            checkpoint()
             before = selected
             for out in [pose for pose in selected if pose not in bar]:
                 others = tuple(pose for pose in selected if pose != out)
@@ -91,9 +94,11 @@ class _Search:
 
         selected: tuple[int, ...] = ()
         while len(selected) < count:
+            checkpoint()
             larger = [(*selected, ball) for ball in every if ball not in selected]
             selected = larger[int(costs(larger).argmin())]
         for _ in range(MOST_PASSES):
+            checkpoint()
             before = selected
             for out in selected:
                 sets = [
@@ -139,6 +144,7 @@ def best_plan(
     at_balls = search.balls(balls, at_poses) if balls < available else candidates.balls
     if poses is not None:
         for _ in range(MOST_PASSES):
+            checkpoint()
             at_poses = search.poses(poses, at_balls, () if poses < len(at_poses) else at_poses)
             again = search.balls(balls, at_poses) if balls < available else at_balls
             if set(again) == set(at_balls):

@@ -11,7 +11,7 @@ from datetime import date
 
 from monitor import __version__
 from monitor.exceptions import NotFoundError
-from monitor.records import Campaign, Machine, Run
+from monitor.records import Campaign, Machine, Run, Setup
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import (
     CertificateRecord,
@@ -161,13 +161,16 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
         offset=f"{offset[:3]}:{offset[3:5]}",
     )
     touched = int((campaign.probings.run == run.run).sum())
-    balls = len(campaign.artefact.balls)
+    balls, setups = len(campaign.artefact.balls), campaign.artefact.setups
     targets = len(set(campaign.probings.target[campaign.probings.run == run.run].tolist()))
-    plan = (
-        texts("record.plan_of", probings=touched, balls=balls)
-        if balls
-        else texts("record.plan_of_targets", probings=touched, targets=targets)
-    )
+    if setups:
+        plan = texts("record.plan_of_setups", readings=touched, count=len(setups))
+    elif balls:
+        plan = texts("record.plan_of", probings=touched, balls=balls)
+    else:
+        plan = texts("record.plan_of_targets", probings=touched, targets=targets)
+    # Instruments that are set up one after the other are no artefact: they stand among the references.
+    artefact = () if setups else (Condition(texts("record.artefact"), campaign.artefact.id),)
     return (
         Condition(texts("record.run"), start if offset else None),
         Condition(
@@ -175,7 +178,7 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
         ),
         *recorded,
         Condition(texts("record.plan"), plan),
-        Condition(texts("record.artefact"), campaign.artefact.id),
+        *artefact,
     )
 
 
@@ -219,6 +222,8 @@ def _with_unit(name: str, value: float, texts: Texts) -> str:
 
 
 def _references(laboratory: LaboratoryFile, campaign: Campaign, texts: Texts) -> tuple[Reference, ...]:
+    if campaign.artefact.setups:
+        return _instrument_references(laboratory, campaign.artefact.setups, texts)
     probe, bar = campaign.probe, campaign.artefact.scale_bar
     name = texts("record.probe", id=probe.id, model=probe.model)
     references = [Reference(name, probe.certificate or laboratory.probe)]
@@ -227,3 +232,19 @@ def _references(laboratory: LaboratoryFile, campaign: Campaign, texts: Texts) ->
         name = texts("record.bar", first=first, second=second)
         references.insert(0, Reference(name, bar.certificate or laboratory.scale_bar))
     return tuple(references)
+
+
+def _instrument_references(
+    laboratory: LaboratoryFile, setups: Sequence[Setup], texts: Texts
+) -> tuple[Reference, ...]:
+    """Each instrument with its setups: the certificate that the campaign names, else what the laboratory states."""
+    by_instrument: dict[tuple[str, str | None], list[str]] = {}
+    for setup in setups:
+        by_instrument.setdefault((setup.instrument or setup.reading, setup.certificate), []).append(setup.id)
+    return tuple(
+        Reference(
+            texts("record.instrument", name=name, setups=", ".join(ids)),
+            certificate or laboratory.instruments,
+        )
+        for (name, certificate), ids in by_instrument.items()
+    )

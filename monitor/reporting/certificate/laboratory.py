@@ -29,6 +29,7 @@ MAY_NOT_APPLY = frozenset(
         "item.received_on",
         "traceability.probe",
         "traceability.scale_bar",
+        "traceability.instruments",
         "standards.valid_until",
         "statements.sampling",
         "statements.deviations",
@@ -46,9 +47,9 @@ Statement = str | NotApplicable
 class LaboratoryFile:
     """The answers of a laboratory, None where it gave none.
 
-    ``item_*`` replace what the campaign says of the machine; ``probe`` and ``scale_bar`` are the certificates
-    of those standards where the campaign names none. ``mark`` is the laboratory's picture as a data address;
-    ``temperature`` what was measured of machine and standard, by its key.
+    ``item_*`` replace what the campaign says of the machine; ``probe``, ``scale_bar`` and ``instruments`` are the
+    certificates of those standards where the campaign names none. ``mark`` is the laboratory's picture as a data
+    address; ``temperature`` what was measured of machine and standard, by its key.
     """
 
     laboratory: Party | None
@@ -80,6 +81,7 @@ class LaboratoryFile:
     mark: str | None = None
     standards: tuple[Standard, ...] | None = None
     temperature: Mapping[str, float | str] | None = None
+    instruments: Statement | None = None
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
@@ -131,6 +133,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         ),
         mark=mark,
         standards=answers.get("standards"),
+        instruments=answers.get("traceability.instruments"),
         temperature={
             key: answers[name] for key in SECTIONS["temperature"] if (name := f"temperature.{key}") in answers
         }

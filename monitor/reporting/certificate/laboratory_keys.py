@@ -21,7 +21,7 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
     "customer": ("name", "address", "contact"),
     "item": ("description", "identification", "condition", "place", "received_on"),
     "method": ("document",),
-    "traceability": ("statement", "probe", "scale_bar"),
+    "traceability": ("statement", "probe", "scale_bar", "instruments"),
     "standards": ("name", "identification", "certificate", "issuer", "issued_on", "valid_until"),
     "temperature": ("machine_degC", "machine_U_degC", "standard_degC", "standard_U_degC", "reference"),
     "statements": (
@@ -65,6 +65,8 @@ def key_of(name: str, part: str) -> str:
     """
     word = re.split(r"[ :]", part)[0]
     if name == "references":
+        if "instrument" in part:
+            return "[traceability] instruments"
         return "[traceability] probe" if "probe" in part else "[traceability] scale_bar"
     section = _SECTION_OF.get(name)
     if section is None:

@@ -59,7 +59,7 @@ def _residual_picture(residuals: ResidualSummary, width: float, height: float, t
         for label, rms in zip(residuals.labels, residuals.rms_um, strict=True)
     )
     title = texts("figures.residuals_alternative", by=by, numbers=numbers)
-    caption = texts("figures.residuals", by=by)
+    caption = texts("figures.residuals_of_setups" if residuals.by == "setup" else "figures.residuals", by=by)
     if residuals.probe_um is not None:
         level = f"{residuals.probe_um:.2g}".replace(".", texts.decimal_sign)
         dashed = texts("figures.dashed", name=texts("figures.probe"), level=level)

@@ -29,7 +29,7 @@ from monitor.units import Unit
 class ResidualSummary:
     """RMS of the residuals over groups of probings, and the probe's stated standard uncertainty, all in µm.
 
-    ``by`` says in words what the groups are: target, axis or run.
+    ``by`` says in words what the groups are: target, setup, axis or run.
     """
 
     by: str

@@ -28,7 +28,11 @@ _NAMED = 6
 #: A drift is spoken of below this probability of seeing it where there is none.
 _DRIFT_P = 0.05
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
-
+_QUIET_IN_PART = (
+    "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
+    "measurements."
+)
+_UNMEASURED = "No machine was measured this week, so nothing is known of its state."
 _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
 
 
@@ -55,7 +59,13 @@ def answers(fleet: Fleet) -> tuple[Answer, ...]:
 
 
 def _quiet(fleet: Fleet) -> str:
-    return _NOTICED if fleet.noticed else _QUIET
+    """Why no machine is the worst; only of what was measured, and only of tolerances that are stated."""
+    states = {row.state for row in fleet.rows}
+    if fleet.noticed:
+        return _NOTICED
+    if not states & set(FINE):
+        return _UNMEASURED
+    return _QUIET_IN_PART if State.NO_CHANGE_SEEN in states else _QUIET
 
 
 def concern(health: MachineHealth) -> ParameterHealth | None:
@@ -99,7 +109,7 @@ def _out(health: MachineHealth) -> str:
 
 
 def _not_evaluated(health: MachineHealth) -> str:
-    return "; ".join(health.quality.remarks[:1])
+    return "; ".join(map(str, health.quality.remarks[:1]))
 
 
 def _unexplained(health: MachineHealth) -> str:
@@ -114,12 +124,12 @@ def _unexplained(health: MachineHealth) -> str:
 
 
 def _changed(health: MachineHealth) -> str:
-    what = "; ".join(
-        change.what for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE
-    )
+    changes = [change for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE]
     parameter = concern(health)
-    name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
-    return f"{what}{name}"
+    name = ""
+    if parameter is not None and any(change.at in parameter.changed_at for change in changes):
+        name = f" ({plain_name(parameter.name)})"
+    return "; ".join(str(change.what) for change in changes) + name
 
 
 def _suspect(health: MachineHealth) -> str:
@@ -211,12 +221,18 @@ def to_do(health: MachineHealth) -> str:
             if missing
             else "look at its page for where the model fails, and measure again"
         )
-    when = "now" if health.next_check == "now" else f"(next check {health.next_check})"
+    when = (
+        "now"
+        if health.state in ALARMS and health.state is not State.NOT_EVALUATED
+        else f"(next check {health.next_check})"
+    )
     return _sentence(f"{action} {when}")
 
 
 def _worst(fleet: Fleet) -> str:
     urgent = [row for row in fleet.rows if row.state in URGENT]
+    if all(row.state is State.NOT_MEASURED for row in fleet.rows):
+        return "Not known: no machine was measured this week."
     if not urgent:
         return "None: no machine that was measured needs attention."
     first, *others = urgent

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, Said
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ErrorStep:
     ``proposed`` is not in the model yet: what adding the effect would give.
     """
 
-    what: str
+    what: Said
     rms_um: float
     heldout_um: float | None
     proposed: bool
@@ -84,7 +84,7 @@ class ModelHealth:
     """
 
     campaign: str
-    runs: str
+    runs: Said
     model: str
     verdict: str
     answer: str

@@ -231,10 +231,10 @@ def _line(row: FleetRow) -> FleetLine:
         state=row.state,
         look=LOOKS[row.state],
         alarm=row.state in ALARMS,
-        changed=row.changed,
+        changed=str(row.changed),
         since="" if row.since is None else day(row.since),
         out="" if row.probability_out is None else percent(row.probability_out),
-        next_check=row.next_check,
+        next_check=str(row.next_check),
     )
 
 
@@ -283,7 +283,7 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
     model = health.model
     if model is None:
         return ()
-    lines = [("model", model.model), ("compared with", model.runs), ("verdict", model.verdict)]
+    lines = [("model", model.model), ("compared with", str(model.runs)), ("verdict", model.verdict)]
     lines.append(("what it leaves", f"{micrometres(model.rms_um)} rms of all coordinates"))
     if model.repeatability_um is not None:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
@@ -329,7 +329,7 @@ def _span(change: Change) -> str:
 
 def _sentence(change: Change) -> str:
     return (
-        change.what
+        str(change.what)
         if change.p_value is None
         else f"{change.what} (p\N{NO-BREAK SPACE}{p_in_words(change.p_value)})"
     )

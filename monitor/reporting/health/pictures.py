@@ -188,7 +188,9 @@ def error_steps(model: ModelHealth) -> str:
     panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
     for index, step in enumerate(steps):
         top = panel.top + index * row
-        on.text(panel.left, top + 26, shortened(step.what, RIGHT_MM * SCALE - 12.0), bold=not step.proposed)
+        on.text(
+            panel.left, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
+        )
         y = top + 36
         end = panel.x(step.rms_um)
         on.path(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
@@ -125,7 +125,7 @@ class Change:
     kind: ChangeKind
     after: datetime | None
     at: datetime
-    what: str
+    what: Said
     p_value: float | None
     this_week: bool
 
@@ -161,10 +161,10 @@ class DataQuality:
     runs: int
     probings: int
     warm_up_runs: int
-    suspect: tuple[str, ...]
+    suspect: tuple[Said, ...]
     refused: tuple[tuple[str, str], ...]
     blind_spots: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[Said, ...]
     refused_imports: tuple[RefusedImport, ...]
 
 
@@ -172,7 +172,7 @@ class DataQuality:
 class PoseError:
     """The volumetric error over the linear strokes with the rotary axes at one pose, in µm."""
 
-    pose: str
+    pose: Said
     worst_um: float
     rms_um: float
 
@@ -187,8 +187,8 @@ class VolumetricMap:
     """
 
     run: int
-    region: str
-    worst_at: str
+    region: Said
+    worst_at: Said
     worst_um: float
     expanded_um: float
     rms_um: float
@@ -204,20 +204,21 @@ class VolumetricMap:
 class MachineHealth:
     """One machine in one week. ``run`` is the run whose numbers stand in ``parameters``, ``basis`` how they were found.
 
-    ``probability_out`` that any parameter with a tolerance is beyond it, jointly. ``next_check`` in words.
+    ``probability_out`` that any parameter with a tolerance is beyond it, jointly. What a new record says are kinds with
+    numbers (``sentences.py``), what a stored one says are their words.
     """
 
     machine: str
-    description: str
+    description: Said
     location: str
     state: State
-    changed: str
+    changed: Said
     since: datetime | None
     probability_out: float | None
-    next_check: str
-    run: str
+    next_check: Said
+    run: Said
     basis: str
-    factor: str
+    factor: Said
     parameters: tuple[ParameterHealth, ...]
     changes: tuple[Change, ...]
     conditions: tuple[ConditionRange, ...]
@@ -233,10 +234,10 @@ class FleetRow:
     machine: str
     location: str
     state: State
-    changed: str
+    changed: Said
     since: datetime | None
     probability_out: float | None
-    next_check: str
+    next_check: Said
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,33 @@ from monitor.reporting.pdf.render import html_of, pdf_of, pieces_of
 TEMPLATE = "health.html"
 #: Machines in one PDF: about 50 pages' worth of layout are held at a time.
 MACHINES_A_PART = 25
+#: Up to so many machines are laid out again, a second each, where the last page would be more than half empty.
+_LAID_OUT_AGAIN = 6
 
 
 def health_html(fleet: Fleet, machines: Iterable[MachineHealth]) -> Iterator[str]:
     """The whole report as pieces of one HTML page, the machines in the order given."""
-    context = {**fleet_context(fleet), "pages": machine_pages(machines), "part": 1, "parts": 1}
+    context = {
+        **fleet_context(fleet),
+        "pages": machine_pages(machines),
+        "part": 1,
+        "parts": 1,
+        "close": False,
+    }
     yield from pieces_of(TEMPLATE, context)
 
 
 def health_pdf(fleet: Fleet, machines: Sequence[MachineHealth], part: int = 1, parts: int = 1) -> bytes:
-    """A part of the report as PDF, the first with the fleet table: the same bytes for the same records."""
+    """A part of the report as PDF, the first with the fleet table: the same bytes for the same records.
+
+    Of few machines it is set closer where the last page would else be more than half empty.
+    """
     context = {**fleet_context(fleet), "pages": list(machine_pages(machines)), "part": part, "parts": parts}
-    name = f"health {fleet.week} {fleet.made_at.isoformat()} {part}"
-    return pdf_of(html_of(TEMPLATE, context), identifier=name, moment=fleet.made_at.replace(tzinfo=UTC))
+    return pdf_of(
+        html_of(TEMPLATE, {**context, "close": False}),
+        identifier=f"health {fleet.week} {fleet.made_at.isoformat()} {part}",
+        moment=fleet.made_at.replace(tzinfo=UTC),
+        closer=(lambda: html_of(TEMPLATE, {**context, "close": True}))
+        if len(machines) <= _LAID_OUT_AGAIN
+        else None,
+    )

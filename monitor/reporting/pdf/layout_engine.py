@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+# ruff: noqa: E402  (what is loaded first decides how long the rest takes)
 import zlib
+
+from monitor.reporting.pdf.quick_loading import load_weasyprint
+
+load_weasyprint()
 
 import fontTools
 import pydyf
 import pyphen
 import weasyprint
 from weasyprint import HTML, Attachment
+from weasyprint.document import Document
 from weasyprint.text.ffi import pango
 from weasyprint.text.fonts import FontConfiguration
 from weasyprint.urls import FatalURLFetchingError, URLFetcher, URLFetcherResponse
@@ -30,6 +36,7 @@ def engine_versions() -> dict[str, str]:
 __all__ = [
     "HTML",
     "Attachment",
+    "Document",
     "FatalURLFetchingError",
     "FontConfiguration",
     "URLFetcher",

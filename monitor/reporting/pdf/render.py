@@ -10,7 +10,7 @@ import os
 import threading
 import unicodedata
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
@@ -29,6 +29,7 @@ from monitor.reporting.certificate.tables import LETTERS_PT
 from monitor.reporting.pdf.layout_engine import (
     HTML,
     Attachment,
+    Document,
     FatalURLFetchingError,
     FontConfiguration,
     URLFetcher,
@@ -66,10 +67,12 @@ def pdf_of(
     moment: datetime,
     extra_fonts: Sequence[Path] = (),
     attached: Sequence[Attached] = (),
+    closer: Callable[[], str] | None = None,
 ) -> bytes:
     """Make the PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
 
-    ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each.
+    ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each. ``closer`` makes the same page with
+    less room between its parts: it is taken where the last page would be less than half full, and is saved by it.
 
     Raises InputError where the page asks for anything but our fonts and inline pictures.
     """
@@ -86,15 +89,28 @@ def pdf_of(
             )
             for file in attached
         ]
-    source = HTML(string=html, url_fetcher=_OwnFonts(extra_fonts), base_url="about:blank")
+
+    def laid_out(text: str) -> Document:
+        source = HTML(string=text, url_fetcher=_OwnFonts(extra_fonts), base_url="about:blank")
+        return source.render(font_config=FontConfiguration(), **options)
+
     try:
         with _reproducible(moment):
-            document = source.render(font_config=FontConfiguration(), **options)
+            document = laid_out(html)
+            if closer is not None and _ends_early(document):
+                shorter = laid_out(closer())
+                document = shorter if len(shorter.pages) < len(document.pages) else document
             return bytes(
                 document.write_pdf(finisher=_each_once, pdf_identifier=identifier.encode("utf-8"), **options)
             )
     except FatalURLFetchingError as error:  # no subclass of Exception
         raise InputError(str(error)) from error
+
+
+def _ends_early(document: Document) -> bool:
+    """Whether the last of several pages is less than half full: what has the id ``end`` is in its upper half."""
+    last = document.pages[-1]
+    return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < 0.5 * last.height
 
 
 def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()) -> str:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -99,6 +100,10 @@ class BeforeAfter:
     def cautious(self) -> float | None:
         """The largest expanded uncertainty of the rivals, at least ``expanded``; None without rivals."""
         return max(self.expanded, *(rival.expanded for rival in self.rivals)) if self.rivals else None
+
+    def p_value(self) -> float:
+        """Return the probability of a difference as large as this one where nothing changed, days independent."""
+        return float(2.0 * scipy.special.stdtr(self.dof, -abs(self.difference) / self.u))
 
     def p_value_of_rivals(self) -> float:
         """Return the largest p-value of the difference by what the days do not exclude; 0 without rivals."""

@@ -55,11 +55,29 @@ class RepeatedSums:
 @dataclass(frozen=True)
 class FleetBlocks:
     """Blocks of the history of c cells, all (c, b): groups (0: none), mean days since ``epoch_d``, mean value less
-    origin."""
+    origin, mean temperature less 20 °C (of use where all groups have one)."""
 
     groups: Array
     t: Array
     m: Array
+    degrees: Array
+
+
+@dataclass(frozen=True)
+class TemperatureSums:
+    """Sums over those groups of c cells whose runs all have a temperature, in °C less 20, all (c,).
+
+    ``groups`` is their number, ``span`` from their lowest to their highest; ``sum_gg``, ``sum_gt`` and ``sum_gm`` are
+    sums of its square and of its products with t and m as in ``FleetSums``; ``thermometer`` is its name ("": none).
+    """
+
+    thermometer: npt.NDArray[np.str_]
+    groups: Array
+    span: Array
+    sum_g: Array
+    sum_gg: Array
+    sum_gt: Array
+    sum_gm: Array
 
 
 @dataclass(frozen=True)
@@ -101,6 +119,7 @@ class FleetSums:
     latest_runs: Array
     since_d: Array
     repeated_sums: RepeatedSums
+    temperatures: TemperatureSums
     blocks: FleetBlocks
 
 
@@ -126,15 +145,25 @@ def _summed(
     """First day, columns of all cells and of their blocks, by way of tables that live as long as the connection."""
     for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
         db.execute(statement)
-    db.execute(queries.CHOSEN, {"model": model, "version": version})
+    db.set_variables({"model": model, "version": version})
+    db.execute(queries.CHOSEN)
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
     if epoch_d is None:
         under = "" if model is None else f" with model {model}"
         raise NotFoundError(f"no campaign was identified{under} yet; type `monitor identify`")
+    for statement in (
+        queries.RUN_TEMPERATURES,
+        queries.TOUCH_TEMPERATURES,
+        queries.THERMOMETERS,
+        queries.TEMPERATURES,
+        queries.CAMPAIGN_TEMPERATURES,
+    ):
+        db.execute(statement)
     for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
         db.execute(statement)
-    db.execute(queries.BLOCKS, {"whole": cut.whole, "each": cut.each, "most": cut.most})
-    db.execute(queries.PARTS, {"epoch_d": epoch_d})
+    db.set_variables({"whole": cut.whole, "each": cut.each, "most": cut.most, "epoch_d": epoch_d})
+    db.execute(queries.BLOCKS)
+    db.execute(queries.PARTS)
     columns, of_blocks = (
         {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
         for query in (queries.TOGETHER, queries.OF_BLOCKS)
@@ -152,16 +181,17 @@ def _blocks(
     rows = order[np.searchsorted(cells["cell"], columns["cell"], sorter=order)]
     block = columns["block"].astype(np.intp)
     shape = (len(order), int(block.max()) + 1)
-    groups, t, m = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    groups[rows, block], t[rows, block], m[rows, block] = columns["k"], columns["t"], columns["m"]
-    return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis])
+    groups, t, m, degrees = (np.zeros(shape) for _ in range(4))
+    for array, name in ((groups, "k"), (t, "t"), (m, "m"), (degrees, "g")):
+        array[rows, block] = columns[name]
+    return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis], degrees)
 
 
 def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, epoch_d: float) -> FleetSums:
     number = {
         name: np.asarray(column, dtype=np.float64)
         for name, column in columns.items()
-        if name not in ("machine", "parameter", "unit")
+        if name not in ("machine", "parameter", "unit", "thermometer")
     }
     f = number["factor"]
     # ln s² of the groups becomes that of the display unit; their degrees of freedom are runs less groups.
@@ -201,6 +231,15 @@ def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, e
             s4_dof=(
                 number["s4_dof"] / f**4, number["s4_dof_runs"] / f**4, number["s4_dof_runs_squared"] / f**4
             ),
+        ),
+        temperatures=TemperatureSums(
+            thermometer=columns["thermometer"].astype(np.str_),
+            groups=number["g_k"],
+            span=number["g_range"],
+            sum_g=number["g"],
+            sum_gg=number["gg"],
+            sum_gt=number["gt"],
+            sum_gm=number["gm"] / f,
         ),
         blocks=blocks,
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """The queries of the sums over the fleet, each a table that the next ones read: groups of runs, blocks of these, sums.
 
-``fleet.py`` says what is summed and why so.
+``fleet.py`` says what is summed and why so, and sets the variables: a statement that makes a table cannot be prepared.
 """
 
 from __future__ import annotations
@@ -47,11 +47,12 @@ WITH latest AS (
     FROM identification
     LEFT JOIN fleet_model AS f USING (campaign_id, method)
     LEFT JOIN fleet_own AS o ON o.model = identification.method
-    WHERE CASE WHEN $model IS NULL
+    WHERE CASE WHEN getvariable('model') IS NULL
           -- That which the machine is followed by, else the latest version of the method's own.
           THEN identification.model = coalesce(f.model, identification.method)
                AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
-          ELSE identification.model = $model AND ($version IS NULL OR identification.model_version = $version) END
+          ELSE identification.model = getvariable('model')
+               AND (getvariable('version') IS NULL OR identification.model_version = getvariable('version')) END
     GROUP BY campaign_id
 ), span AS (
     SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
@@ -66,17 +67,77 @@ JOIN fleet_machine AS n USING (machine)
 JOIN (SELECT heading, unnest(identifications) AS identification_id FROM fleet_heading) AS h USING (identification_id)
 """
 
+# The temperature of each run, by the rule of the history of one machine: of the recorded ones that which most of its
+# runs have, of several those recorded for the runs before channels of the touches, the first by name. The touches of
+# all are many: they are read where no temperature is recorded for every run of a machine.
+_TEMPERATURES = r"""
+SELECT machine_no, campaign_id, run, e.key AS channel, {value} AS degc
+FROM (SELECT machine_no, campaign_id, run, unnest(map_entries({source})) AS e
+      FROM {rows} JOIN fleet_chosen USING (campaign_id) {where})
+WHERE e.key LIKE '%_\_degC' ESCAPE '\' AND e.value IS NOT NULL
+"""
+
+RUN_TEMPERATURES = f"""
+CREATE OR REPLACE TEMP TABLE fleet_run_temperature AS
+SELECT *, false AS of_touches
+FROM ({_TEMPERATURES.format(value="e.value", source="conditions", rows="run", where="")}) WHERE isfinite(degc)
+"""
+
+TOUCH_TEMPERATURES = f"""
+INSERT INTO fleet_run_temperature
+WITH every AS (
+    SELECT machine_no, count(*) AS runs FROM run JOIN fleet_chosen USING (campaign_id) GROUP BY machine_no
+), recorded AS (
+    SELECT machine_no, count(*) AS runs FROM fleet_run_temperature GROUP BY machine_no, channel
+), lacking AS (
+    SELECT machine_no FROM every ANTI JOIN recorded USING (machine_no, runs)
+), touched AS (
+    {
+    _TEMPERATURES.format(
+        value="avg(e.value)", source="channels", rows="probing", where="SEMI JOIN lacking USING (machine_no)"
+    )
+}
+    GROUP BY ALL
+)
+SELECT *, true FROM touched ANTI JOIN fleet_run_temperature USING (campaign_id, run, channel)
+"""
+
+THERMOMETERS = """
+CREATE OR REPLACE TEMP TABLE fleet_thermometer AS
+SELECT machine_no, channel FROM (
+    SELECT machine_no, channel, count(*) AS runs, bool_and(of_touches) AS of_touches
+    FROM fleet_run_temperature GROUP BY machine_no, channel
+)
+QUALIFY row_number() OVER (PARTITION BY machine_no ORDER BY runs DESC, of_touches, channel) = 1
+"""
+
+TEMPERATURES = """
+CREATE OR REPLACE TEMP TABLE fleet_temperature AS
+SELECT campaign_id, run, degc FROM fleet_run_temperature JOIN fleet_thermometer USING (machine_no, channel)
+"""
+
+# Of a campaign whose runs all have one.
+CAMPAIGN_TEMPERATURES = """
+CREATE OR REPLACE TEMP TABLE fleet_campaign_temperature AS
+WITH counted AS (SELECT campaign_id, count(*) AS runs FROM run SEMI JOIN fleet_chosen USING (campaign_id) GROUP BY ALL)
+SELECT campaign_id, avg(degc) AS degc FROM fleet_temperature JOIN counted USING (campaign_id)
+GROUP BY campaign_id, runs HAVING count(*) = runs
+"""
+
 # A group is a campaign, or a day of a campaign that has several: `places` are then its runs among those identified.
 GROUPS = """
 CREATE OR REPLACE TEMP TABLE fleet_group AS
-SELECT identification_id, machine_no, heading, began_d, CAST(NULL AS BIGINT[]) AS places
-FROM fleet_chosen WHERE NOT several_days
+SELECT identification_id, machine_no, heading, began_d, CAST(NULL AS BIGINT[]) AS places, degc
+FROM fleet_chosen LEFT JOIN fleet_campaign_temperature USING (campaign_id) WHERE NOT several_days
 UNION ALL
 SELECT identification_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
-       coalesce(list(place) FILTER (place IS NOT NULL), [])
+       coalesce(list(place) FILTER (place IS NOT NULL), []),
+       CASE WHEN count(degc) = count(*) THEN avg(degc) END
 FROM (
-    SELECT c.identification_id, c.machine_no, c.heading, r.day, r.started_at, list_position(v.runs, r.run) AS place
+    SELECT c.identification_id, c.machine_no, c.heading, r.day, r.started_at, list_position(v.runs, r.run) AS place,
+           d.degc
     FROM fleet_chosen AS c JOIN run AS r USING (campaign_id) JOIN identified_values AS v USING (identification_id)
+    LEFT JOIN fleet_temperature AS d ON d.campaign_id = c.campaign_id AND d.run = r.run
     WHERE c.several_days
 )
 GROUP BY identification_id, machine_no, heading, day
@@ -111,7 +172,8 @@ WITH span AS (
     FROM fleet_group GROUP BY machine_no
 ), cut AS (
     SELECT machine_no, first_d, greatest(last_d - first_d, 1e-300) AS span_d,
-           CASE WHEN k <= $whole THEN k ELSE least(greatest(k // $each, $whole), $most) END AS blocks
+           CASE WHEN k <= getvariable('whole') THEN k
+           ELSE least(greatest(k // getvariable('each'), getvariable('whole')), getvariable('most')) END AS blocks
     FROM span
 )
 SELECT g.*, CAST(least(floor((began_d - first_d) / span_d * blocks), blocks - 1) AS UTINYINT) AS block
@@ -126,10 +188,10 @@ BLOCK_BITS = 6
 # The values of every cell in some groups, a list each. The outer join keeps the values on the side that is only read:
 # a hash table of them would be most of the time and memory.
 LISTS = f"""
-SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, (cell << {BLOCK_BITS}) | block AS cb, began_d,
+SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, (cell << {BLOCK_BITS}) | block AS cb, began_d, degc,
        CASE WHEN places IS NULL THEN x ELSE list_select(x, places) END AS x
 FROM (
-    SELECT g.machine_no, g.began_d, g.places, g.block, unnest(h.numbers) AS k, unnest(v.value) AS x
+    SELECT g.machine_no, g.began_d, g.degc, g.places, g.block, unnest(h.numbers) AS k, unnest(v.value) AS x
     FROM identified_values AS v JOIN {{groups}} AS g USING (identification_id)
     LEFT JOIN fleet_heading AS h USING (heading)
 )
@@ -151,7 +213,7 @@ WITH last AS (
 ORIGINS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_origin AS
 WITH earliest AS (
-    SELECT *, NULL AS places, 0 AS block FROM fleet_chosen
+    SELECT *, NULL AS places, 0 AS block, NULL AS degc FROM fleet_chosen
     WHERE identification_id IN (SELECT min(identification_id) FROM fleet_chosen GROUP BY machine_no)
 ), first AS ({LISTS.format(groups="earliest")})
 SELECT cell, coalesce(list_any_value(f.x), list_any_value(l.x), 0.0) AS origin
@@ -168,11 +230,13 @@ PARTS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_part AS
 SELECT cb, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
        sum(t) AS t, sum(t * t) AS tt, sum(m) AS m, sum(m * m) AS mm, sum(m * t) AS tm,
-       sum(v * v) AS vv
+       sum(v * v) AS vv, count(g) AS g_k, sum(g) AS g, sum(g * g) AS gg, sum(g * t) AS gt, sum(g * m) AS gm,
+       min(g) AS g_low, max(g) AS g_high
 FROM (
-    SELECT cb, t, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
+    SELECT cb, t, g, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
     FROM (
-        SELECT cb, began_d - $epoch_d AS t, list_transform(x, lambda value: value - origin) AS d
+        SELECT cb, began_d - getvariable('epoch_d') AS t, degc - 20.0 AS g,
+               list_transform(x, lambda value: value - origin) AS d
         FROM ({LISTS.format(groups="fleet_blocked")}) JOIN fleet_origin USING (cell)
     )
 )
@@ -195,7 +259,9 @@ WITH shown AS (
 ), part AS (
     SELECT cb >> {BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS
     t,
-           sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv
+           sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv,
+           sum(g_k) AS g_k, sum(g) AS g, sum(gg) AS gg, sum(gt) AS gt, sum(gm) AS gm, min(g_low) AS g_low,
+           max(g_high) AS g_high
     -- Groups in which a parameter was refused in every run have no part in it.
     FROM fleet_part WHERE n > 0 GROUP BY cell, n
 ), summed AS (
@@ -205,6 +271,9 @@ WITH shown AS (
            coalesce(sum((n - 1) * (logs + k * ln(n / (n - 1)))) FILTER (n > 1), 0.0) AS logs,
            coalesce(sum(k / (n - 1)) FILTER (n > 1), 0.0) AS inverse,
            sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm,
+           -- About 20 °C, of the groups whose runs all have a temperature.
+           sum(g_k) AS g_k, coalesce(sum(g), 0.0) AS g, coalesce(sum(gg), 0.0) AS gg, coalesce(sum(gt), 0.0) AS gt,
+           coalesce(sum(gm), 0.0) AS gm, coalesce(max(g_high) - min(g_low), 0.0) AS g_range,
            -- Of the groups with several runs, whose variances are v n / (n - 1).
            coalesce(sum(k * n) FILTER (n > 1), 0) AS runs_rep, coalesce(sum(n * m) FILTER (n > 1), 0.0) AS offset_rep,
            coalesce(sum(n * mm) FILTER (n > 1), 0.0) AS squares_rep,
@@ -219,12 +288,14 @@ WITH shown AS (
 )
 SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
-       coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d
+       coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d,
+       coalesce(h.channel, '') AS thermometer
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}
 JOIN fleet_origin AS o USING (cell)
 LEFT JOIN latest AS l USING (cell)
 LEFT JOIN fleet_since AS e ON e.machine_no = m.machine_no
+LEFT JOIN fleet_thermometer AS h ON h.machine_no = m.machine_no
 JOIN shown AS s ON s.k = p.cell & ((1 << {PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
 """
@@ -232,7 +303,8 @@ ORDER BY m.machine, s.parameter
 # The blocks of every cell: how many groups, and their mean times and values about the origin.
 OF_BLOCKS = f"""
 SELECT cb >> {BLOCK_BITS} AS cell, cb & ((1 << {BLOCK_BITS}) - 1) AS block, CAST(sum(k) AS DOUBLE) AS k, sum(t) /
-sum(k) AS t, sum(m) / sum(k) AS m
+sum(k) AS t, sum(m) / sum(k) AS m,
+       coalesce(sum(g), 0.0) / sum(k) AS g
 FROM fleet_part WHERE n > 0 GROUP BY cb
 """
 
@@ -242,6 +314,10 @@ TABLES = (
     "model",
     "own",
     "chosen",
+    "run_temperature",
+    "thermometer",
+    "temperature",
+    "campaign_temperature",
     "group",
     "blocked",
     "since",

@@ -75,9 +75,10 @@ class MachineHistory:
 
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
-    the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
-    machine's latest campaign. ``unidentified`` names the campaigns, in order of import, of which no identification
-    under the model holds every run; ``campaigns`` are the number and name of all that count, in the same order.
+    the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
+    are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
+    of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
+    in the same order.
     """
 
     machine: str
@@ -95,11 +96,24 @@ class MachineHistory:
     conditions: Mapping[str, Array]
     tolerances: Mapping[str, float]
     unidentified: tuple[str, ...]
+    channels: frozenset[str] = frozenset()
 
     @cached_property
     def seconds(self) -> Array:
         """Start of each run in seconds since 1970 (n,)."""
         return np.array([at.timestamp() for at in self.started_at])
+
+    def own_copy(self, parameter: str | None = None) -> MachineHistory:
+        """Return the history with arrays of its own, of one parameter (none where the history lacks it) or of all."""
+        columns = [j for j, name in enumerate(self.parameters) if parameter in (None, name)]
+        return replace(
+            self,
+            parameters=tuple(self.parameters[j] for j in columns),
+            units=tuple(self.units[j] for j in columns),
+            values=np.array(self.values[:, columns], order="C"),
+            u=np.array(self.u[:, columns], order="C"),
+            conditions={name: values.copy() for name, values in self.conditions.items()},
+        )
 
     def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
         """The runs of a mask (n,), with all parameters, tolerances and campaigns."""
@@ -134,6 +148,22 @@ def machine_history(
     Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
     own. May hold no run. Raises NotFoundError for a machine that is not there.
     """
+    if since is None:
+        key = ("history", machine, model, version, tuple(sorted(followed_by.items())))
+        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by))
+        return whole.own_copy(parameter)
+    return _read(db, machine, model, version, parameter, since, followed_by)
+
+
+def _read(
+    db: Database,
+    machine: str,
+    model: str | None,
+    version: int | None,
+    parameter: str | None,
+    since: datetime | None,
+    followed_by: Mapping[str, tuple[str, int]],
+) -> MachineHistory:
     campaigns = campaigns_of_machine(db, machine)
     identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
     recorded = runs_of_campaigns(db, campaigns)
@@ -144,6 +174,7 @@ def machine_history(
     ]
     rows = {(identified[run.campaign_id].number, run.run): row for row, run in enumerate(runs)}
     names, units, values, u = _values(db, identified.values(), rows, parameter)
+    conditions, channels = _conditions(db, runs)
     latest = max(recorded, key=lambda run: (run.started_at, run.campaign_id), default=None)
     return MachineHistory(
         machine=machine,
@@ -158,9 +189,10 @@ def machine_history(
         units=units,
         values=values,
         u=u,
-        conditions=_conditions(db, runs),
+        conditions=conditions,
         tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
         unidentified=_unidentified(campaigns, recorded, identified),
+        channels=channels,
     )
 
 
@@ -262,19 +294,26 @@ def _values(
     return names, tuple(unit_of[name] for name in names), values, uncertainties
 
 
-def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:
-    """Conditions of the runs and means of their channels, each (n,)."""
+def _conditions(db: Database, runs: list[RecordedRun]) -> tuple[dict[str, Array], frozenset[str]]:
+    """Conditions of the runs and means of their channels, each (n,), and the names of the latter.
+
+    What is recorded for a run goes before the mean of a channel of that name.
+    """
     conditions: dict[str, Array] = {}
     for row, run in enumerate(runs):
         for name, value in run.conditions.items():
             conditions.setdefault(name, np.full(len(runs), np.nan))[row] = value
+    of_runs = set(conditions)
     rows = {(run.campaign_id, run.run): row for row, run in enumerate(runs)}
     for campaign, number, channel, value in _with_marks(
         db, _CHANNELS, sorted({run.campaign_id for run in runs})
     ):
-        if (campaign, number) in rows:
-            conditions.setdefault(channel, np.full(len(runs), np.nan))[rows[campaign, number]] = value
-    return conditions
+        if (campaign, number) not in rows:
+            continue
+        row = rows[campaign, number]
+        means = conditions.setdefault(channel, np.full(len(runs), np.nan))
+        means[row] = value if np.isnan(means[row]) else means[row]
+    return conditions, frozenset(set(conditions) - of_runs)
 
 
 def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:

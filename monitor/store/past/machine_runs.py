@@ -121,6 +121,17 @@ def probing_counts(db: Database, campaign: str) -> dict[int, int]:
     return {int(run): int(count) for run, count in rows}
 
 
+def latest_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str], str]:
+    """What the parameters of machines refer to, by machine and parameter, as the latest identification of each says."""
+    rows = db.rows(
+        "SELECT machine, parameter, refers_to FROM parameter_frame JOIN (SELECT machine, max(identification_id) AS "
+        "identification_id FROM identification JOIN campaign USING (campaign_id) "
+        "WHERE machine IN (SELECT unnest(CAST(? AS VARCHAR[]))) GROUP BY machine) USING (identification_id)",
+        [list(machines)],
+    )
+    return {(machine, parameter): refers_to for machine, parameter, refers_to in rows}
+
+
 def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> dict[str, str]:
     """What parameters of a machine refer to, in the words of ``parameter_frame``; "or" where models differ."""
     rows = db.rows(

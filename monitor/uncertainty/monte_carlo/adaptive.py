@@ -17,6 +17,7 @@ import numpy as np
 
 from monitor.exceptions import DataError, RefusedResultError
 from monitor.records import Array
+from monitor.stopping import checkpoint
 from monitor.uncertainty.coverage_regions.coverage import (
     largest_deviations,
     mahalanobis_distances,
@@ -149,6 +150,7 @@ def adaptive_monte_carlo(
     total = Accumulator(len(names), options.p, options.keep, options.rank_tolerance)
     with Trials(model, sampler, len(names), options.workers).pool() as trials:
         while True:
+            checkpoint()
             total.add(trials.sequence(length // sampler.block_size))
             _refuse_without_trials(total)
             last = total.trials >= options.max_trials

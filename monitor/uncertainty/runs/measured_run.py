@@ -73,6 +73,11 @@ class MeasuredRun(ABC):
         return (*self.reading_names, *self.calibrated[0])
 
     @property
+    def numbers(self) -> int:
+        """How many rows a Jacobian has before those of the calibrated quantities."""
+        return self.problem.sigma.size
+
+    @property
     def probings(self) -> int:
         """The number of probings n."""
         return len(self.problem.context)

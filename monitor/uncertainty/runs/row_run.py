@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Linearisation
@@ -23,14 +25,21 @@ from monitor.uncertainty.runs.touched_run import touch_run
 
 @dataclass(frozen=True)
 class _Shifted:
-    """A problem whose runs are trials, with ``added`` (B, N) to its whitened residuals."""
+    """A problem whose runs are trials, with ``added`` (B, N) to its whitened residuals; ``is_input`` (M,) are those of
+    its residuals that are numbers."""
 
     problem: ChainProblem
     added: Array
+    is_input: npt.NDArray[np.bool_]
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """As ``ChainProblem.linearise``, at the trials' own readings."""
         at = self.problem.linearise(local, common)
+        if not self.is_input.all():
+            residual, by_local, by_common = (
+                rows[:, self.is_input] for rows in (at.residual, at.local, at.common)
+            )
+            at = replace(at, residual=residual, local=by_local, common=by_common)
         return replace(at, residual=at.residual + self.added)
 
 
@@ -44,12 +53,23 @@ class RowRun(MeasuredRun):
     @cached_property
     def reading_names(self) -> tuple[str, ...]:
         """``normal 7``: the number named normal at sequence number 7."""
-        return tuple(f"{what} {s}" for s in self.problem.context.sequence for what in self.problem.components)
+        names = (f"{what} {s}" for s in self.problem.context.sequence for what in self.problem.components)
+        return tuple(compress(names, self._is_number))
+
+    @cached_property
+    def _is_number(self) -> npt.NDArray[np.bool_]:
+        """Which entries (n d,) of the rows are numbers."""
+        return self.problem.is_number.ravel()
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers the rows have."""
+        return int(np.count_nonzero(self._is_number))
 
     @property
     def stated(self) -> Array:
         """Those that the problem weighs its rows with; 0 where a row has no weight."""
-        sigma = self.problem.sigma.ravel()
+        sigma = self.problem.sigma.ravel()[self._is_number]
         return np.where(np.isfinite(sigma), sigma, 0.0)
 
     @property
@@ -60,7 +80,7 @@ class RowRun(MeasuredRun):
     @cached_property
     def inputs(self) -> Array:
         """No deviation (N,)."""
-        return np.zeros(self.problem.sigma.size + len(self.problem.extra_names))
+        return np.zeros(self.numbers + len(self.problem.extra_names))
 
     def whitened(self, inputs: Array) -> Array:
         """What inputs (N, B) add to the whitened residuals (N, B)."""
@@ -69,7 +89,8 @@ class RowRun(MeasuredRun):
     @property
     def weighed_by(self) -> Array:
         """The standard uncertainty (N,) by which each input is whitened: infinite where it has no weight."""
-        return np.concatenate([self.problem.sigma.ravel(), np.ones(len(self.problem.extra_names))])
+        sigma = self.problem.sigma.ravel()[self._is_number]
+        return np.concatenate([sigma, np.ones(len(self.problem.extra_names))])
 
     def by_input(self, unknowns: Array) -> Array:
         """Derivatives (p, N) of J^T r at ``unknowns`` (p,) by the inputs, exact: they only add to the residuals."""
@@ -80,7 +101,8 @@ class RowRun(MeasuredRun):
         """The problem whose runs are the trials ``inputs`` (N, B)."""
         trials, count = inputs.shape[1], self.probings
         several = self.problem.taken(np.tile(np.arange(count), trials), np.repeat(np.arange(trials), count))
-        return _Shifted(several, self.whitened(inputs).T)
+        is_input = np.concatenate([self._is_number, np.ones(len(self.problem.extra_names), dtype=bool)])
+        return _Shifted(several, self.whitened(inputs).T, is_input)
 
 
 def measured_run(problem: ChainProblem, run: int, common: Array | None = None) -> MeasuredRun:
@@ -114,4 +136,5 @@ def repeated_readings(problem: ChainProblem) -> Array:
     if isinstance(problem, TouchProblem):
         return np.array([single.inputs[: len(single.reading_names)] for single in runs])
     start, common = runs[0].problem.start, problem.common_start
-    return np.array([single.problem.vectors(start, common).ravel() for single in runs])
+    is_number = runs[0].problem.is_number
+    return np.array([single.problem.vectors(start, common)[is_number] for single in runs])

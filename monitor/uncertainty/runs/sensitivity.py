@@ -153,7 +153,7 @@ def _space(run: MeasuredRun, inputs: Array, theta: Array) -> tuple[Array, npt.ND
     share = np.max(np.abs(vectors[~keep]), axis=0, initial=0.0)
     weighed = np.isfinite(run.problem.sigma)
     sigma = float(np.sqrt(np.mean(run.problem.sigma[weighed] ** 2)))
-    largest = np.max(np.abs(jacobian[: run.problem.sigma.size]), axis=0) * sigma
+    largest = np.max(np.abs(jacobian[: run.numbers]), axis=0) * sigma
     steps = STEP / np.where(largest > 0.0, largest, 1.0)
     return (vectors[keep] / scale).T, share < MEMBER_SHARE, steps
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +15,8 @@ from monitor.web.charts.chart import Trace
 if TYPE_CHECKING:
     from monitor.workflow.explain.residual_vectors import AxisPlace, ResidualsAnswer
 
+#: An error is drawn as a shift of so much of what was probed, or a turn of so many radians.
+SHIFT, SWING = 0.08, 0.1
 #: Points of the arc that says how a rotary axis turns, which leaves a part of the circle open.
 ARC, TURN = 40, np.radians(300.0)
 
@@ -49,6 +53,52 @@ def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
             traces.append(_line(axis, *ends))
             traces.append(_arc(axis, ends[0], 0.22 * span))
     return traces
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the drawing moves where an axis has an error: the ``axes`` that move with it, the ``shift`` in mm and the
+    ``turn`` in rad about ``about``, both far larger than the error, and what that is in a ``sentence``."""
+
+    axes: tuple[str, ...]
+    shift: tuple[float, ...]
+    turn: tuple[float, ...]
+    about: tuple[float, ...]
+    sentence: str
+
+
+def motion_of(residuals: ResidualsAnswer) -> Motion | None:
+    """Return how an effect moves the machine: the axis of its error, and all that this axis carries.
+
+    The second letter of a term of ISO 230-1 says how: EXB is a shift of B along X, EAB a turn about X. None for an
+    effect that is no error of an axis.
+    """
+    term = re.match(r"E([XYZABC])", residuals.effect or "")
+    names = [axis.name for axis in residuals.machine]
+    if term is None or residuals.effect_axis not in names:
+        return None
+    places = np.array(residuals.place_mm)
+    span = max(float(np.ptp(places, axis=0).max()), 1.0)
+    first = names.index(residuals.effect_axis)
+    moving = residuals.machine[first]
+    moved = [axis.name for axis in residuals.machine[first:] if axis.carries == moving.carries]
+    turns, along = divmod("XYZABC".index(term[1]), 3)
+    unit = np.eye(3)[along]
+    others = [name for name in moved if name != moving.name]
+    carried = (
+        f", and with it {', '.join(others)} and the {moving.carries}"
+        if others
+        else f" and the {moving.carries}"
+    )
+    return Motion(
+        axes=tuple(moved),
+        shift=tuple((SHIFT * span * unit).tolist()) if not turns else (0.0, 0.0, 0.0),
+        turn=tuple((SWING * unit).tolist()) if turns else (0.0, 0.0, 0.0),
+        about=tuple((places.min(axis=0) + places.max(axis=0)) / 2.0)
+        if moving.kind != "rotary"
+        else moving.at_mm,
+        sentence=f"{moving.name} {'turns about' if turns else 'shifts along'} {'XYZ'[along]}{carried}",
+    )
 
 
 def _ends(along: Array, span: float) -> tuple[float, float]:

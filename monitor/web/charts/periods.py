@@ -18,7 +18,7 @@ _LOOKS = {
 
 
 def periods_chart(answer: PeriodsAnswer) -> Chart:
-    """Show by how many expanded uncertainties each parameter changed; beyond 1 it differs."""
+    """Show by how many expanded uncertainties each parameter changed; beyond 1 it would differ by itself."""
     rows = [(name, of, ratio) for name, of in answer.parameters.items() if (ratio := _ratio(of)) is not None]
     traces = []
     for differs, (title, colour, marker) in _LOOKS.items():
@@ -34,7 +34,8 @@ def periods_chart(answer: PeriodsAnswer) -> Chart:
         )  # fmt: skip
     return Chart(
         key="periods",
-        says="change from the earlier to the later period, in expanded uncertainties (95 %) of each parameter",
+        says="change from the earlier to the later period, in expanded uncertainties (95 %) of each parameter; "
+        "the colour says what differs among all parameters together",
         traces=traces,
         layout={
             "xaxis": axis("", type="category", categoryorder="array", categoryarray=[name for name, _, _ in rows]),

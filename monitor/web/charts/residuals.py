@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from monitor.web.charts.chart import Chart, Trace, axis
-from monitor.web.charts.machine import machine_traces
+from monitor.web.charts.machine import machine_traces, motion_of
 
 if TYPE_CHECKING:
     from monitor.reporting.health.comparison import ResidualAgainst
@@ -62,7 +63,9 @@ def scene_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
 
 def explained_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
     """Return what an effect explains of every residual and what it leaves, for the script."""
+    motion = motion_of(residuals)
     return {
+        "motion": None if motion is None else asdict(motion),
         "effect": residuals.effect,
         "axis": residuals.effect_axis,
         "explained": residuals.explained_um,
@@ -216,14 +219,10 @@ def falling_chart(
                 "marker": {"color": "@teal", "symbol": "square", "size": 10},
             }
         )  # fmt: skip
-    lines = (
-        []
-        if expected_um is None
-        else [_level(expected_um, "noise floor: what the readings' uncertainty leaves")]
-    )
+    lines = [] if expected_um is None else [_level(expected_um, "noise floor")]
     return Chart(
         key="falling",
-        says="RMS of the residual from version to version in µm",
+        says="RMS of the residual by version in µm; the noise floor is what the readings' uncertainty leaves",
         traces=traces,
         layout={
             "xaxis": axis("", type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"), "shapes": lines,

@@ -139,7 +139,7 @@ def routes() -> APIRouter:
     async def identify(request: Request) -> Response:
         """Identify the errors of every campaign, in a thread of its own."""
         async with read_form(request):
-            request.app.state.desk.ask(request.state.user, IDENTIFY, {})
+            request.app.state.desk.ask(request.state.user, IDENTIFY, {}, anew=True)
         return RedirectResponse("/", status_code=303)
 
     @router.get("/machine/history.svg")

@@ -53,6 +53,9 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
             answer: ImportAnswer = asker(user, "import", {}, {"folders": folders})
         except MonitorError as error:
             refusal = refusal_of(error)
-            texts = [text.replace(f"{folder}/", "") for text in (refusal.error, *refusal.faults)]
+            texts = [
+                text.replace(f"{folder}/", "").replace(folder, "the upload")
+                for text in (refusal.error, *refusal.faults)
+            ]
             return Refusal(refusal.status, texts[0], tuple(texts[1:]))
         return answer

@@ -28,16 +28,17 @@ from monitor.web.users import User
 FILE_BYTES = 2**20
 #: The file that the answers are kept in.
 FILE_NAME = "laboratory.toml"
-#: A preview is a draft under this number: the next one of the campaign takes its place.
+#: What stands in the place of the number on a preview.
 PREVIEW = "preview {}"
 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What a button of the form led to: a certificate's ``number``, or a ``refusal`` with what is wrong at each box."""
+    """What a button of the form led to: a certificate's ``number``, a ``preview`` (PDF), or a ``refusal`` with what is
+    wrong at each box."""
 
     number: str = ""
-    is_draft: bool = False
+    preview: bytes = b""
     refusal: Refusal | None = None
     faults: Mapping[str, str] = field(default_factory=dict)
     grounds: bool = False
@@ -67,7 +68,18 @@ def routes() -> APIRouter:
             outcome = await run_in_threadpool(
                 _pressed, request.app.state.asker, request.state.user, texts, request.app.state.working_folder
             )
+        if outcome.preview:
+            request.app.state.previews.hold(request.state.user.name, outcome.preview)
         return await run_in_threadpool(_shown, request, texts, outcome)
+
+    @router.get("/certificate/preview.pdf")
+    def preview(request: Request) -> Response:
+        """Send the user's latest preview, to be looked at."""
+        return Response(
+            request.app.state.previews.document_of(request.state.user.name),
+            media_type="application/pdf",
+            headers={"Content-Disposition": 'inline; filename="preview.pdf"'},
+        )
 
     return router
 
@@ -104,10 +116,14 @@ def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder:
         try:
             laboratory.write_text(laboratory_file(texts), encoding="utf-8")
             document = _document(texts, draft=draft)
-            answer = asker(user, question, document, {"laboratory": laboratory, "out": Path(folder)})
+            answer = asker(
+                user, question, document, {"laboratory": laboratory, "out": Path(folder)}, storing=not draft
+            )
+            if draft:
+                return _Outcome(preview=Path(answer.file).read_bytes())
         except MonitorError as error:
             return _refused(error, folder)
-        return _Outcome(number=answer.certificate.number, is_draft=draft)
+        return _Outcome(number=answer.certificate.number)
 
 
 def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:

@@ -10,9 +10,8 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import InputError
 from monitor.web.access import offered, role_needed
-from monitor.web.forms import read_form
+from monitor.web.forms import own_address, read_form, whole_number
 from monitor.web.interface import address_of, attachment
 from monitor.web.rendering import page
 from monitor.workflow.contract import QUESTIONS
@@ -38,12 +37,19 @@ def routes() -> APIRouter:
 
     @router.post("/work/cancel")
     async def cancel(request: Request) -> Response:
-        """Take back a question that still waits."""
+        """Take back a question that waits or is being computed."""
         async with read_form(request) as form:
-            number = form.text("number")
-        if not number.isdecimal() or not request.app.state.desk.cancel(int(number)):
-            raise InputError("it is answered already, or being computed: that ends by itself")
+            number = whole_number("number", form.text("number"))
+        request.app.state.desk.take_back(request.state.user, number)
         return RedirectResponse("/work", status_code=303)
+
+    @router.post("/work/again")
+    async def again(request: Request) -> Response:
+        """Let a question that was taken back be asked again, by the page that needs it."""
+        async with read_form(request) as form:
+            number, page_of_it = whole_number("number", form.text("number")), form.text("then")
+        request.app.state.desk.ask_again(number)
+        return RedirectResponse(own_address(page_of_it), status_code=303)
 
     @router.get("/export")
     def export(request: Request, format: str = "csv", machine: str = "") -> Response:

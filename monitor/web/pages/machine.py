@@ -15,12 +15,14 @@ from starlette.responses import RedirectResponse, Response
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
+from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
 
 if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer
+    from monitor.workflow.trend.answer import TrendAnswer
 
 #: Which runs are shown: all, those of a warm machine, those of one that warms up.
 WARMTHS = ("", "warm", "warming up")
@@ -38,27 +40,26 @@ def routes() -> APIRouter:
         colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "",
     ) -> Response:  # fmt: skip
         """Show a machine; one parameter, one period."""
-        ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
+        ask, user = request.app.state.asker, request.state.user
         if colour not in GROUPINGS:
             raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
-        asked = _asked(name, since, campaign)
-        ticket = desk.ask(user, "trend", asked)
+        trends = _Trends(request, _asked(name, since, campaign), parameter)
         values: ValuesAnswer = ask(user, "values", _period(name, since, until))
-        trend = ticket.answer()
-        if trend is not None and not values.parameters:
+        if not values.parameters and trends.of_all() is not None:
             # The trend has identified what nobody had identified before.
             values = ask(user, "values", _period(name, since, until))
         methods = sorted(set(values.method))
         values = _chosen(values, campaign, method, warm_up)
         names = list(values.parameters)
-        _check_names(values, parameter, campaign, may_lack=not ticket.is_done)
+        _check_names(values, parameter, campaign, may_lack=trends.waiting is not None)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
         campaigns = ask(user, "campaigns", {"machine": name}).campaigns
+        trend = trends.shown(shown)
         return page(
             request, "machine.html",
             name=name, parameter=shown, parameters=names, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
-            waiting=None if ticket.is_done else ticket,
+            waiting=trends.waiting,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
@@ -84,6 +85,49 @@ def routes() -> APIRouter:
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router
+
+
+class _Trends:
+    """The trends of a page: of its one parameter at once, of all in the table below as soon as that is answered.
+
+    All parameters take some fifteen times as long as one, and share the processor with whoever asks next.
+    """
+
+    def __init__(self, request: Request, asked: dict[str, Any], parameter: str) -> None:
+        self._user, self._desk, self._asked = request.state.user, request.app.state.desk, asked
+        self._one: Ticket | None = None
+        self._all: Ticket | None = self._desk.standing("trend", asked)
+        if parameter and (self._all is None or not self._all.is_done):
+            self._one = self._of_one(parameter)
+
+    def _of_one(self, parameter: str) -> Ticket:
+        ticket: Ticket = self._desk.ask(self._user, "trend", {**self._asked, "parameter": parameter})
+        return ticket
+
+    def of_all(self) -> TrendAnswer | None:
+        """Return the trends of all parameters, None while they are computed."""
+        if self._all is None:
+            self._all = self._desk.ask(self._user, "trend", self._asked)
+        answer: TrendAnswer | None = self._all.answer()
+        return answer
+
+    def shown(self, parameter: str) -> TrendAnswer | None:
+        """Return what there is of a parameter (empty: the machine has none), None while it is computed."""
+        if not parameter or (self._all is not None and self._all.is_done):
+            return self.of_all()
+        if self._one is None:
+            self._one = self._of_one(parameter)
+        answer: TrendAnswer | None = self._one.answer()
+        if answer is not None:
+            self._all = self._desk.ask(self._user, "trend", self._asked)
+        return answer
+
+    @property
+    def waiting(self) -> Ticket | None:
+        """The trend that is not answered yet."""
+        return next(
+            (ticket for ticket in (self._one, self._all) if ticket is not None and not ticket.is_done), None
+        )
 
 
 def _two_periods(
@@ -188,7 +232,7 @@ def _most_urgent(request: Request, name: str, names: list[str]) -> str:
     """The parameter that the fleet names first, where that is computed already; else the first by name."""
     ticket = request.app.state.desk.ask(request.state.user, "fleet", {"top": 0})
     try:
-        answer = ticket.answer(patience=0.5)
+        answer = ticket.answer()
     except NotFoundError:
         answer = None
     rows = () if answer is None else answer.table

@@ -26,7 +26,7 @@ def routes() -> APIRouter:
     def plan(request: Request, campaign: str, model: str = "", separate: str = "") -> Response:
         """Weigh the plan of a campaign, and the one that the form asks for."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
-        from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer
+        from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
 
         query = request.query_params
         document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
@@ -45,7 +45,8 @@ def routes() -> APIRouter:
         return page(
             request, "plan.html",
             campaign=campaign, model=model, answer=answer, refusal=refusal, asked=document, separate=separate,
-            is_of_angles=isinstance(answer, AnglePlanAnswer), waiting=None if ticket.is_done else ticket,
+            is_of_angles=isinstance(answer, AnglePlanAnswer), is_of_tests=isinstance(answer, InstrumentPlanAnswer),
+            waiting=None if ticket.is_done else ticket,
             chart=plan_chart(answer) if isinstance(answer, BallPlanAnswer) and answer.proposed else None,
         )  # fmt: skip
 

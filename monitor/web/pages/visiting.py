@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from monitor.web.forms import read_form
+from monitor.web.forms import own_address, read_form
 from monitor.web.gate import session_cookie
 from monitor.web.rendering import page
 from monitor.web.sessions import COOKIE, Sessions
@@ -23,7 +23,7 @@ def routes() -> APIRouter:
     @router.get("/login")
     def form(request: Request, then: str = "/") -> Response:
         """Show the form."""
-        return page(request, "login.html", then=_inside(then), wrong="")
+        return page(request, "login.html", then=own_address(then), wrong="")
 
     @router.post("/login")
     async def login(request: Request) -> Response:
@@ -33,7 +33,7 @@ def routes() -> APIRouter:
         """
         sessions: Sessions = request.app.state.sessions
         async with request.form(max_files=0) as texts:
-            then = _inside(str(texts.get("then") or "/"))
+            then = own_address(str(texts.get("then") or "/"))
             name, secret = str(texts.get("name") or "").strip(), str(texts.get("token") or "")
         wait_s = sessions.attempts.wait_s(name) if name else 0.0
         if wait_s > 0.0:
@@ -61,8 +61,3 @@ def routes() -> APIRouter:
         return answer
 
     return router
-
-
-def _inside(address: str) -> str:
-    """Return an address of this server, the first page for any other."""
-    return address if address.startswith("/") and not address.startswith(("//", "/\\")) else "/"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from monitor import __version__
 from monitor.documents import from_document
 from monitor.exceptions import InputError
+from monitor.reporting import messages
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import is_signed
@@ -38,9 +39,7 @@ def remake(db: Database, request: RemakeRequest) -> RemakeAnswer:
     pdf = certificate_pdf(record, request.fonts, inputs, written)
     signed = is_signed(stored.pdf)
     identical = stored.pdf.startswith(pdf) if signed else stored.pdf == pdf
-    why = None if identical else (
-        f"{_why_another(stored, made_with)}; the stored document is unchanged where `monitor verify` says so"
-    )  # fmt: skip
+    why = None if identical else _why_another(stored, made_with)
     file = None
     if request.path is not None:
         path = path_of(request.path, number)
@@ -51,13 +50,13 @@ def remake(db: Database, request: RemakeRequest) -> RemakeAnswer:
 
 def _why_another(stored: StoredCertificate, made_with: MadeWith) -> str:
     """What differs from when a document was made: this software, or what lays out its pages."""
-    then = {"this software": stored.software_version, **made_with.page_made_by}
-    present = {"this software": __version__, **engine_versions()}
-    others = [
-        f"{name} {then[name]} (here {present[name]})"
-        for name in then
-        if present.get(name, then[name]) != then[name]
-    ]
+    then = {messages.THIS_SOFTWARE: stored.software_version, **made_with.page_made_by}
+    present = {messages.THIS_SOFTWARE: __version__, **engine_versions()}
+    others = {
+        name: (version, present[name])
+        for name, version in then.items()
+        if present.get(name, version) != version
+    }
     if others:
-        return f"it was made with {', '.join(others)}"
-    return f"it was made with the same {stored.software_version} of this software, but with other templates or texts"
+        return messages.remade_with_others(others)
+    return messages.remade_with_other_texts(stored.software_version)

@@ -143,12 +143,7 @@ def results_of(
             state=state or texts("record.as_found"),
             evaluation=_evaluation(evaluated, texts, monte_carlo, method),
             refused=answer.refused,
-            residuals=ResidualSummary(
-                "target",
-                tuple(answer.residuals.by_target_um),
-                tuple(answer.residuals.by_target_um.values()),
-                MICROMETRE.to_display(evaluated.campaign.probe.standard_uncertainty),
-            ),
+            residuals=_residuals(evaluated),
             trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
             validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
             descriptions={
@@ -159,6 +154,18 @@ def results_of(
             budget=_budget(answer),
         ),
         texts,
+    )
+
+
+def _residuals(evaluated: StatedUncertainty) -> ResidualSummary:
+    """What the model leaves of the run, by target; of several instruments there is no one uncertainty beside it."""
+    by_target, campaign = evaluated.answer.residuals.by_target_um, evaluated.campaign
+    of_setups = bool(campaign.artefact.setups)
+    return ResidualSummary(
+        "setup" if of_setups else "target",
+        tuple(by_target),
+        tuple(by_target.values()),
+        None if of_setups else MICROMETRE.to_display(campaign.probe.standard_uncertainty),
     )
 
 
@@ -286,7 +293,8 @@ def _how_it_fits(evaluated: StatedUncertainty, texts: Texts) -> str:
         texts.number(round_to_place(value, decimal_of(0.01)))
         for value in (residuals.rms_um, residuals.expected_rms_um)
     )
-    fits = texts("evaluation.fit", rms=rms, expected=expected)
+    of_setups = bool(evaluated.campaign.artefact.setups)
+    fits = texts("evaluation.fit_setups" if of_setups else "evaluation.fit", rms=rms, expected=expected)
     if evaluated.counts_lack_of_fit:
         fits += "; " + texts("evaluation.fit_counted")
     elif residuals.something_is_missing:

@@ -11,14 +11,12 @@ import numpy as np
 
 from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError, NotFoundError
+from monitor.reporting import messages
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
 from monitor.workflow.certificate.answer import CertificateChecks, Verdict, VerificationAnswer
 from monitor.workflow.certificate.request import VerificationRequest
 
-_WITHOUT_SIGNATURE = (
-    "the file is not signed, and who names trusted signers asks for a signature of one of them"
-)
 #: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
 _IDENTIFIER = re.compile(rb"/ID ?\[ ?\(([^()\\]*)\)")
 
@@ -49,8 +47,8 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     ok = checks.passed and not without
     faults = (
         _unknown(db, file.name, content) if stored is None else _no_longer(stored),
-        f"the file has the hash {sha256}, not the one noted elsewhere" if checks.expected is False else None,
-        _WITHOUT_SIGNATURE if without else None,
+        messages.other_hash(sha256) if checks.expected is False else None,
+        messages.WITHOUT_SIGNATURE if without else None,
     )
     return VerificationAnswer(
         number=number,
@@ -99,29 +97,27 @@ def _as_stated(signature: SignatureFinding, stored: StoredCertificate) -> Signat
     stated = stored.record.get("signer")
     if stated is None or (signature.signer is not None and signature.signer.sha256 == stated["sha256"]):
         return signature
-    actual = "nobody" if signature.signer is None else f"{signature.signer.name} ({signature.signer.sha256})"
-    fault = f"the certificate states that {stated['name']} ({stated['sha256']}) signs it, and {actual} does"
+    actual = None if signature.signer is None else (signature.signer.name, signature.signer.sha256)
+    fault = messages.other_signer((stated["name"], stated["sha256"]), actual)
     return SignatureFinding(False, signature.signer, (*signature.faults, fault))
 
 
 def _unknown(db: Database, name: str, content: bytes) -> str:
     """Why a file that this database does not know is no certificate of it."""
-    why = _claimed(db, content) if content.startswith(b"%PDF-") else "it is no PDF"
-    return f"no certificate of this database has the content of {name}: {why}"
+    why = _claimed(db, content) if content.startswith(b"%PDF-") else messages.NO_PDF
+    return messages.unknown_content(name, why)
 
 
 def _no_longer(stored: StoredCertificate) -> str | None:
     """Why a genuine certificate is not valid; None where it is."""
     if stored.state == "draft":
-        return "it is a draft"
+        return messages.DRAFT
     if stored.state != "issued":
-        replaced = f", replaced by {stored.replaced_by}" if stored.replaced_by else ""
-        return f"certificate {stored.number} is {stored.state}, no longer valid{replaced}: {stored.reason}"
+        return messages.no_longer_valid(stored.number, stored.state, stored.replaced_by, stored.reason)
     if stored.campaign_withdrawn is None:
         return None
-    return (
-        f"the campaign {stored.campaign}, which certificate {stored.number} rests on, was withdrawn: "
-        f"{stored.campaign_withdrawn}"
+    return messages.campaign_of_certificate_withdrawn(
+        stored.campaign, stored.number, stored.campaign_withdrawn
     )
 
 
@@ -135,8 +131,5 @@ def _claimed(db: Database, content: bytes) -> str:
         common = min(len(content), len(genuine))
         starts = (np.frombuffer(file[:common], dtype=np.uint8) for file in (content, genuine))
         first = next(iter(np.flatnonzero(np.not_equal(*starts))), common)
-        return (
-            f"it bears the number {number}, but differs from the document of that certificate from byte "
-            f"{first} on ({len(content)} bytes, where the genuine one has {len(genuine)})"
-        )
-    return "altered, or not from here"
+        return messages.differs_from(number, int(first), len(content), len(genuine))
+    return messages.ALTERED

@@ -8,6 +8,7 @@ from pathlib import Path
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve.fit import CurveFit, fit
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.curve import MeasuredCurve, Residuals, residuals_figure
 from monitor.reporting.figures.style import Figure
 from monitor.workflow.figure_files import make_folder, save_figure
@@ -33,7 +34,7 @@ def residual_figure(first: CurveFit, explanation: CurveExplanation | None) -> Fi
             _with_unit(first, curve.response),
         ),
         _panels(first, explanation),
-        title=_title(curve.name, explanation),
+        title=titles.curve_residual(curve.name, None if explanation is None else len(explanation.missing)),
     )
 
 
@@ -55,17 +56,8 @@ def _panels(first: CurveFit, explanation: CurveExplanation | None) -> list[Resid
     """The residual of the model as it is, and of every missing effect added to it in turn, without the outliers."""
     if explanation is not None:
         first = fit(replace(first.settled, left_out=explanation.final.problem.left_out))
-    panels = [Residuals(f"model as it is: RMS {first.rms:.4g}", first.residual)]
+    panels = [Residuals(titles.curve_as_it_is(first.rms), first.residual)]
     for effect in () if explanation is None else explanation.missing:
         first = fit(first.settled.with_effects([effect.fitted]))
-        panels.append(Residuals(f"+ {effect.effect}: RMS {first.rms:.4g}", first.residual))
+        panels.append(Residuals(titles.curve_with(effect.effect, first.rms), first.residual))
     return panels
-
-
-def _title(name: str, explanation: CurveExplanation | None) -> str:
-    if explanation is None:
-        return f"{name}: what the model leaves"
-    count = len(explanation.missing)
-    if not count:
-        return f"{name}: nothing is missing that these rows can show"
-    return f"{name}: {count} missing effect{'s' if count > 1 else ''} found"

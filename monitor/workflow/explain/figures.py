@@ -9,8 +9,8 @@ import numpy as np
 
 from monitor.discovery import ChainComparison, Explanation, Fit
 from monitor.effects import ChainEffect
-from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.drivers import (
     DrivenResiduals,
     predicted_against_measured,
@@ -20,7 +20,6 @@ from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_fa
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.figures.unknown_shape import ShapeCurve, unknown_shape
-from monitor.reporting.numbers import round_result
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.explain_answer import MachineExplanation, MachineMissing
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
@@ -33,8 +32,6 @@ from monitor.workflow.figure_files import make_folder, save_figure
 SMALLEST_SHOWN_UM = 0.005
 # Rivals of an effect that a figure has room for.
 MOST_RIVALS = 5
-OVER_WORKSPACE = "What the model leaves, mean over the runs, over the workspace"
-NOISE_NAME = "probe's stated uncertainty"
 
 
 def comparison_figures(comparison: ChainComparison, fit: Fit, folder: Path) -> list[str]:
@@ -51,26 +48,23 @@ def comparison_figures(comparison: ChainComparison, fit: Fit, folder: Path) -> l
         if residuals:
             groups[name] = (list(residuals), list(residuals.values()))
     level = um(comparison.expected_rms)
-    title = (
-        f"{comparison.campaign}: RMS {um(comparison.rms):.2f} µm where {level:.2f} µm is expected: "
-        f"{comparison.verdict.value}"
-    )
-    bars = residual_bars(groups, level_um=level, level_name="expected", title=title)
+    title = titles.where_it_fails(comparison.campaign, um(comparison.rms), level, comparison.verdict.value)
+    bars = residual_bars(groups, level_um=level, level_name=titles.EXPECTED, title=title)
     files = save_figure(bars, folder, "where-it-fails")
     files += _over_workspace(fit, *in_machine_frame(fit), folder)
     for name, driver, axis, residuals_um in drivers_followed(fit):
         figure = residual_against_driver(
             DrivenResiduals(driver, residuals_um),
-            title=f"Residual along {axis} against {name}",
+            title=titles.residual_along(axis, name),
             driver_name=name,
-            residual_name=f"residual along {axis} / µm",
+            residual_name=titles.residual_axis(axis),
         )
         files += save_figure(figure, folder, f"residual-against-{name.split(' ')[0].lower()}")
     return files + shape_figure(comparison.campaign, fit, folder)
 
 
 def _over_workspace(fit: Fit, positions: Array, vectors: Array, folder: Path) -> list[str]:
-    figure = residual_vectors(*mean_over_runs(fit, positions, vectors), title=OVER_WORKSPACE)
+    figure = residual_vectors(*mean_over_runs(fit, positions, vectors), title=titles.OVER_WORKSPACE)
     return save_figure(figure, folder, "residual-vectors")
 
 
@@ -82,16 +76,15 @@ def explanation_figures(answer: MachineExplanation, explanation: Explanation, fo
         return []
     best = missing[0].effect
     noise_um = MICROMETRE.to_display(explanation.comparison.stated_uncertainty)
-    title = f"The model lacks {_drawn_name(missing[0])}" if missing[0].shape_unknown else answer.answer
+    title = titles.model_lacks(_drawn_name(missing[0])) if missing[0].shape_unknown else answer.answer
     files = save_figure(_ranked(missing, title), folder, "missing-effects")
     files += save_figure(_falling(missing, noise_um), folder, "error-falling")
     files += _unknown_shapes(missing, folder)
     files += _failing(explanation, best, _drawn_name(missing[0]), folder)
     prediction = _predicted(explanation, best)
     if prediction is not None:
-        figure = predicted_against_measured(
-            *prediction, title=f"{_drawn_name(missing[0])} predicts what the model leaves"
-        )
+        title = titles.predicts(_drawn_name(missing[0]))
+        figure = predicted_against_measured(*prediction, title=title)
         files += save_figure(figure, folder, "predicted-against-measured")
     return files
 
@@ -107,15 +100,15 @@ def _ranked(missing: Sequence[MachineMissing], title: str) -> Figure:
         names += [_drawn_name(effect), *rivals]
         peaks += [effect.peak_um] * (1 + len(rivals))
         groups += [effect.rank] * (1 + len(rivals))
-        notes += [_size(effect.amplitude, effect.u, effect.unit)]
-        notes += ["not ruled out"] * len(rivals)
+        notes += [titles.effect_size(effect.amplitude, effect.u, effect.unit)]
+        notes += [titles.NOT_RULED_OUT] * len(rivals)
     effects = RankedEffects(names, peaks, groups, notes)
-    return ranked_effects(effects, title=title, value_name="peak displacement / µm")
+    return ranked_effects(effects, title=title, value_name=titles.PEAK)
 
 
 def _drawn_name(effect: MachineMissing) -> str:
     """The name of an effect where there is little room: the parts of an unknown shape are left out."""
-    return f"{effect.effect.partition(':')[0]}, shape unknown" if effect.shape_unknown else effect.effect
+    return titles.effect_name(effect.effect, shape_unknown=effect.shape_unknown)
 
 
 def _unknown_shapes(missing: Sequence[MachineMissing], folder: Path) -> list[str]:
@@ -131,8 +124,8 @@ def _unknown_shapes(missing: Sequence[MachineMissing], folder: Path) -> list[str
                     [point.value for point in effect.curve],
                     [point.u for point in effect.curve],
                 ),
-                title=f"{error}, shape unknown; nearest in the catalogue: {effect.nearest_shape}",
-                axis_name=f"reading of {error[2:].lstrip('0')}",
+                title=titles.unknown_shape_of(error, effect.nearest_shape),
+                axis_name=titles.reading_of(error[2:].lstrip("0")),
                 value_name=f"{error} / {effect.unit}",
             )
             files += save_figure(figure, folder, f"shape-of-{error.lower()}")
@@ -149,20 +142,12 @@ def _failing(explanation: Explanation, effect: str, shown: str, folder: Path) ->
     if against is not None:
         figure = residual_against_driver(
             DrivenResiduals(against.at, against.before, against.groups, after_um=against.after),
-            title=f"{shown} is missing: the residual along {against.along} follows it",
+            title=titles.residual_follows(shown, against.along),
             driver_name=against.driver,
-            residual_name=f"residual along {against.along} / µm",
+            residual_name=titles.residual_axis(against.along),
         )
         files += save_figure(figure, folder, "missing-effect-before-after")
     return files
-
-
-def _size(amplitude: float, u: float, unit: str) -> str:
-    try:
-        rounded = round_result(amplitude, u)
-    except DataError:
-        return f"{amplitude:.3g} {unit}"
-    return f"{rounded.estimate} ± {rounded.uncertainty} {unit}"
 
 
 def _not_a_number_for_none(values: list[float | None]) -> list[float]:
@@ -172,9 +157,11 @@ def _not_a_number_for_none(values: list[float | None]) -> list[float]:
 def _falling(missing: Sequence[MachineMissing], noise_um: float) -> Figure:
     rms = [missing[0].rms_before_um, *(effect.rms_after_um for effect in missing)]
     held_out = [missing[0].heldout_before_um, *(effect.heldout_after_um for effect in missing)]
-    names = ["as it is", *(f"+ {_drawn_name(effect)}" for effect in missing)]
-    steps = ErrorSteps(names, rms, _not_a_number_for_none(held_out), noise_um, NOISE_NAME)
-    return error_falling(steps, title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm")
+    names = [titles.AS_IT_IS, *(f"+ {_drawn_name(effect)}" for effect in missing)]
+    steps = ErrorSteps(
+        names, rms, _not_a_number_for_none(held_out), noise_um, titles.Noise.STATED_BY_PROBE.value
+    )
+    return error_falling(steps, title=titles.error_falls(rms[0], rms[-1]))
 
 
 def _predicted(explanation: Explanation, text: str) -> tuple[Array, Array] | None:
@@ -198,27 +185,25 @@ def history_figures(steps: Sequence[MachineVersion | CurveVersion], folder: Path
     make_folder(folder)
     first, last = steps[0], steps[-1]
     noise, noise_name = _noise_floor(last)
-    digits = ".4g" if isinstance(last, CurveVersion) else ".2f"
     unit = "" if last.unit == "1" else last.unit
-    named_unit = "" if isinstance(last, CurveVersion) else f" {unit}"
+    named_unit = None if isinstance(last, CurveVersion) else unit
     figure = error_falling(
         ErrorSteps(
             [step.model if step.added is None else f"+ {step.added}" for step in steps],
             [step.rms for step in steps],
             _not_a_number_for_none([step.heldout_rms for step in steps]),
             noise,
-            noise_name,
+            noise_name.value,
             unit,
         ),
-        title=f"{last.model} on {last.campaign}: the error falls from {first.rms:{digits}} to "
-        f"{last.rms:{digits}}{named_unit}",
+        title=titles.versions_fall(last.model, last.campaign, first.rms, last.rms, named_unit),
     )
     return save_figure(figure, folder, "error-falling")
 
 
-def _noise_floor(step: MachineVersion | CurveVersion) -> tuple[float, str]:
+def _noise_floor(step: MachineVersion | CurveVersion) -> tuple[float, titles.Noise]:
     """The noise below which no error falls, and its name; 0 for a curve that states none and has no repeats."""
     if isinstance(step, MachineVersion):
-        return step.stated_uncertainty_um, NOISE_NAME
+        return step.stated_uncertainty_um, titles.Noise.STATED_BY_PROBE
     floor = step.stated_uncertainty or step.repeatability
-    return (0.0, "no repeats") if floor is None else (floor, "stated uncertainty or repeatability")
+    return (0.0, titles.Noise.UNKNOWN) if floor is None else (floor, titles.Noise.STATED_OR_REPEATABILITY)

@@ -7,6 +7,7 @@ import numpy as np
 from monitor.discovery import Fit
 from monitor.discovery.machine.noise.plan_cells import plan_cells
 from monitor.records import Array
+from monitor.reporting.figures import driver_names
 from monitor.units import HOUR, MICROMETRE, MINUTE
 
 #: Of the drivers of the residual so many are drawn: those that explain most, the others in the document.
@@ -85,14 +86,14 @@ def _drivers(fit: Fit) -> dict[str, Array]:
     """Everything that a residual may depend on (n,): positions of the axes, recorded temperatures, time."""
     context = fit.problem.context
     columns = {
-        f"{joint.name} / {'°' if joint.turns else 'mm'}": joint.sign
+        driver_names.reading(joint.name, turns=joint.turns): joint.sign
         * context.positions[:, index]
         * (180.0 / np.pi if joint.turns else 1.0)
         for index, joint in enumerate(context.chain.joints)
     }
     columns |= {name: values for name, values in context.columns.items() if name.endswith("_degC")}
-    columns["time_in_run / min"] = context.time / MINUTE.factor
-    columns["time_of_day / h"] = context.day_time / HOUR.factor
+    columns[driver_names.TIME_IN_RUN] = context.time / MINUTE.factor
+    columns[driver_names.TIME_OF_DAY] = context.day_time / HOUR.factor
     return columns
 
 

@@ -16,6 +16,7 @@ from monitor.effects.drivers import Channel, EachRun, LaggedTemperature, RunTime
 from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal
 from monitor.exceptions import InputError
 from monitor.records import Array
+from monitor.reporting.figures import driver_names
 from monitor.reporting.health.comparison import GroupMean, ResidualAgainst, ResidualMap
 from monitor.units import COLUMN_UNITS, MICROMETRE, MINUTE
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
@@ -74,7 +75,7 @@ def against_effect(explanation: Explanation, effect: str) -> Against | None:
     columns = {name: values[acts] for name, values in _what_drives(fit, drawn).items()}
     if size is not None and (not columns or (isinstance(drawn, ChainEffect) and len(columns) > 1)):
         moved = np.sum(fit.moved_by(basis) * size, axis=2)[acts]
-        columns[f"what {effect} predicts / µm"] = -um * np.sum(moved * unit, axis=1)
+        columns[driver_names.predicted(effect)] = -um * np.sum(moved * unit, axis=1)
     driver = _most_followed(columns, before)
     if driver is None:
         return None
@@ -119,38 +120,36 @@ def _axis_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     reading = joint.sign * context.positions[:, effect.term.joint] * (180.0 / np.pi if joint.turns else 1.0)
     if isinstance(effect.shape, Reversal):
         travel = joint.sign * context.travel[:, effect.term.joint]
-        return {f"direction of the last travel of {joint.name}": travel}
+        return {driver_names.last_travel(joint.name): travel}
     if isinstance(effect.shape, Cyclic):
         pitch = effect.shape.pitch
-        return {f"{joint.name} within its pitch of {pitch:g} mm / mm": reading % pitch}
-    return {f"{joint.name} / {'°' if joint.turns else 'mm'}": reading}
+        return {driver_names.within_pitch(joint.name, pitch): reading % pitch}
+    return {driver_names.reading(joint.name, turns=joint.turns): reading}
 
 
 def _driver_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     """What a driver reads: a channel, the time since the first start, the part of the run."""
     context, driver = fit.problem.context, effect.driver
     if isinstance(driver, Channel):
-        stem, _, suffix = driver.name.rpartition("_")
-        name, unit = stem.replace("_", " "), COLUMN_UNITS[suffix].name
+        unit = COLUMN_UNITS[driver.name.rpartition("_")[2]].name
         values = context.columns[driver.name]
         return {
-            f"{name} / {unit}": values,
-            f"{name}, from its mean in the run / {unit}": _within_run(context.run, values),
+            driver_names.channel(driver.name, unit): values,
+            driver_names.channel_within_run(driver.name, unit): _within_run(context.run, values),
         }
     if isinstance(driver, LaggedTemperature):
         late = driver.columns(context, None)[:, 0] + REFERENCE_TEMPERATURE_DEGC
-        name = f"{driver.channel.rpartition('_')[0].replace('_', ' ')}, followed late"
         return {
-            f"{name} / °C": late,
-            f"{name}, from its mean in the run / K": _within_run(context.run, late),
+            driver_names.channel(driver.channel, "°C", late=True): late,
+            driver_names.channel_within_run(driver.channel, "K", late=True): _within_run(context.run, late),
         }
     if isinstance(driver, WarmUp):
         warmth = driver.columns(context, None)[:, 0]
         return {
-            "time since the day's first start / min": context.day_time / MINUTE.factor,
-            "warm-up, from its mean in the run": _within_run(context.run, warmth),
+            driver_names.SINCE_DAY_BEGAN: context.day_time / MINUTE.factor,
+            driver_names.WARM_UP_WITHIN_RUN: _within_run(context.run, warmth),
         }
-    return {"part of the run / %": 100.0 * context.run_time} if isinstance(driver, RunTime) else {}
+    return {driver_names.PART_OF_RUN: 100.0 * context.run_time} if isinstance(driver, RunTime) else {}
 
 
 def _within_run(run: npt.NDArray[np.int64], values: Array) -> Array:

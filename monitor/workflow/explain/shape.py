@@ -10,6 +10,7 @@ import numpy.typing as npt
 from monitor.discovery import Fit
 from monitor.methods.free_form.problem import FreeFormProblem
 from monitor.records import Array
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.shape import Deviations, raw_and_identified
 from monitor.reporting.figures.style import Figure
 from monitor.units import DEGREE, MICROMETRE
@@ -47,8 +48,12 @@ def _raw_and_identified(name: str, fit: Fit, problem: FreeFormProblem) -> Figure
             shape * um,
             np.where(free, K * um * np.sqrt(variance), np.nan),
         ),
-        title=f"{name}, run {run}: the angles disagree by up to {um * float(np.nanmax(np.ptp(raw, axis=1))):.1f} µm; "
-        f"U of the shape at most {K * um * float(np.sqrt(variance[free].max(initial=0.0))):.1f} µm",
+        title=titles.shape_title(
+            name,
+            run,
+            um * float(np.nanmax(np.ptp(raw, axis=1))),
+            K * um * float(np.sqrt(variance[free].max(initial=0.0))),
+        ),
         axes_names=(plane.u.name, plane.v.name),
     )
 

@@ -12,7 +12,11 @@ from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 @dataclass(frozen=True)
 class FleetTableRow:
-    """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day."""
+    """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day.
+
+    ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``refers_to`` says in
+    words what the parameter is stated relative to, where it is an error of the chain.
+    """
 
     rank: int
     machine: str
@@ -41,6 +45,8 @@ class FleetTableRow:
     since: str | None
     limit: float | None
     years_to_limit: float | None
+    temperature: str | None = field(default=None, metadata=OMITTED)
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

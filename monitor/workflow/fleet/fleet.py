@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ from monitor.store import (
     Database,
     FleetSums,
     fleet_sums,
+    latest_frames,
     latest_tolerances,
     not_identified,
     tolerance_types,
@@ -23,7 +25,7 @@ from monitor.store import (
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
 from monitor.workflow.fleet.attention import ATTENTION
-from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked
+from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, warmth_beside
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.weekly_looks import weekly_notices
@@ -43,6 +45,11 @@ class _Cells:
     kind: npt.NDArray[np.int64]
     measure: Array
     years: Array
+
+    @cached_property
+    def warmth(self) -> npt.NDArray[np.bool_]:
+        """Whether the temperature is fitted beside each slope that is stated (c,)."""
+        return warmth_beside(self.sums) & np.isfinite(self.drift.slope)
 
     @property
     def order(self) -> npt.NDArray[np.int64]:
@@ -79,6 +86,7 @@ class _Cells:
             since=_date(float(self.sums.since_d[index])),
             limit=_number(self.limit[index]),
             years_to_limit=_number(self.years[index]) if self.kind[index] == 1 else None,
+            temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
         )
 
 
@@ -105,9 +113,18 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             for number, label in enumerate(ATTENTION)
         },
         not_identified=not_identified(db) if request.model is None else (),
-        table=tuple(replace(row, rank=rank) for rank, (row, _) in enumerate(measured[:most], start=1)),
+        table=_shown(db, [row for row, _ in measured[:most]]),
         weekly_looks=weekly_notices(db) if request.weekly_looks else None,
         tolerances_of_type=tolerance_types(db) or None,
+    )
+
+
+def _shown(db: Database, rows: list[FleetTableRow]) -> tuple[FleetTableRow, ...]:
+    """Return the rows with their ranks and what their parameters refer to."""
+    frames = latest_frames(db, sorted({row.machine for row in rows}))
+    return tuple(
+        replace(row, rank=rank, refers_to=frames.get((row.machine, row.parameter)))
+        for rank, row in enumerate(rows, start=1)
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,10 +17,11 @@ from monitor.statistics.sufficient import (
     cells_from_sums,
     drift_from_sums,
     drift_in_blocks,
+    slope_beside,
 )
 from monitor.store import BlockCut, FleetSums
 from monitor.units import DAYS_PER_YEAR
-from monitor.workflow.history.drift import SHORTEST_DAYS
+from monitor.workflow.history.drift import DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE, SHORTEST_DAYS
 
 #: How histories are cut into blocks: as those of `monitor trend`.
 CUT = BlockCut(DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS)
@@ -43,8 +46,25 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
         )
     )  # fmt: skip
     drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
-    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups)
+    beside = warmth_beside(sums)
+    degrees = np.where(beside[:, np.newaxis], sums.blocks.degrees, 0.0)[:, :, np.newaxis]
+    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups, degrees)
+    warmth = sums.temperatures
+    slopes = slope_beside(
+        sums.groups,
+        (sums.sum_tt, warmth.sum_gg),
+        (warmth.sum_gt, sums.sum_tm, warmth.sum_gm),
+        (sums.sum_t, warmth.sum_g, sums.sum_m),
+    )
+    drift = replace(drift, slope=np.where(beside, slopes, drift.slope))
     return cells, _without_short_histories(sums, drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR))
+
+
+def warmth_beside(sums: FleetSums) -> npt.NDArray[np.bool_]:
+    """Whether the temperature is fitted beside the line of each cell (c,), as for one machine (``PieceDrift``)."""
+    warmth = sums.temperatures
+    enough = (sums.groups >= DAYS_FOR_TEMPERATURE) & (warmth.span >= LEAST_TEMPERATURE_RANGE)
+    return np.asarray((warmth.groups == sums.groups) & enough)
 
 
 def means_p(sums: FleetSums) -> Array:

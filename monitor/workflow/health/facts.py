@@ -8,6 +8,7 @@ from datetime import datetime
 
 import numpy as np
 
+from monitor.documents import Said
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -17,10 +18,15 @@ from monitor.reporting.health.records import (
     ParameterHealth,
     RefusedImport,
 )
-from monitor.reporting.health.words import in_words
+from monitor.reporting.health.sentences import (
+    BadPoint,
+    BallMoved,
+    EventNoted,
+    ParameterChanged,
+    SteppedAtEvent,
+)
 from monitor.reporting.lacks import Undecided
 from monitor.reporting.symbols import describe
-from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
@@ -110,19 +116,18 @@ def changes_noted(
         for change in parameter.search.changes:
             at = moment_of(change.at, parameter.series)
             after = moment_of(change.interval[0], parameter.series)
-            sentence = _change_in_words(change, parameter.series.unit)
-            noted.append(Change(ChangeKind.CHANGE, after, at, sentence, change.p_value, week.holds(at)))
+            what = ParameterChanged(
+                change.parameter, change.kind, change.size, change.u, parameter.series.unit
+            )
+            noted.append(Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at)))
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
-        noted.append(
-            Change(ChangeKind.EVENT_STEP, None, at, _step_in_words(step), step.p_value, week.holds(at))
-        )
+        noted.append(Change(ChangeKind.EVENT_STEP, None, at, _stepped(step), step.p_value, week.holds(at)))
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
-            sentence = f"ball {move.target} moved by {move.size:.1f} {move.unit} (run {move.run})"
-            at = starts[move.run]
-            noted.append(Change(ChangeKind.CHANGE, None, at, sentence, move.p_value, week.holds(at)))
+            moved, at = BallMoved(move.target, move.size, move.unit, move.run), starts[move.run]
+            noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)
 
@@ -130,31 +135,21 @@ def changes_noted(
 def event_noted(event: MachineEvent, week: Week) -> Change:
     """An event as the page states it."""
     at = event.at.replace(tzinfo=None)
-    return Change(ChangeKind.EVENT, None, at, f"{event.kind}: {event.description}", None, week.holds(at))
+    what = EventNoted(event.kind, event.description)
+    return Change(ChangeKind.EVENT, None, at, what, None, week.holds(at))
 
 
-def _step_in_words(step: EventStep) -> str:
-    """What a parameter stepped by at an event, and that one knows since when."""
-    size, u = in_words(step.size, step.u, sign=True)
-    event = f"the event '{step.event.description}'"
-    if step.decided:
-        return f"{step.parameter} stepped by {size} {step.unit} at {event} (u = {u} {step.unit})"
-    if step.by_days:
-        differs = f"{step.parameter} differs by {size} {step.unit} before and after {event}"
-        return f"{differs} (u = {u} {step.unit}): {Undecided.DAYS_MAY_DO}"
-    return (
-        f"{step.parameter} differs by {size} {step.unit} before and after {event} (u = {u} {step.unit} by the runs "
-        f"alone): {Undecided.ONE_DAY_EACH}"
+def _stepped(step: EventStep) -> SteppedAtEvent:
+    """What a parameter stepped by at an event, and why that may be no step."""
+    undecided = Undecided.DAYS_MAY_DO if step.by_days else Undecided.ONE_DAY_EACH
+    return SteppedAtEvent(
+        step.parameter,
+        step.event.description,
+        step.size,
+        step.u,
+        step.unit,
+        None if step.decided else undecided,
     )
-
-
-def _change_in_words(change: FoundChange, unit: str) -> str:
-    size, u = in_words(change.size, change.u, sign=True)
-    if change.kind == "step":
-        return f"{change.parameter} stepped by {size} {unit} (u = {u} {unit})"
-    if change.kind == "slope":
-        return f"{change.parameter} began to drift by {size} {unit} a day (u = {u} {unit} a day)"
-    return f"{change.parameter}: {change.kind} of {size} {unit} (u = {u} {unit})"
 
 
 def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:
@@ -177,7 +172,7 @@ def data_quality(
     explanation: MachineExplanation | None,
     stated: UncertaintyAnswer | None,
     refused_imports: tuple[RefusedImport, ...],
-    remarks: Sequence[str],
+    remarks: Sequence[Said],
 ) -> DataQuality:
     """What the data of the week's ``runs`` are worth; without a result, what depends on it is empty."""
     campaigns = sorted({run.campaign for run in runs})
@@ -188,8 +183,7 @@ def data_quality(
         ()
         if explanation is None
         else tuple(
-            f"run {point.run}, touch {point.sequence}, ball {point.target}: "
-            f"{point.axis} is off by {point.size_um:.1f} µm"
+            BadPoint(point.run, point.sequence, point.target, point.axis, point.size_um)
             for point in explanation.suspect_data
             if (explanation.comparison.campaign, point.run) in measured
         )

@@ -6,8 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 
+from monitor.documents import Said
 from monitor.methods import Unable, method_named
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
+from monitor.reporting.health.sentences import (
+    CheckKind,
+    LimitWithoutMap,
+    NextCheck,
+    NotMeasured,
+    RunNamed,
+    TolerancesOfType,
+)
 from monitor.store import (
     Database,
     MachineEvent,
@@ -35,11 +44,11 @@ from monitor.workflow.health.results import MeasuredWeek, Results, stored_result
 from monitor.workflow.health.runs import campaign_span, first_run, past_runs
 from monitor.workflow.health.task import Task, TaskResult
 from monitor.workflow.health.verdict import (
-    changed_in_words,
     conformity_of,
-    factor_in_words,
+    factor_of,
+    imports_refused,
+    new_this_week,
     next_check,
-    refusals_in_words,
     since_when,
     state_of,
     with_volumetric,
@@ -58,7 +67,7 @@ class MachineName:
     """A machine as the head of its page names it."""
 
     machine: str
-    description: str
+    description: Said
     location: str
 
 
@@ -77,7 +86,7 @@ class MachineWeek:
     first: RecordedRun | None
     events: Sequence[MachineEvent]
     refused: tuple[RefusedImport, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[Said, ...]
     measured: MeasuredWeek | None = None
     results: Results | None = None
     task: Task | None = None
@@ -119,8 +128,9 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     measured, week = past.measured, past.week
     if measured is None or past.results is None:
         return _not_measured(db, past)
-    last, remarks = measured.last, list(past.remarks)
-    results = stored_with(db, past.results, computed, measured, remarks)
+    last = measured.last
+    results, failures = stored_with(db, past.results, computed, measured)
+    remarks = [*past.remarks, *failures]
     stated, explanation = results.uncertainty, results.explanation
     model = measured.model
     history = machine_history(db, past.name.machine, model=model.name, version=model.version)
@@ -157,74 +167,66 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     state = state_of(judged, noted, explanation, quality, past.options.risk, evaluated=evaluated)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
-        changed=changed_in_words(noted, explanation, quality),
+        changed=new_this_week(noted, explanation, quality),
         since=since_when(state, parameters, noted, measured.span.first), probability_out=judged.any,
         next_check=next_check(state, drifts, limits, week),
-        run=_in_words(last),
-        basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
+        run=_named(last),
+        basis="" if stated is None else stated.input_covariance, factor=factor_of(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
         model=model_health(explanation, results.versions, measured.span, unchanged), quality=quality,
         map=stated_map(results.map, limit_um, beyond),
     )  # fmt: skip
 
 
-def _limits(db: Database, campaign: str, remarks: list[str]) -> dict[str, float]:
+def _limits(db: Database, campaign: str, remarks: list[Said]) -> dict[str, float]:
     """The tolerances by which a machine is judged; a remark where they are those of its type."""
     of_type = type_in_use(db, campaign)
     if of_type is not None:
-        remarks.append(
-            f"its tolerances are those of the machine type '{of_type.name}' in the configuration: campaign "
-            f"{campaign} states none"
-        )
+        remarks.append(TolerancesOfType(of_type.name, campaign))
     return campaign_tolerances(db, campaign)
 
 
-def _beyond(results: Results, limit_um: float, remarks: list[str]) -> float | None:
+def _beyond(results: Results, limit_um: float, remarks: list[Said]) -> float | None:
     """The probability that the volumetric error lies beyond its limit; a remark where there is no map."""
     if results.map is not None:
         return probability_beyond(results.map, limit_um)
-    remarks.append(
-        f"the volumetric error has a limit of {limit_um:g} µm, but no map: it is not judged against it"
-    )
+    remarks.append(LimitWithoutMap(limit_um))
     return None
 
 
-def _in_words(run: RecordedRun) -> str:
-    return f"run {run.run} of campaign {run.campaign}, {run.local_start:%Y-%m-%d %H:%M}"
+def _named(run: RecordedRun) -> RunNamed:
+    return RunNamed(run.run, run.campaign, run.local_start)
 
 
-def _left_in_alarm(db: Database, past: MachineWeek) -> str:
-    """What the last report said of the machine's last run, where that was an alarm: nothing has settled it since."""
+def _left_in_alarm(db: Database, past: MachineWeek) -> str | None:
+    """The state that the last report gave the machine's last run, where it was an alarm: nothing has settled it."""
     for stored in stored_analyses(db, "health", machine=past.name.machine, most=100):
-        if stored.document["run"] == _in_words(past.runs[-1]):
+        if stored.document["run"] == str(
+            _named(past.runs[-1])
+        ):  # a stored report has the run by this text alone
             state = str(stored.document["state"])
-            return f", when it was reported as: {state}" if state in ALARMS else ""
-    return ""
+            return state if state in ALARMS else None
+    return None
 
 
 def _not_measured(db: Database, past: MachineWeek) -> MachineHealth:
     """The page of a machine without a run in the week."""
+    refused = imports_refused(past.refused)
     if past.runs:
-        last = past.runs[-1]
-        check = "now: no run this week"
-        sentence = (
-            f"no run this week; its last run was on {last.local_start:%Y-%m-%d} ({last.campaign})"
-            f"{_left_in_alarm(db, past)}"
+        last, check = past.runs[-1], CheckKind.NO_RUN_THIS_WEEK
+        changed = NotMeasured(
+            last.campaign, last=last.local_start, state=_left_in_alarm(db, past), refused=refused
         )
     elif past.first is not None:
-        check = "its first run"
-        sentence = (
-            f"not yet measured in this week: its first run was on {past.first.local_start:%Y-%m-%d} "
-            f"({past.first.campaign})"
-        )
+        check = CheckKind.FIRST_RUN
+        changed = NotMeasured(past.first.campaign, first=past.first.local_start, refused=refused)
     else:
-        check = "now: no run yet"
-        sentence = "not yet measured: the database holds no run of it"
+        check, changed = CheckKind.NO_RUN_YET, NotMeasured(refused=refused)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, State.NOT_MEASURED,
-        changed="; ".join([sentence, *refusals_in_words(past.refused)]),
+        changed=changed,
         since=past.runs[-1].local_start if past.runs else None, probability_out=None,
-        next_check=check, run="", basis="", factor="", parameters=(),
+        next_check=NextCheck(check), run="", basis="", factor="", parameters=(),
         changes=tuple(event_noted(event, past.week) for event in reversed(past.events)),
         conditions=(), model=None,
         quality=DataQuality(0, 0, 0, (), (), (), past.remarks, past.refused), map=None,

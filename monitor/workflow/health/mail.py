@@ -18,6 +18,7 @@ from typing import Any
 
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
+from monitor.reporting.health.letter import not_attached, report_lines, report_subject
 from monitor.workflow.health.request import ReportAnswer
 
 #: Port that goes with each kind of security (RFC 8314 section 3.3; RFC 6409; RFC 5321 section 4.5.4.2).
@@ -144,18 +145,8 @@ def _faults_of_password(table: Table) -> list[str]:
 
 def message_of(settings: MailSettings, report: ReportAnswer) -> EmailMessage:
     """The e-mail of a report's document: the fleet table as text, the PDF files attached."""
-    alarms = report.alarms
-    quiet = "no alarm" if report.measured else "no machine was measured"
-    subject = f"Machine health {report.week}: " + (
-        f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else quiet
-    )
-    lines = [f"Week {report.week}, {report.from_} to {report.to}", ""]
-    for row in report.machines:
-        p = row.probability_out
-        out = "" if p is None else f", probability out of tolerance {p:.2g}"
-        lines += [f"{row.machine}: {row.state}{out}", f"  {row.changed}; next check {row.next_check}"]
-    if report.message:
-        lines += ["", report.message]
+    subject = report_subject(report.week, len(report.alarms), report.measured)
+    lines = report_lines(report.week, report.from_, report.to, report.machines, report.message)
     return composed(settings, subject, lines, report.files)
 
 
@@ -178,7 +169,7 @@ def composed(
             room -= size
             attached.append((file.name, file.read_bytes()))
         else:
-            lines.append(f"too large to be attached: {file}")
+            lines.append(not_attached(file))
     message.set_content("\n".join(lines) + "\n")
     for name, content in attached:
         message.add_attachment(content, maintype="application", subtype="pdf", filename=name)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import scipy
 
 from monitor.reporting.health.records import PoseError, VolumetricMap
+from monitor.reporting.health.sentences import Pose, Position, Region
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
 
@@ -32,14 +31,13 @@ def stated_map(
         return None
     return VolumetricMap(
         run=answer.run,
-        region=f"{answer.region.points} points of {answer.region.origin}",
-        worst_at=_position(answer.worst.at),
+        region=Region(answer.region.points, answer.region.origin),
+        worst_at=Position(tuple(answer.worst.at.items())),
         worst_um=answer.worst.error_um,
         expanded_um=answer.worst.expanded_um,
         rms_um=answer.rms.error_um,
         by_pose=tuple(
-            PoseError(_position(pose.at) or "no rotary axes", pose.worst_um, pose.rms_um)
-            for pose in answer.by_pose
+            PoseError(Pose(tuple(pose.at.items())), pose.worst_um, pose.rms_um) for pose in answer.by_pose
         ),
         slices=answer.slices,
         k=answer.k,
@@ -47,13 +45,3 @@ def stated_map(
         limit_um=limit_um,
         probability_out=probability_out,
     )
-
-
-def _position(at: Mapping[str, float]) -> str:
-    """A position for people: ``X -178.9 mm, B -90°``; axes that are not named stand where the map put them."""
-    parts = []
-    for key, value in at.items():
-        axis, _, unit = key.rpartition("_")
-        text = f"{axis.upper()} {value:.4g}{'°' if unit == 'deg' else ' ' + unit}"
-        parts.append(text.replace("-", "\N{MINUS SIGN}"))
-    return ", ".join(parts)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence, Set
 import numpy as np
 
 from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth, ReversalValue
+from monitor.reporting.health.sentences import ErrorOf, ErrorWith, RunsNamed
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.health.runs import Span
@@ -29,7 +30,7 @@ def model_health(
     comparison = explanation.comparison
     return ModelHealth(
         campaign=comparison.campaign,
-        runs=_runs_in_words(comparison.campaign, span),
+        runs=RunsNamed(comparison.campaign, span.count, span.later, span.first, span.last),
         model=comparison.model,
         verdict=comparison.verdict.value,
         answer=explanation.answer,
@@ -78,10 +79,8 @@ def _steps(
 ) -> Iterator[ErrorStep]:
     """The error from the method's own model on: what was added, and what adding the missing effects would give."""
     for version in versions:
-        changed = [f"+ {text}" for text in (version.added or "").split(" + ") if text]
-        changed += [f"\N{MINUS SIGN} {text}" for text in (version.removed or "").split(" + ") if text]
         yield ErrorStep(
-            f"{version.model}: {' '.join(changed) or 'as it is'}",
+            ErrorOf(version.model, _effects(version.added), _effects(version.removed)),
             version.rms,
             version.heldout_rms,
             proposed=False,
@@ -90,18 +89,15 @@ def _steps(
     if missing and not versions:
         first = missing[0]
         yield ErrorStep(
-            f"{explanation.comparison.model}: as it is",
+            ErrorOf(explanation.comparison.model),
             first.rms_before_um,
             first.heldout_before_um,
             proposed=False,
         )
     for effect in missing:
-        yield ErrorStep(f"+ {effect.effect}", effect.rms_after_um, effect.heldout_after_um, proposed=True)
+        yield ErrorStep(ErrorWith(effect.effect), effect.rms_after_um, effect.heldout_after_um, proposed=True)
 
 
-def _runs_in_words(campaign: str, span: Span) -> str:
-    first, last = f"{span.first:%Y-%m-%d}", f"{span.last:%Y-%m-%d}"
-    days = first if first == last else f"{first} to {last}"
-    if span.later:
-        return f"{span.count} of {span.count + span.later} runs of {campaign}, {days}; the others began after the week"
-    return f"{'the one run' if span.count == 1 else f'all {span.count} runs'} of {campaign}, {days}"
+def _effects(text: str | None) -> tuple[str, ...]:
+    """The effects of a text that joins them by plus signs."""
+    return tuple(effect for effect in (text or "").split(" + ") if effect)

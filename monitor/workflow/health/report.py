@@ -29,6 +29,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
+from monitor.reporting.health.sentences import MachineNamed, NothingMeasured
 from monitor.reporting.weekly_notice import weekly_sentence
 from monitor.store import (
     Database,
@@ -104,9 +105,9 @@ def _machines(db: Database) -> list[MachineName]:
     """Every machine that counts, by name."""
     machines = []
     for machine in machine_descriptions(db):
-        maker = " ".join(text for text in (machine.manufacturer, machine.model) if text)
-        serial = f"serial number {machine.serial_number}" if machine.serial_number else ""
-        description = ", ".join(part for part in (maker, serial, f"chain {machine.topology}") if part)
+        description = MachineNamed(
+            machine.manufacturer, machine.model, machine.serial_number, machine.topology
+        )
         machines.append(MachineName(machine.machine, description, machine.location))
     return machines
 
@@ -241,9 +242,7 @@ def _answer(fleet: Fleet, week: Week, files: list[str], looks: WeeklyNotices) ->
         ended=fleet.ended,
         alarms=tuple(row.machine for row in fleet.rows if row.state in ALARMS),
         refused_imports=fleet.refused_imports,
-        message=""
-        if measured
-        else f"No machine was measured in week {week.name} ({week.first} to {week.last}).",
+        message="" if measured else NothingMeasured(week.name, week.first, week.last),
         files=tuple(files),
         weekly_looks=looks,
     )

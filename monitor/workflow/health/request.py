@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from monitor.documents import OMITTED, named
+from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.workflow.history.weekly_looks import WeeklyNotices
@@ -61,7 +61,7 @@ class ReportAnswer:
     ended: bool
     alarms: tuple[str, ...]
     refused_imports: tuple[RefusedImport, ...]
-    message: str
+    message: Said
     files: tuple[str, ...]
     weekly_looks: WeeklyNotices
     mailed_to: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

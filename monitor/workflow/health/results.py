@@ -15,6 +15,7 @@ from typing import Any, TypedDict, TypeVar, Unpack
 from monitor.documents import from_document, to_document
 from monitor.exceptions import NotFoundError, StoreError
 from monitor.records import Campaign
+from monitor.reporting.health.sentences import Step, StepFailed
 from monitor.store import (
     Database,
     RecordedRun,
@@ -164,33 +165,34 @@ def task_of(
 
 
 def stored_with(
-    db: Database, stored: Results, computed: TaskResult, week: MeasuredWeek, remarks: list[str]
-) -> Results:
-    """Store what was computed; everything that there is now, and in ``remarks`` what could not be stored."""
+    db: Database, stored: Results, computed: TaskResult, week: MeasuredWeek
+) -> tuple[Results, list[StepFailed]]:
+    """Store what was computed; everything that there is now, and what could not be computed or stored."""
     model, before = week.model, week.span.before
-    remarks += computed.remarks
+    remarks = list(computed.remarks)
     for identification in computed.identified:
         attempted(
             lambda identification=identification: save_identification(db, identification),  # type: ignore[misc]
-            f"campaign {identification.campaign} could not be identified",
+            Step.IDENTIFICATION,
             remarks,
+            identification.campaign,
         )
     uncertainty = _saved(
         computed.uncertainty,
         lambda answer: save_uncertainty(db, answer, model, METHOD, before),
-        "the uncertainty of the last run could not be evaluated",
+        Step.UNCERTAINTY,
         remarks,
     )
     explanation = _saved(
         computed.explanation,
         lambda answer: save_explanation(db, answer, week.last.method, model, before),
-        "model and measurement could not be compared",
+        Step.COMPARISON,
         remarks,
     )
     mapped = _saved(
         computed.map,
         lambda answer: save_map(db, answer, model, before),
-        "the volumetric error could not be mapped",
+        Step.MAP,
         remarks,
     )
     if computed.versions is not None:
@@ -204,11 +206,11 @@ def stored_with(
         stored.map or mapped,
         stored.versions or computed.versions,
     )
-    return every if every.uncertainty is not None else replace(every, map=None)
+    return every if every.uncertainty is not None else replace(every, map=None), remarks
 
 
 def _saved(
-    answer: Answer | None, save: Callable[[Answer], None], failure: str, remarks: list[str]
+    answer: Answer | None, save: Callable[[Answer], None], part: Step, remarks: list[StepFailed]
 ) -> Answer | None:
     """A computed answer once it is stored; None, with a remark, where it could not be."""
     if answer is None:
@@ -218,7 +220,7 @@ def _saved(
         save(answer)
         return answer
 
-    return attempted(saved, failure, remarks)
+    return attempted(saved, part, remarks)
 
 
 def _bare(campaign: Campaign) -> Campaign:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from monitor.reporting.run_notes import LeftOutNoted
 from monitor.store import RecordedRun
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.runs import possible_campaigns
@@ -27,7 +28,7 @@ class Span:
 
 def past_runs(
     runs: Sequence[RecordedRun], week: Week, campaigns: tuple[str, ...]
-) -> tuple[list[RecordedRun], list[str]]:
+) -> tuple[list[RecordedRun], list[LeftOutNoted]]:
     """The runs up to the end of the week, in the order of time, and remarks on campaigns that were left out."""
     possible, remarks = possible_campaigns(runs, campaigns)
     return [run for run in runs if run.campaign in possible and run.local_start < week.ends], remarks

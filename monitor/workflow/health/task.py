@@ -18,6 +18,7 @@ from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
+from monitor.reporting.health.sentences import Step, StepFailed
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of, first_fit
 from monitor.workflow.explain.explain_answer import MachineExplanation
@@ -69,15 +70,17 @@ class TaskResult:
     explanation: MachineExplanation | None = None
     map: VolumetricAnswer | None = None
     versions: HistoryAnswer | None = None
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[StepFailed, ...] = ()
 
 
-def attempted(step: Callable[[], Result], failure: str, remarks: list[str]) -> Result | None:
+def attempted(
+    step: Callable[[], Result], part: Step, remarks: list[StepFailed], campaign: str = ""
+) -> Result | None:
     """The result of a step, or a remark that says why there is none: one machine does not stop the fleet's report."""
     try:
         return step()
     except MonitorError as error:
-        remarks.append(f"{failure}: {error}")
+        remarks.append(StepFailed(part, str(error), campaign))
         return None
 
 
@@ -124,40 +127,39 @@ class _Fitted:
 
 
 def _computed(task: Task, fitted: _Fitted) -> TaskResult:
-    remarks: list[str] = []
+    remarks: list[StepFailed] = []
     runs = []
     for campaign in task.identify:
         same = task.whole and campaign.name == task.past.name
         solve = (lambda problem: fitted.fit.solution) if same else solve_problem
         identification = attempted(
             lambda campaign=campaign, solve=solve: identified(campaign, task.model, solve)[1],  # type: ignore[misc]
-            f"campaign {campaign.name} could not be identified",
+            Step.IDENTIFICATION,
             remarks,
+            campaign.name,
         )
         if identification is not None:
             runs.append(identification)
     uncertainty = explanation = mapped = versions = None
     if task.uncertainty:
-        uncertainty = attempted(
-            lambda: fitted.uncertainty, "the uncertainty of the last run could not be evaluated", remarks
-        )
+        uncertainty = attempted(lambda: fitted.uncertainty, Step.UNCERTAINTY, remarks)
     if task.explanation:
         explanation = attempted(
             lambda: machine_explanation(explanation_of(task.past, task.model, fitted.robust)),
-            "model and measurement could not be compared",
+            Step.COMPARISON,
             remarks,
         )
     # Without an uncertainty there is no map, and its remark says why.
     if task.map and (uncertainty is not None or not task.uncertainty):
         mapped = attempted(
             lambda: map_answer(map_of(fitted.evaluated, fitted.fit)),
-            "the volumetric error could not be mapped",
+            Step.MAP,
             remarks,
         )
     if task.versions:
         versions = attempted(
             lambda: HistoryAnswer(error_steps(task.past, task.versions)),
-            "the versions of the model could not be compared",
+            Step.VERSIONS,
             remarks,
         )
     return TaskResult(tuple(runs), uncertainty, explanation, mapped, versions, tuple(remarks))

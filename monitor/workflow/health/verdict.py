@@ -9,6 +9,7 @@ from datetime import datetime
 
 import numpy as np
 
+from monitor.documents import Said
 from monitor.records import Verdict
 from monitor.reporting.health.records import (
     ALARMS,
@@ -19,6 +20,15 @@ from monitor.reporting.health.records import (
     RefusedImport,
     State,
 )
+from monitor.reporting.health.sentences import (
+    CheckKind,
+    Factor,
+    ImportsRefused,
+    ModelLacks,
+    NewThisWeek,
+    NextCheck,
+    NoFactor,
+)
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.weeks import Week
@@ -26,6 +36,9 @@ from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+
+#: So many sentences of a week are named one by one.
+MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -67,32 +80,27 @@ def with_volumetric(judged: Conformity, probability_out: float | None) -> Confor
     return Conformity(single, min(1.0, (judged.any or 0.0) + probability_out), judged.every_has_one)
 
 
-def changed_in_words(
+def new_this_week(
     noted: Sequence[Change], explanation: MachineExplanation | None, quality: DataQuality
-) -> str:
+) -> NewThisWeek:
     """What is new this week: changes, then steps at events, then events, what the model lacks, and data that never
     came in."""
-    sentences = [
+    every: list[Said] = [
         change.what
         for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)
         for change in noted
         if change.this_week and change.kind is kind
     ]
-    sentences += refusals_in_words(quality.refused_imports)
-    sentences = sentences[:3] + ([f"and {len(sentences) - 3} more"] if len(sentences) > 3 else [])
-    if explanation is not None:
-        sentences += [f"the model lacks {effect.effect}" for effect in explanation.missing[:1]]
-    return "; ".join(sentences) or "nothing this week"
+    every += imports_refused(quality.refused_imports)
+    missing = () if explanation is None else explanation.missing[:1]
+    lacking = tuple(ModelLacks(effect.effect) for effect in missing)
+    return NewThisWeek(tuple(every[:MOST_NAMED]), max(0, len(every) - MOST_NAMED), lacking)
 
 
-def refusals_in_words(refused: Sequence[RefusedImport]) -> list[str]:
+def imports_refused(refused: Sequence[RefusedImport]) -> tuple[ImportsRefused, ...]:
     """One sentence for the imports that were refused and did not come in since."""
     open_refusals = [refusal for refusal in refused if refusal.imported_at is None]
-    if not open_refusals:
-        return []
-    if len(open_refusals) == 1:
-        return [f"an import was refused on {open_refusals[0].at:%Y-%m-%d}"]
-    return [f"{len(open_refusals)} imports were refused, the last on {open_refusals[-1].at:%Y-%m-%d}"]
+    return (ImportsRefused(len(open_refusals), open_refusals[-1].at),) if open_refusals else ()
 
 
 def since_when(
@@ -142,7 +150,7 @@ def next_check(
     drifts: Mapping[str, DriftForecast | None],
     limits: Mapping[str, float],
     week: Week,
-) -> str:
+) -> NextCheck:
     """When to measure again, and why: the machine is likely to be in tolerance until then."""
     good_until = {
         name: drift.origin + drift.good_for
@@ -150,13 +158,13 @@ def next_check(
         if drift is not None and drift.good_for is not None
     }
     if state is State.NOT_EVALUATED:
-        return "now: the last run could not be evaluated"
+        return NextCheck(CheckKind.NOT_EVALUATED)
     if state in ALARMS:
-        return "now"
+        return NextCheck(CheckKind.ALARM)
     if not limits:
-        return "no forecast: the campaign states no tolerances"
+        return NextCheck(CheckKind.NO_TOLERANCE)
     if not good_until:
-        return "no forecast: fewer than three days since the last change"
+        return NextCheck(CheckKind.NO_FORECAST)
     name = min(good_until, key=good_until.__getitem__)
     first = drifts[name]
     assert first is not None
@@ -164,20 +172,18 @@ def next_check(
     assert until is not None
     day, whole = until.date(), first.good_for == first.span
     if whole and day <= week.last:
-        return f"next week: {first.span:.0f} days of history allow no longer forecast"
+        return NextCheck(CheckKind.SHORT_HISTORY, name, day, first.span)
     if day <= week.last:
-        return f"now: {name} stayed in tolerance with 95 % until {day} only"
-    if whole:
-        return f"by {day}: in tolerance as far ahead as the history is long"
-    return f"by {day}: {name} stays in tolerance with 95 % until then"
+        return NextCheck(CheckKind.PASSED, name, day, first.span)
+    return NextCheck(
+        CheckKind.AS_FAR_AS_HISTORY if whole else CheckKind.IN_TOLERANCE_UNTIL, name, day, first.span
+    )
 
 
-def factor_in_words(stated: UncertaintyAnswer | None) -> str:
+def factor_of(stated: UncertaintyAnswer | None) -> Factor | NoFactor:
     """What the expanded uncertainties of the page hold for."""
     if stated is None:
-        return "no uncertainty"
-    k_q, dof = stated.guf.k_q_with_degrees_of_freedom, stated.guf.degrees_of_freedom
+        return NoFactor()
+    k_q = stated.guf.k_q_with_degrees_of_freedom
     k_q = math.inf if k_q is None else k_q
-    freedom = "" if dof is None else f", {dof:.0f} degrees of freedom"
-    count, percent = len(stated.parameters), stated.p * 100
-    return f"U = {k_q:.2f} u: all {count} intervals hold at once with {percent:g} %{freedom}"
+    return Factor(k_q, len(stated.parameters), stated.p, stated.guf.degrees_of_freedom)

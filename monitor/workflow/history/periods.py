@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError
+from monitor.statistics import control_false_discoveries
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
 from monitor.store import Database, MachineHistory, followed_by, machine_history
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series
+
+#: False discovery rate over the parameters of a comparison.
+RATE = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,9 @@ class ParameterOfPeriods:
     """A parameter in both periods, None where one has no run: means over the days, their difference (later less
     earlier) with its standard uncertainty by the scatter of the days and its coverage factor ``k`` for 95 %.
 
-    ``differs`` is whether the difference exceeds its uncertainty; None where the days do not say how days differ, or
-    days that follow each other may explain it.
+    ``q_value`` is the false discovery rate at which the parameter is among those that differ, over all parameters of
+    the comparison (Benjamini and Hochberg); ``p_value`` is its own. ``differs`` is whether that rate is at most 5 %;
+    None where the days do not say how days differ, or where days that are not independent may explain it by themselves.
     """
 
     unit: str
@@ -68,6 +73,8 @@ class ParameterOfPeriods:
     difference: float | None
     u: float | None
     k: float | None
+    p_value: float | None
+    q_value: float | None
     differs: bool | None
     tolerance: float | None
 
@@ -108,16 +115,17 @@ def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
                 f"{period.until:%Y-%m-%d}"
             )
     days = [len({at.date() for at in history.part(mask).started_at}) for mask in masks]
+    compared = {
+        name: _compared(series, history.campaign[of], request, history.tolerances.get(name))
+        for name, (series, of) in parameter_series(history).items()
+    }
     return PeriodsAnswer(
         machine=request.machine,
         earlier=request.earlier,
         later=request.later,
         runs=(int(masks[0].sum()), int(masks[1].sum())),
         days=(days[0], days[1]),
-        parameters={
-            name: _compared(series, history.campaign[of], request, history.tolerances.get(name))
-            for name, (series, of) in parameter_series(history).items()
-        },
+        parameters=_with_discovery_rates(compared),
         conditions={
             name: ConditionOfPeriods(*(_mean(values[mask]) for mask in masks))
             for name, values in history.conditions.items()
@@ -136,8 +144,8 @@ def _mean(values: npt.NDArray[np.float64]) -> float | None:
 
 def _compared(
     whole: Series, campaigns: npt.NDArray[np.str_], request: PeriodsRequest, tolerance: float | None
-) -> ParameterOfPeriods:
-    """One parameter; its other days help to say how days differ."""
+) -> tuple[ParameterOfPeriods, BeforeAfter | None]:
+    """One parameter, not yet judged among the others; its other days help to say how days differ."""
     steady = whole.steady
     steady_campaigns = campaigns[~whole.warm_up] if len(steady.values) < len(whole.values) else campaigns
     ends = [
@@ -160,16 +168,19 @@ def _compared(
             )  # fmt: skip
         except DataError:
             judged = None
-    return ParameterOfPeriods(
+    parameter = ParameterOfPeriods(
         unit=whole.unit,
         earlier=means[0],
         later=means[1],
         difference=None if means[0] is None or means[1] is None else means[1] - means[0],
         u=None if judged is None else judged.u,
         k=None if judged is None else judged.k,
-        differs=_differs(judged),
+        p_value=None,
+        q_value=None,
+        differs=None,
         tolerance=tolerance,
     )
+    return parameter, judged
 
 
 def _mean_of_days(series: Series) -> float | None:
@@ -179,5 +190,27 @@ def _mean_of_days(series: Series) -> float | None:
     return float((np.bincount(index, series.values) / np.bincount(index)).mean())
 
 
-def _differs(judged: BeforeAfter | None) -> bool | None:
-    return None if judged is None or judged.agree is None else not judged.agree
+def _with_discovery_rates(
+    compared: Mapping[str, tuple[ParameterOfPeriods, BeforeAfter | None]],
+) -> dict[str, ParameterOfPeriods]:
+    """The parameters judged together, since thirteen of them at 5 % each would often name one that did not change; what
+    is named also has to exceed, by itself, what its days do not exclude."""
+    decided = {
+        name: judged for name, (_, judged) in compared.items() if judged is not None and judged.decided
+    }
+    p_values = {name: judged.p_value() for name, judged in decided.items()}
+    rates = control_false_discoveries(list(p_values.values()), rate=RATE).q_value.tolist()
+    q_values = dict(zip(p_values, rates, strict=True))
+    return {
+        name: replace(parameter, p_value=p_values[name], q_value=q_values[name],
+                      differs=_differs(q_values[name], decided[name].p_value_of_rivals()))
+        if name in decided else parameter
+        for name, (parameter, _) in compared.items()
+    }  # fmt: skip
+
+
+def _differs(q_value: float, p_value_of_rivals: float) -> bool | None:
+    """Whether a parameter differs; None where it does only if its days are independent and of one scatter."""
+    if q_value > RATE:
+        return False
+    return True if p_value_of_rivals <= RATE else None

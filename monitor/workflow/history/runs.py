@@ -8,6 +8,7 @@ from datetime import datetime
 import numpy as np
 
 from monitor.exceptions import NotFoundError, did_you_mean
+from monitor.reporting.run_notes import LeftOutNoted, SameHoursNoted
 from monitor.store import MachineHistory, RecordedRun
 
 
@@ -30,7 +31,7 @@ def only_runs(history: MachineHistory, runs: Sequence[RecordedRun]) -> MachineHi
     return history.part(np.array([pair in selected for pair in pairs], dtype=np.bool_))
 
 
-def same_hours(history: MachineHistory) -> list[str]:
+def same_hours(history: MachineHistory) -> list[SameHoursNoted]:
     """A sentence for every group of campaigns that hold runs of the same hours, which one machine cannot have made.
 
     The runs of a campaign's day stretch from its first start to its last; two campaigns that take turns within a
@@ -53,14 +54,12 @@ def same_hours(history: MachineHistory) -> list[str]:
         if ends > latest:
             latest, holder = ends, name
     groups = {tuple(sorted(names)) for names in group.values() if len(names) > 1}
-    return [
-        f"campaigns {', '.join(names[:-1])} and {names[-1]} hold runs of the same hours, which one machine cannot "
-        f"have made; the numbers here mix them: name the one that counts with --campaign"
-        for names in sorted(groups)
-    ]
+    return [SameHoursNoted(names) for names in sorted(groups)]
 
 
-def possible_campaigns(runs: Sequence[RecordedRun], campaigns: tuple[str, ...]) -> tuple[set[str], list[str]]:
+def possible_campaigns(
+    runs: Sequence[RecordedRun], campaigns: tuple[str, ...]
+) -> tuple[set[str], list[LeftOutNoted]]:
     """The campaigns that one machine can have made, and a remark on each that was left out.
 
     Where runs of a campaign lie within the span of another, only the one imported first counts, unless ``campaigns``
@@ -86,7 +85,5 @@ def possible_campaigns(runs: Sequence[RecordedRun], campaigns: tuple[str, ...]) 
         if overlapped is None:
             selected.append(name)
         else:
-            remarks.append(
-                f"campaign {name} was left out: its runs lie within the time of {overlapped}, which was imported first"
-            )
+            remarks.append(LeftOutNoted(name, overlapped))
     return set(selected), remarks

@@ -86,7 +86,11 @@ def day_numbers(history: MachineHistory) -> npt.NDArray[np.int64]:
 
 
 def _temperature(history: MachineHistory) -> tuple[str | None, Array | None]:
-    """The recorded temperature that most runs have, the first in the order of names; None without one."""
+    """The recorded temperature that most runs have; None without one.
+
+    Of several those recorded for the runs before channels of the touches, then the first in the order of names: what
+    the queries of the fleet table ask, too.
+    """
     recorded = {
         name: int(np.isfinite(values).sum())
         for name, values in history.conditions.items()
@@ -94,7 +98,7 @@ def _temperature(history: MachineHistory) -> tuple[str | None, Array | None]:
     }
     if not recorded:
         return None, None
-    name = min(recorded, key=lambda channel: (-recorded[channel], channel))
+    name = min(recorded, key=lambda channel: (-recorded[channel], channel in history.channels, channel))
     return name, history.conditions[name]
 
 

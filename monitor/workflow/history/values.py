@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -104,4 +105,4 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
 
 
 def _numbers(values: list[float]) -> tuple[float | None, ...]:
-    return tuple(value if np.isfinite(value) else None for value in values)
+    return tuple(value if math.isfinite(value) else None for value in values)

@@ -14,6 +14,7 @@ import numpy as np
 from monitor.exceptions import CampaignError, Fault, MonitorError
 from monitor.methods import campaign_method
 from monitor.records import Campaign
+from monitor.reporting.run_notes import CopiedRunsNoted, joined_by_and
 from monitor.store import Database, run_fingerprints
 from monitor.units import MICROMETRE
 from monitor.workflow.campaign_parts import only_run
@@ -36,11 +37,7 @@ def check_copies(db: Database, campaign: Campaign) -> tuple[str, ...]:
         return ()
     rms = _rms(db, campaign, copies[0][0])
     if rms < EXACT_RMS:
-        named = "; ".join(_and(runs) for runs in copies)
-        return (
-            f"runs {named} are equal in every reading, and their residuals ({rms * 1e6:.2g} nm) are no measurement's: "
-            "simulated without noise they count as runs, but their scatter means nothing",
-        )
+        return (str(CopiedRunsNoted(tuple(map(tuple, copies)), rms)),)
     raise CampaignError(
         campaign.name,
         [
@@ -48,9 +45,9 @@ def check_copies(db: Database, campaign: Campaign) -> tuple[str, ...]:
                 "probings.csv",
                 None,
                 "run",
-                f"runs {_and(runs)} are equal in every reading of their {np.sum(campaign.probings.run == runs[0])} "
-                "probings, which two measurements never are: give each run its own readings, or remove the copies "
-                "here and from runs.csv",
+                f"runs {joined_by_and(runs)} are equal in every reading of their "
+                f"{np.sum(campaign.probings.run == runs[0])} probings, which two measurements never are: give each run "
+                "its own readings, or remove the copies here and from runs.csv",
             )
             for runs in copies
         ],
@@ -69,7 +66,3 @@ def _rms(db: Database, campaign: Campaign, run: int) -> float:
         return float(campaign_method(campaign).identify(single_run, model).runs[0].rms)
     except MonitorError:
         return float("inf")
-
-
-def _and(runs: list[int]) -> str:
-    return f"{', '.join(str(run) for run in runs[:-1])} and {runs[-1]}"

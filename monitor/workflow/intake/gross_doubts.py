@@ -18,7 +18,7 @@ def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
     # Loaded here: the methods take longer to load than a folder of curves to read.
     from monitor.methods import campaign_method
     from monitor.methods.chain.gross import gross_readings
-    from monitor.workflow.identify.notes import gross_sentence
+    from monitor.workflow.identify.notes import gross_noted
 
     try:
         method = campaign_method(campaign)
@@ -33,7 +33,7 @@ def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
         return ()
     in_other_units = {odd.run for odd in runs_in_units(campaign)}
     return tuple(
-        gross_sentence(reading, method.nouns.target)
+        str(gross_noted(reading, method.nouns.target))
         for reading in readings
         if reading.run not in in_other_units
     )

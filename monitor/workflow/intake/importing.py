@@ -8,8 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import CampaignError, InputError, StoreError
-from monitor.readers import doubts, names_in, read_campaign
-from monitor.records import CurveCampaign
+from monitor.readers import (
+    MAPPING,
+    UnderstoodFile,
+    doubts,
+    files_in,
+    is_export_folder,
+    names_in,
+    read_campaign,
+    read_exports,
+    understood_tables,
+)
+from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
     Database,
     Imported,
@@ -26,16 +36,30 @@ from monitor.workflow.intake.gross_doubts import gross_doubts
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """The folders to be imported, in this order."""
+    """The folders to be imported, in this order.
+
+    With a ``mapping`` the ``folders`` are files of instruments (or folders of them) that make one campaign, which may
+    be called ``campaign`` instead of what the mapping calls it. A ``dry_run`` says what was understood and stores
+    nothing.
+    """
 
     folders: Sequence[Path]
+    mapping: Path | None = None
+    campaign: str | None = None
+    dry_run: bool = False
+
+    def __post_init__(self) -> None:
+        if self.campaign is not None and self.mapping is None:
+            raise InputError("campaign names what files of instruments make together; give their mapping too")
 
 
 @dataclass(frozen=True)
 class ImportedFolder:
-    """What the import of a folder did: "imported", or "unchanged" where its content was in the database already.
+    """What the import of a folder did: "imported", "unchanged" where its content was in the database already, or
+    "not stored" in a dry run.
 
-    ``rows`` is the number of rows of a curve, None for the campaign of a machine; ``notes`` say what may be a mistake.
+    ``rows`` is the number of rows of a curve, None for the campaign of a machine; ``notes`` say what may be a mistake;
+    ``understood`` says of each file of an instrument (of a dry run of each table) what its columns were taken for.
     """
 
     campaign: str
@@ -46,6 +70,7 @@ class ImportedFolder:
     rows: int | None
     notes: tuple[str, ...]
     message: str
+    understood: tuple[UnderstoodFile, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,64 +89,127 @@ class ImportAnswer:
     refused: tuple[RefusedFolder, ...] = ()
 
 
+@dataclass(frozen=True)
+class _Source:
+    """What is imported at once: a folder, or the files of instruments that a mapping explains."""
+
+    path: Path
+    mapping: Path | None = None
+    files: tuple[Path, ...] = ()
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A campaign as it was read, what was noticed, and what was understood of the files of instruments."""
+
+    campaign: Campaign | CurveCampaign
+    notes: tuple[str, ...]
+    understood: tuple[UnderstoodFile, ...]
+
+
 def import_folders(
     db: Database, request: ImportRequest, *, progress: Callable[[str], None] = lambda name: None
 ) -> ImportAnswer:
     """Import every folder, all or nothing each; one that is refused does not hinder the others.
 
-    Every refusal is recorded. Raises CampaignError with all faults of a folder that was asked for alone, StoreError
-    where the database cannot be written.
+    Every refusal is recorded, but of a dry run. Raises CampaignError with all faults of a folder that was asked for
+    alone, StoreError where the database cannot be written.
     """
     answers: list[ImportedFolder] = []
     refused: list[RefusedFolder] = []
-    for folder in request.folders:
-        progress(str(folder))
+    sources = _sources(request)
+    for source in sources:
+        progress(str(source.path))
         try:
-            imported = _import(db, Path(folder))
+            answers.append(_look(db, source) if request.dry_run else _import(db, source))
         except StoreError as error:
             if not answers:
                 raise
             before = ", ".join(answer.campaign for answer in answers)
             raise StoreError(f"{error}\nIn the database before it was met: {before}") from error
         except InputError as error:
-            if len(request.folders) == 1:
+            if len(sources) == 1:
                 raise
-            refused.append(RefusedFolder(str(folder), str(error)))
-        else:
-            answers.append(_answer(db, folder, imported))
+            refused.append(RefusedFolder(str(source.path), str(error)))
     return ImportAnswer(tuple(answers), tuple(refused))
 
 
-def _import(db: Database, folder: Path) -> Imported:
+def _sources(request: ImportRequest) -> list[_Source]:
+    if request.mapping is None:
+        return [_Source(Path(folder)) for folder in request.folders]
+    files: list[Path] = []
+    for folder in map(Path, request.folders):
+        files += files_in(folder) if folder.is_dir() else [folder]
+    return [_Source(request.mapping, request.mapping, tuple(files), request.campaign)]
+
+
+def _read(db: Database, source: _Source) -> _Reading:
+    """Read a folder and look for what may be a mistake. Raises CampaignError with all its faults."""
+    understood: tuple[UnderstoodFile, ...] = ()
+    notes: tuple[str, ...] = ()
+    campaign: Campaign | CurveCampaign
+    if source.mapping is not None or is_export_folder(source.path):
+        mapping = source.mapping or source.path / MAPPING
+        exports = read_exports(mapping, source.files or files_in(source.path), source.name)
+        campaign, understood, notes = exports.campaign, exports.files, exports.notes
+    else:
+        campaign = read_campaign(source.path)
+    if isinstance(campaign, CurveCampaign):
+        check_base(campaign)
+        return _Reading(campaign, (), ())
+    if campaign.sources:
+        # Loaded here: hardly any campaign states sources, and the solver takes a third of a second.
+        from monitor.workflow.intake.checked_sources import check_sources
+
+        check_sources(campaign)
+    notes = (*notes, *check_copies(db, campaign), *doubts(campaign), *gross_doubts(campaign))
+    return _Reading(campaign, notes, understood)
+
+
+def _look(db: Database, source: _Source) -> ImportedFolder:
+    """Say what was understood of a folder, and store nothing."""
+    reading = _read(db, source)
+    campaign = reading.campaign
+    if isinstance(campaign, CurveCampaign):
+        rows = len(campaign.lines)
+        message = f"{campaign.name}: understood, {rows} rows; nothing was stored"
+        return ImportedFolder(campaign.name, str(source.path), "not stored", 0, 0, rows, (), message)
+    runs, probings = len(campaign.runs), len(campaign.probings)
+    counted = f"{runs} run{'' if runs == 1 else 's'}, {probings} probings"
+    return ImportedFolder(
+        campaign.name, str(source.path), "not stored", runs, probings, None, reading.notes,
+        f"{campaign.name}: understood, {counted}; nothing was stored",
+        reading.understood or understood_tables(campaign),
+    )  # fmt: skip
+
+
+def _import(db: Database, source: _Source) -> ImportedFolder:
     """Import one folder, which settles earlier refusals of it or of its campaign, or record that it was refused."""
-    path = _resolved(folder)
+    path = _resolved(source.path)
     try:
-        campaign = read_campaign(folder)
+        reading = _read(db, source)
+        campaign = reading.campaign
         if isinstance(campaign, CurveCampaign):
-            check_base(campaign)
             imported = import_curve(db, campaign)
         else:
-            if campaign.sources:
-                # Loaded here: hardly any campaign states sources, and the solver takes a third of a second.
-                from monitor.workflow.intake.checked_sources import check_sources
-
-                check_sources(campaign)
-            notes = (*check_copies(db, campaign), *doubts(campaign), *gross_doubts(campaign))
-            imported = import_campaign(db, campaign, notes)
+            imported = import_campaign(db, campaign, reading.notes)
     except StoreError:
         # Nothing is wrong with the folder; and where the database cannot be written nothing can be recorded.
         raise
     except InputError as error:
         faults = [str(fault) for fault in error.faults] if isinstance(error, CampaignError) else [str(error)]
-        name, machine = names_in(folder)
+        name, machine = names_in(source.path)
         with suppress(StoreError):  # the faults of the folder are what the user has to hear
-            record_refusal(db, path, faults, campaign=name, machine=machine)
+            record_refusal(db, path, faults, campaign=source.name or name, machine=machine)
         raise
     clear_refusals(db, path, imported.campaign)
-    return imported
+    return _answer(db, source.path, imported, reading.understood)
 
 
-def _answer(db: Database, folder: Path, imported: Imported) -> ImportedFolder:
+def _answer(
+    db: Database, folder: Path, imported: Imported, understood: tuple[UnderstoodFile, ...]
+) -> ImportedFolder:
     # Of a campaign that was imported before, its notes are not repeated.
     notes = campaign_notes(db, imported.campaign) if imported.state == "imported" else ()
     return ImportedFolder(
@@ -133,6 +221,7 @@ def _answer(db: Database, folder: Path, imported: Imported) -> ImportedFolder:
         rows=imported.rows,
         notes=notes,
         message=str(imported),
+        understood=understood,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 
 from monitor.documents import IN_UTC
+from monitor.reporting import messages
 from monitor.store import Database, withdraw_campaign
 
 
@@ -38,5 +39,5 @@ def withdraw(db: Database, request: WithdrawRequest) -> WithdrawAnswer:
         withdrawal.reason,
         withdrawal.withdrawn_at,
         withdrawal.certificates,
-        f"{withdrawal.campaign}: withdrawn, it no longer counts; its name is free for the corrected folder",
+        messages.campaign_withdrawn(withdrawal.campaign),
     )

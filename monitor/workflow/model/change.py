@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from monitor.exceptions import DataError, EffectError, InputError, NotFoundError
 from monitor.methods import methods
+from monitor.reporting import messages
 from monitor.store import (
     Database,
     StoredModel,
@@ -125,8 +126,5 @@ def _changed(
     name, version = model.name, model.version
     note = None
     if version > 1 and new_name in (None, name):
-        note = (
-            f"'{name}' without a version means {label(model)} from now on, for everybody and every campaign; "
-            f"{name}@{version - 1} is what it was (--as NAME leaves {name} alone)"
-        )
+        note = messages.name_means_another(name, label(model), version - 1)
     return ChangeModelAnswer(shown(db, model), steps, note)

@@ -1,4 +1,4 @@
-"""The answers of `plan`: of balls at indexations, and of angles of a table."""
+"""The answers of `plan`: of balls at indexations, of angles of a table, and of tests of instruments."""
 
 from __future__ import annotations
 
@@ -157,4 +157,53 @@ class AnglePlanAnswer:
     proposed: AnglesOfTable
 
 
-PlanAnswer = BallPlanAnswer | AnglePlanAnswer
+@dataclass(frozen=True)
+class TestAnswer:
+    """A test of an instrument: so many ``poses`` with each axis between two readings (``x_mm``, ``c_deg``), a bar or a
+    sphere at ``work_point_mm`` on the work side. ``available``: the campaign has the instrument, else it is a usual
+    one. ``u`` are standard uncertainties of all parameters with it, in their units; None where there is no number."""
+
+    instrument: str
+    setup: str
+    reading: str
+    available: bool
+    poses: int
+    axes: Mapping[str, tuple[float, float]]
+    u: Mapping[str, float | None]
+    work_point_mm: tuple[float, float, float] | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class UnseenParameter:
+    """A parameter that the readings give no number, and the test that would give it the smallest ``u``."""
+
+    parameter: str
+    unit: str
+    u: float
+    test: TestAnswer
+
+
+@dataclass(frozen=True)
+class InstrumentPlanAnswer:
+    """Which instrument next, and where: for the ``asked`` parameters of a run the best test of each setup, best first.
+
+    ``present`` are standard uncertainties as measured, by parameter; ``proposed`` tests in turn, each with what all up
+    to it leave; ``unseen`` what has no number yet, with the test that would see it. ``standing`` are linear axes that
+    stood still and have no stroke in the machine file, so that no test moves them.
+    """
+
+    campaign: str
+    machine: str
+    method: str
+    model: str
+    run: int
+    asked: tuple[str, ...]
+    units: Mapping[str, str]
+    present: Mapping[str, float | None]
+    tests: tuple[TestAnswer, ...]
+    proposed: tuple[TestAnswer, ...]
+    unseen: tuple[UnseenParameter, ...]
+    standing: tuple[str, ...]
+
+
+PlanAnswer = BallPlanAnswer | AnglePlanAnswer | InstrumentPlanAnswer

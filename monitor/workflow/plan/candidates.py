@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import fit
-from monitor.machine import Chain
 from monitor.methods import campaign_method
 from monitor.methods.chain.touch import TouchProblem
 from monitor.methods.planning.candidates import Candidates, Choice, TimeModel, more_balls, pose_grid
@@ -16,12 +15,11 @@ from monitor.methods.planning.touches import candidate_touches, planned_context
 from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model
+from monitor.workflow.plan.strokes import strokes_of
 
 # Where the times of a campaign do not tell: five touches of a ball take about a minute on a machining centre (the
 # five-day campaign: 62 centres in 65 min), another indexation of two axes half of that.
 ASSUMED_PROBING_S, ASSUMED_INDEXATION_S = 60.0, 30.0
-# Linear axes without a stroke in the machine file may go this much further than they went.
-STRETCH = 1.25
 
 
 @dataclass(frozen=True)
@@ -34,25 +32,6 @@ class PlannedCampaign:
     candidates: Candidates
     present: Choice
     places: Array
-
-
-def strokes_of(
-    campaign: Campaign, chain: Chain, positions: Array
-) -> tuple[dict[str, tuple[float, float]], ...]:
-    """Positions that axes may take: of the rotary axes with a stroke in the file, and of all linear ones."""
-    rotary: dict[str, tuple[float, float]] = {}
-    linear: dict[str, tuple[float, float]] = {}
-    for index, joint in enumerate(chain.joints):
-        settings = campaign.machine.axes.get(joint.name)
-        stroke = None if settings is None else settings.stroke
-        if stroke is not None:
-            ends = sorted((joint.sign * stroke[0], joint.sign * stroke[1]))
-            (rotary if joint.turns else linear)[joint.name] = (ends[0], ends[1])
-        elif not joint.turns:
-            low, high = float(positions[:, index].min()), float(positions[:, index].max())
-            middle, half = (low + high) / 2.0, (high - low) / 2.0 * STRETCH
-            linear[joint.name] = (middle - half, middle + half)
-    return rotary, linear
 
 
 def _time_model(problem: TouchProblem, pose: Array) -> TimeModel:

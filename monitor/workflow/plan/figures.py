@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.volumetric import expected_uncertainties
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.plan.answer import BallPlan, BallPlanAnswer
@@ -20,19 +21,18 @@ def plan_figures(answer: BallPlanAnswer, folder: Path) -> tuple[str, ...]:
     def uncertainties(plan: BallPlan) -> list[float]:
         return [np.nan if (u := plan.parameters[name].u) is None else u for name in names]
 
-    sizes = (
-        f"{len(present.balls)} balls at {len(present.poses)} indexations, {present.seconds / 60.0:.0f} min"
-    )
-    if proposed is not None:
-        sizes += (
-            f"; proposed {len(proposed.balls)} at {len(proposed.poses)}, {proposed.seconds / 60.0:.0f} min"
-        )
     figure = expected_uncertainties(
         names,
         [present.parameters[name].unit for name in names],
         uncertainties(present),
         None if proposed is None else uncertainties(proposed),
-        title=f"{answer.campaign}: {sizes}",
-        note=f"Expected standard uncertainties of one run with {answer.stated_uncertainty_um:g} µm a coordinate.",
+        title=titles.expected_of_plan(
+            answer.campaign, _size(present), None if proposed is None else _size(proposed)
+        ),
+        note=titles.expected_note(answer.stated_uncertainty_um),
     )
     return tuple(save_figure(figure, folder, "expected-uncertainties"))
+
+
+def _size(plan: BallPlan) -> titles.PlanSize:
+    return titles.PlanSize(len(plan.balls), len(plan.poses), plan.seconds)

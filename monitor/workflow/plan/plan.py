@@ -8,7 +8,7 @@ import numpy as np
 
 from monitor.documents import to_document
 from monitor.exceptions import InputError
-from monitor.methods import AnglePlan, campaign_method
+from monitor.methods import AnglePlan, InstrumentPlan, campaign_method
 from monitor.methods.planning.candidates import Choice
 from monitor.methods.planning.search import best_plan, quickest_plan
 from monitor.records import Campaign
@@ -17,9 +17,10 @@ from monitor.units import MICROMETRE
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve_for
 from monitor.workflow.plan.angles import plan_angles
-from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, PlanAnswer, TimeAnswer
+from monitor.workflow.plan.answer import BallPlanAnswer, PlanAnswer, TimeAnswer
 from monitor.workflow.plan.balls import ball_plan, best_subsets, blind_spots
 from monitor.workflow.plan.candidates import PlannedCampaign, planned
+from monitor.workflow.plan.instruments import plan_instruments
 from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.plan.separate import separation
 
@@ -34,16 +35,23 @@ def plan(db: Database, request: PlanRequest) -> PlanAnswer:
     method = campaign_method(campaign).plan
     if request.keep and isinstance(method, AnglePlan):
         raise InputError(f"{campaign.name} is planned by angles of a table; there are no indexations to keep")
-    answer: PlanAnswer = (
-        plan_angles(method, campaign, model, request)
-        if isinstance(method, AnglePlan)
-        else _plan_balls(campaign, model, request)
-    )
+    if request.parameters and not isinstance(method, InstrumentPlan):
+        raise InputError(
+            f"--for: {campaign.name} is no campaign of instruments; name a wanted uncertainty by --wanted, or leave "
+            "it out"
+        )
+    answer: PlanAnswer
+    if isinstance(method, AnglePlan):
+        answer = plan_angles(method, campaign, model, request)
+    elif isinstance(method, InstrumentPlan):
+        answer = plan_instruments(method, campaign, model, request)
+    else:
+        answer = _plan_balls(campaign, model, request)
     save_analysis(
         db, "plan", to_document(answer), method=campaign.method, campaign=campaign.name,
         model=model.name, model_version=model.version,
     )  # fmt: skip
-    if request.figures is None or isinstance(answer, AnglePlanAnswer):
+    if request.figures is None or not isinstance(answer, BallPlanAnswer):
         return answer
     # Loaded here: drawing costs a second that a plan without figures need not wait.
     from monitor.workflow.plan.figures import plan_figures

@@ -16,8 +16,9 @@ class PlanRequest:
 
     ``balls`` and ``poses`` ask for the best plan of so many; ``wanted`` (parameter to display unit) for the quickest
     that reaches these standard uncertainties; ``keep`` weighs the campaign's own plan with these of its indexations
-    alone (numbers from 1 on in their order); ``separate`` asks for poses that separate two effects. Expanded
-    uncertainties are of the coverage probability ``p``. Raises InputError.
+    alone (numbers from 1 on in their order); ``parameters`` are those that tests of instruments are ranked for (none
+    named: all); ``separate`` asks for poses that separate two effects. Expanded uncertainties are of the coverage
+    probability ``p``. Raises InputError.
     """
 
     campaign: str
@@ -29,6 +30,7 @@ class PlanRequest:
     p: float = 0.95
     figures: Path | None = None
     keep: tuple[int, ...] = ()
+    parameters: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:

@@ -14,7 +14,7 @@ from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.explain.explain_answer import DeviationsApart
 from monitor.workflow.models import as_model
 from monitor.workflow.plan.answer import SeparationAnswer, SeparationVerdict
-from monitor.workflow.plan.candidates import strokes_of
+from monitor.workflow.plan.strokes import strokes_of
 
 #: The size at the tip for which effects are separated.
 SEPARATED_PEAK = MICROMETRE.to_internal(5.0)

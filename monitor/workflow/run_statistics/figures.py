@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from monitor.records import Campaign
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.parameters import ParametersOfRuns, parameters_by_run
 from monitor.store import StoredIdentification
 from monitor.workflow.figure_files import make_folder, save_figure
@@ -25,7 +26,6 @@ def statistics_figure(
     estimate = np.array([run.estimate[columns] for run in identification.runs]) / factors
     u = np.sqrt(np.array([np.diag(run.covariance)[columns] for run in identification.runs])) / factors
     moved = list(answer.moved)
-    summary = f"differ between days: {', '.join(moved)}" if moved else "no parameter differs between days"
     figure = parameters_by_run(
         ParametersOfRuns(
             [run.run for run in identification.runs],
@@ -35,8 +35,8 @@ def statistics_figure(
             estimate,
             2.0 * u,
         ),
-        title=f"{answer.campaign}: {summary}",
-        interval="± 2 standard uncertainties of the run",
+        title=titles.parameters_of_runs(answer.campaign, moved),
+        interval=titles.INTERVAL_OF_RUN,
         highlight=moved,
     )
     return tuple(save_figure(figure, folder, "parameters-by-run"))

@@ -62,15 +62,17 @@ def _scatter(db: Database, name: str, request: SideBySideRequest) -> SelectionSc
 def _figure(answer: SideBySideAnswer, folder: Path) -> tuple[str, ...]:
     """The expanded uncertainties of the selections, bars side by side."""
     # The drawing library takes longer to load than most commands to run.
+    from monitor.reporting.figures import titles
     from monitor.reporting.figures.trend import selections_side_by_side
     from monitor.workflow.figure_files import make_folder, save_figure
 
     make_folder(folder)
     units, scatters = answer.units, answer.selections
     figure = selections_side_by_side(
-        list(units), list(units.values()), [f"{name} ({scatter.runs} runs)" for name, scatter in scatters.items()],
+        list(units), list(units.values()),
+        [titles.selection_name(name, scatter.runs) for name, scatter in scatters.items()],
         [[scatter.expanded.get(name, np.nan) for name in units] for scatter in scatters.values()],
-        title="Expanded uncertainty of a calibration, by the runs that its covariance is from",
-        meaning=f"bars: U = k_q u of all parameters together with p = {answer.p:g}",
+        title=titles.SELECTIONS,
+        meaning=titles.selections_note(answer.p),
     )  # fmt: skip
     return tuple(save_figure(figure, folder, "selections"))

@@ -342,7 +342,7 @@ class VolumetricForecast:
 
     ``held`` parameters have no drift and stay where they are; those ``left_out`` are no error of the chain. An error
     that is beyond its limit already is so since ``beyond_since``, by the same drifts; by then at the latest, where
-    they begin.
+    they begin. ``mapped_um`` is the worst error of the last map stored, which the fleet judges.
     """
 
     limit_um: float | None
@@ -362,6 +362,7 @@ class VolumetricForecast:
     why_no_backtest: Lack | None = field(default=None, metadata=WORDED)
     points: int | None = field(default=None, metadata=OMITTED)
     beyond_since: str | None = field(default=None, metadata=OMITTED)
+    mapped_um: float | None = field(default=None, metadata=OMITTED)
     why: Lack | None = field(metadata=WORDED)
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.style import save
 from monitor.reporting.figures.trend import RunsOverTime, parameter_over_time
-from monitor.reporting.health.words import in_words
 from monitor.statistics import predict
 from monitor.workflow.figure_files import ENDINGS, make_folder
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, days_since_1970
@@ -26,15 +26,10 @@ def headline(name: str, parameter: ParameterTrend) -> str:
     """What one parameter's history says, in one line."""
     if parameter.changes:
         last = parameter.changes[-1]
-        size, u = in_words(last.size, last.u, sign=True)
-        return f"{name}: changed by {size} {last.unit} (u = {u} {last.unit}) on {(last.at or '')[:10]}"
-    drift, unit = parameter.drift, parameter.unit
-    if drift.slope_per_year is None or drift.u_slope is None:
-        return f"{name}: too little history for a drift"
-    slope, u = in_words(drift.slope_per_year, drift.u_slope, sign=True)
-    sentence = f"{name}: {slope} {unit} a year (u = {u} {unit} a year)"
+        return titles.parameter_changed(name, last.size, last.u, last.unit, (last.at or "")[:10])
+    drift = parameter.drift
     moving = drift.p_value is not None and drift.p_value < MOVING
-    return sentence if moving else f"{sentence}, no drift seen"
+    return titles.parameter_drifts(name, drift.slope_per_year, drift.u_slope, parameter.unit, moving=moving)
 
 
 def trend_figures(answer: TrendAnswer, past: Mapping[str, ParameterPast], folder: Path) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.records import Array
+from monitor.reporting import messages
 from monitor.statistics import control_false_discoveries
 from monitor.store import (
     NOTE,
@@ -136,7 +137,7 @@ def _answer(
             RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
             for event in events
         ),
-        notes=(*same_hours(history), *_not_followed(history), *_limits_of_type(db, history)),
+        notes=(*map(str, same_hours(history)), *_not_followed(history), *_limits_of_type(db, history)),
         false_alarm=FALSE_ALARM,
         seed=SEED,
         why=None if past else _why_none(request),
@@ -177,26 +178,18 @@ def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
     name = tolerance_types(db).get(history.machine)
     if name is None:
         return ()
-    return (
-        f"limits are those of the machine type '{name}' in the configuration: the latest campaign states none",
-    )
+    return (messages.limits_of_type(name),)
 
 
 def _not_followed(history: MachineHistory) -> list[str]:
     """What is lacking, because it is not identified under the model that the machine is followed by."""
     if not history.unidentified:
         return []
-    names = ", ".join(history.unidentified)
-    return [
-        f"not identified by the model that {history.machine} is followed by, and left out: {names}; "
-        f"type `monitor identify {history.unidentified[0]}`"
-    ]
+    return [messages.not_identified_by_model(history.machine, history.unidentified)]
 
 
 def _why_none(request: TrendRequest) -> str:
-    when = "yet" if request.since is None else f"since {request.since:%Y-%m-%d}"
-    campaign = f" of campaign {', '.join(request.campaigns)}" if request.campaigns else ""
-    return f"machine {request.machine} has no identified run{campaign} {when}"
+    return messages.no_identified_run(request.machine, request.campaigns, request.since)
 
 
 def _next_check(history: MachineHistory, request: TrendRequest) -> float:

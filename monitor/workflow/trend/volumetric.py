@@ -29,7 +29,7 @@ from monitor.statistics import (
     residual_correlation,
     trend,
 )
-from monitor.store import Database, MachineHistory, load_campaign
+from monitor.store import Database, MachineHistory, latest_maps, load_campaign
 from monitor.units import DAYS_PER_YEAR, MICROMETRE
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift
@@ -247,8 +247,9 @@ def volumetric_forecast(
     limit = history.tolerances.get(VOLUMETRIC) if question.limit_um is None else question.limit_um
     offset = next(iter(drifts.values())).piece.offset
     none = VolumetricForecast(
-        limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None
-    )
+        limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None,
+        mapped_um=None if limit is None else latest_maps(db, history.machine).get(history.machine),
+    )  # fmt: skip
     if limit is None:
         return replace(none, why=Lack(Part.VOLUMETRIC_FORECAST, Cause.NO_LIMIT))
     if not any(drift.stated is not None for drift in drifts.values()):

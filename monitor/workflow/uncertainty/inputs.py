@@ -76,13 +76,24 @@ def reading_inputs(
             "three days or more are needed (write --holds-for run)"
         )
     else:
-        stated = campaign.probe.standard_uncertainty
+        # Readings of several instruments each have their own: what repeats worse than stated does so in proportion.
+        several = bool(campaign.artefact.setups)
+        stated = fit.sigma if several else campaign.probe.standard_uncertainty
         u = max(stated, lack_of_fit(fit)[1] or 0.0)
         inputs = uncorrelated(names, units, run.inputs[:count], run.stated * (u / stated), source=READINGS)
-        kind = CovarianceKind.REPEATABILITY if u > stated else CovarianceKind.STATED_BY_PROBE
-        source = CovarianceSource(kind, u_um=u * 1e3, selection=name)
+        source = _stated_source(u, stated, several=several, selection=name)
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source
+
+
+def _stated_source(u: float, stated: float, *, several: bool, selection: str | None) -> CovarianceSource:
+    """The source of a covariance from what probe or setups state, or from a repeatability ``u`` (mm) above it."""
+    exceeds = u > stated
+    if several:
+        kind = CovarianceKind.REPEATABILITY_OF_SETUPS if exceeds else CovarianceKind.STATED_BY_SETUPS
+        return CovarianceSource(kind, selection=selection, times=u / stated if exceeds else None)
+    kind = CovarianceKind.REPEATABILITY if exceeds else CovarianceKind.STATED_BY_PROBE
+    return CovarianceSource(kind, u_um=u * 1e3, selection=selection)
 
 
 def holding_for(source: CovarianceSource, days: int) -> HoldsFor:

@@ -67,7 +67,11 @@ class LeftOutOfMap:
 
 @dataclass(frozen=True)
 class VolumetricAnswer:
-    """The volumetric error of one run. ``k`` is the coverage factor of one length for the probability ``p``."""
+    """The volumetric error of one run. ``k`` is the coverage factor of one length for the probability ``p``.
+
+    ``refers_to`` says in words what each parameter, in the map or left out of it, is stated relative to, and
+    ``vectors_refer_to`` what the vectors are: not of the same frame.
+    """
 
     campaign: str
     machine: str
@@ -86,5 +90,7 @@ class VolumetricAnswer:
     least_certain: MapPoint
     by_pose: tuple[PoseError, ...]
     slices: tuple[Slice, ...]
+    refers_to: Mapping[str, str]
+    vectors_refer_to: str
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     tables: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from monitor.reporting.figures import titles
 from monitor.reporting.figures.volumetric import volumetric_slices
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.volumetric.answer import VolumetricAnswer
@@ -19,11 +20,10 @@ def map_figures(answer: VolumetricAnswer, mapped: VolumetricMap, folder: Path) -
         drawn.vectors_um,
         drawn.u_um * answer.k,
         names=drawn.axes,
-        title=f"{answer.campaign}, run {answer.run}: at worst {worst.error_um:.1f} µm "
-        f"± {worst.expanded_um:.1f} µm, RMS {answer.rms.error_um:.1f} µm",
-        note=f"Rotary axes at zero. Colour: length of the error; arrows: its part in the slice; numbers: expanded "
-        f"uncertainty (k = {answer.k:.2f}, p = {answer.p:g}). "
-        f"The title is about all {answer.region.rotary_poses} rotary poses of the plan.",
+        title=titles.map_title(
+            answer.campaign, answer.run, (worst.error_um, worst.expanded_um), answer.rms.error_um
+        ),
+        note=titles.map_note(answer.k, answer.p, answer.region.rotary_poses),
     )
     make_folder(folder)
     return tuple(save_figure(figure, folder, "volumetric-error"))

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from monitor.bounded import LARGEST_DOCUMENT
 from monitor.exceptions import InputError
-from monitor.readers.archive import CAMPAIGN_FILE, UploadedFile, unpack
+from monitor.readers.archive import CAMPAIGN_FILES, UploadedFile, unpack
 
 #: Files of an arrival that are looked at; a campaign has three to a dozen.
 MOST_FILES = 2000
@@ -51,7 +51,8 @@ def _arrival(path: Path) -> Arrival | None:
         return None
     try:
         if path.is_dir():
-            lacks = None if (path / CAMPAIGN_FILE).is_file() else f"it has no {CAMPAIGN_FILE}"
+            has_one = any((path / name).is_file() for name in CAMPAIGN_FILES)
+            lacks = None if has_one else f"it has no {CAMPAIGN_FILES[0]}"
             return _observed(path, _files_below(path), lacks)
         if path.suffix.casefold() in (".zip", *_ALONE):
             return _observed(path, [path], None)
@@ -95,7 +96,7 @@ def campaign_folders(path: Path) -> Iterator[tuple[Path, ...]]:
     if path.suffix.casefold() in _ALONE:
         raise InputError(
             f"{path}: a workbook alone is no campaign; put it into a folder of its own as campaign.xlsx, "
-            f"beside {CAMPAIGN_FILE} (docs/campaign-format.md)"
+            f"beside {CAMPAIGN_FILES[0]} (docs/campaign-format.md)"
         )
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is no zip, or was cut off; copy it again")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from monitor.reporting import messages
 from monitor.workflow.health.mail import composed, message_of, read_mail_settings, send
 from monitor.workflow.watching.request import WatchAnswer
 
@@ -12,12 +13,14 @@ def lines_of(answer: WatchAnswer) -> list[str]:
     """Return what came and what was refused, a sentence a line."""
     lines = []
     for campaign in answer.arrived:
-        size = f"{campaign.runs} runs" if campaign.rows is None else f"{campaign.rows} rows"
-        what = "identified" if campaign.identified else f"NOT identified: {campaign.why_not}"
-        lines.append(f"{campaign.campaign}: {campaign.state} from {campaign.arrival}, {size}; {what}")
+        size = (campaign.runs, "runs") if campaign.rows is None else (campaign.rows, "rows")
+        why_not = None if campaign.identified else str(campaign.why_not)
+        lines.append(
+            messages.arrived(campaign.campaign, campaign.state, str(campaign.arrival), size, why_not)
+        )
         lines += [f"note: {note}" for note in campaign.notes]
     for refused in answer.refused:
-        lines.append(f"refused, and left where it is: {refused.folder}")
+        lines.append(messages.arrival_refused(refused.folder))
         lines += [f"  {line}" for line in refused.why.splitlines()]
     return lines
 

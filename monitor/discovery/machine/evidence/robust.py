@@ -13,7 +13,9 @@ import numpy as np
 
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.suspects.anomalies import BadPoint
+from monitor.exceptions import DataError
 from monitor.methods.chain.gross import (
+    FEWEST_RUNS,
     LEAST_TIMES,
     Deviation,
     GrossReading,
@@ -65,8 +67,11 @@ def robust_fit(problem: ChainProblem) -> RobustFit:
         current = _without(problem, gross)
     if not gross:
         return RobustFit(current, ())
+    certain = _without_innocent(problem, gross)
+    if len(certain) < len(gross):
+        current = _without(problem, certain)
     return RobustFit(
-        current, tuple(as_reading(current.problem, current.by_error, gross[row]) for row in sorted(gross))
+        current, tuple(as_reading(current.problem, current.by_error, certain[row]) for row in sorted(certain))
     )
 
 
@@ -80,6 +85,34 @@ def _without(problem: ChainProblem, gross: Mapping[int, Deviation]) -> Fit:
     marks = np.zeros(len(problem.context), dtype=bool)
     marks[list(gross)] = True
     return fit(problem, marks if gross else None)
+
+
+def _without_innocent(problem: ChainProblem, gross: dict[int, Deviation]) -> dict[int, Deviation]:
+    """The gross rows, less those that nothing speaks against once the others of their run have no weight.
+
+    One ball of a bar that is touched once a run and stands 30 mm off makes the bar's length wrong: before the other
+    runs are asked, the ball at its other end is as likely to be the wrong one.
+    """
+    if problem.moved_together is None or len(problem.runs) < FEWEST_RUNS:
+        return gross
+    runs, certain = problem.context.run, dict(gross)
+    for row in sorted(gross, key=lambda row: gross[row].chi_square):
+        beside = {other: deviation for other, deviation in certain.items() if other != row}
+        if not np.isfinite(gross[row].chi_square) or runs[row] not in runs[list(beside)]:
+            continue
+        try:
+            current = _without(problem, beside)
+        except (DataError, np.linalg.LinAlgError):
+            continue
+        solution = current.solution
+        again = [
+            *deviations(current.problem, solution.local, solution.common),
+            *against_other_runs(current.problem, solution),
+        ]
+        by_row = {deviation.row: deviation for deviation in again}
+        # How far it is off was taken from a bar of which both balls are wrong, where both are.
+        certain = {**certain, row: by_row[row]} if row in by_row else beside
+    return certain
 
 
 def _fitting(current: Fit, gross: Mapping[int, Deviation]) -> set[int]:

@@ -159,6 +159,20 @@ class Whitening:
         white[..., : rows.count] = (self.factors[0] @ readings).reshape(*numbers.shape[:-1], rows.count)
         return white
 
+    def undone(self, white: Array) -> Array:
+        """The numbers (R, N) that were made independent; zero for touches without weight."""
+        rows = self.rows
+        touches = rows.weighted.shape[1]
+        # A touch without weight has a row of zeros in its triangle, and none of itself to give back.
+        triangles = self.factors[0] + np.eye(touches) * ~rows.weighted[:, :, None]
+        independent = white[:, : rows.count].reshape(len(white), touches, rows.numbers)
+        readings = np.linalg.solve(triangles, independent)
+        if rows.turned is not None:
+            readings = (np.swapaxes(rows.turned, -1, -2) @ readings[..., None])[..., 0]
+        numbers = np.array(white)
+        numbers[:, : rows.count] = readings.reshape(len(white), rows.count)
+        return numbers
+
 
 def rows_of(problem: ChainProblem) -> Rows:
     """The layout of the whitened numbers of a problem."""

@@ -6,6 +6,7 @@ is held where the centre is stated. A centre that is not stated, or far from whe
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -66,6 +67,14 @@ class DistanceReading(AtWorkPoint):
     @property
     def unknowns(self) -> tuple[str, ...]:
         return (*super().unknowns, *(() if self.holds("length") else ("length",)))
+
+    @property
+    def shared(self) -> Mapping[str, Hashable]:
+        """The length of a bar, which setups of one instrument with the same stated length have in common."""
+        setup = self.setup
+        return (
+            {"length": (setup.instrument, setup.length, setup.length_uncertainty)} if setup.instrument else {}
+        )
 
     def start(self, runs: int) -> Array:
         begin = super().start(runs)

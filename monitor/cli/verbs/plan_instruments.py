@@ -1,0 +1,62 @@
+"""What ``monitor plan`` prints for a campaign of instruments."""
+
+from __future__ import annotations
+
+from monitor.cli import output
+from monitor.workflow.plan.answer import InstrumentPlanAnswer, TestAnswer
+
+
+def tables(answer: InstrumentPlanAnswer) -> None:
+    """Which instrument next, and where; the proposed tests in turn; what would see what has no number yet."""
+    shown = answer.asked[:4]
+    columns = ["test", *(f"u {name}" for name in shown), "where"]
+    now = ["as measured", *(_u(answer.present.get(name)) for name in shown), ""]
+    rows = [[_name(test), *(_u(test.u.get(name)) for name in shown), where(test)] for test in answer.tests]
+    units = ", ".join(f"{name} in {answer.units[name]}" for name in shown)
+    further = len(answer.asked) - len(shown)
+    more = f", ranked for {further} more parameters (--json has them)" if further else ""
+    output.table(
+        f"{answer.campaign}, run {answer.run}: u with one more test ({units}{more})",
+        columns,
+        [now, *rows],
+        text_columns=1,
+    )
+    if any(not test.available for test in answer.tests):
+        output.say("(usual): an instrument that the campaign does not have, with its usual uncertainty")
+    for number, test in enumerate(answer.proposed, 1):
+        u = ", ".join(f"{name} {_u(test.u.get(name))} {answer.units[name]}" for name in shown)
+        output.say(f"{number}. {_name(test)}: {where(test)}; then u of {u}")
+    for axis in answer.standing:
+        output.say(
+            f"{axis} stood still and has no stroke in the machine file, so no test moves it; state its stroke_mm"
+        )
+    for parameter in answer.unseen:
+        output.say(
+            f"{parameter.parameter} has no number yet: {_name(parameter.test)} would give it u = {parameter.u:.2g} "
+            f"{parameter.unit} ({where(parameter.test)})"
+        )
+
+
+def where(test: TestAnswer) -> str:
+    """Which axes move between which readings, and where the others stand."""
+    parts = []
+    for column, (low, high) in test.axes.items():
+        axis, unit = column.upper().rpartition("_")[0], "°" if column.endswith("_deg") else " mm"
+        parts.append(f"{axis} {low:g}{unit}" if low == high else f"{axis} {low:g} to {high:g}{unit}")
+    words = f"{test.poses} poses, {', '.join(parts)}"
+    if test.work_point_mm is not None:
+        words += f"; work point {', '.join(f'{value:g}' for value in test.work_point_mm)} mm"
+    return words
+
+
+def _name(test: TestAnswer) -> str:
+    name = f"{test.instrument} ({test.setup})" if test.available else f"{test.instrument} (usual)"
+    return (
+        name
+        if test.available
+        else f"{name} {test.setup.rpartition('-')[2]}".removesuffix(" bar").removesuffix(" test")
+    )
+
+
+def _u(value: float | None) -> str:
+    return "none" if value is None else f"{value:.2g}"

@@ -1,0 +1,200 @@
+"""What a test would say of a machine's parameters beside what was measured, before anyone measures.
+
+The derivatives of the rows at the machine without errors, whitened by what each setup states, are the information;
+unknowns of a setup (centre of a bar, turn of a beam, zero) are taken out of its rows first, as a later fit would do. A
+test belongs to one run together with the readings that are there. First order: errors of 1 mrad change u by 1e-3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from monitor.effects import parse_effect
+from monitor.machine import evaluate
+from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE
+from monitor.methods.instruments.assembly import SETUP, problem_of
+from monitor.methods.instruments.base import instrument_base
+from monitor.methods.instruments.candidates import CandidateTest, Workspace, usual_instruments
+from monitor.methods.instruments.problem import InstrumentProblem
+from monitor.methods.instruments.reading import Rows
+from monitor.methods.instruments.readings import readings
+from monitor.methods.instruments.readings.direction import Direction
+from monitor.methods.method import ExpectedTest, PlannedTest
+from monitor.methods.model import Model, chain_of
+from monitor.records import Array, Campaign, Probings, Setup
+from monitor.units import Unit
+
+#: What is left of a column without the unknowns of its setup, below this part of it, is rounding.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class _Information:
+    """The derivatives (k, k) of all rows by base and added coefficients, as a triangle."""
+
+    names: tuple[str, ...]
+    triangle: Array
+
+    def joined(self, other: _Information) -> _Information:
+        """Both together."""
+        return replace(self, triangle=_triangle(np.vstack([self.triangle, other.triangle])))
+
+    def u(self) -> dict[str, float]:
+        """Standard uncertainties in internal units; NaN where the rows do not determine a coefficient."""
+        scale = np.linalg.norm(self.triangle, axis=0)
+        scale[scale == 0.0] = 1.0
+        _, strength, vectors = np.linalg.svd(self.triangle / scale, full_matrices=True)
+        rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
+        spread = np.sqrt(np.sum((vectors[:rank] / strength[:rank, None]) ** 2, axis=0)) / scale
+        is_open = np.abs(vectors[rank:]).max(axis=0, initial=0.0) >= MEMBER_SHARE
+        return dict(zip(self.names, np.where(is_open, np.nan, spread).tolist(), strict=True))
+
+
+class InstrumentForecast:
+    """The readings of one ``run`` of a campaign under a model, and tests that could follow within ``limits`` of the
+    joints (mm and rad, by name)."""
+
+    def __init__(
+        self, campaign: Campaign, model: Model, run: int, limits: Mapping[str, tuple[float, float]]
+    ) -> None:
+        rows = campaign.probings.run == run
+        runs = tuple(single for single in campaign.runs if single.run == run)
+        self.campaign = replace(campaign, runs=runs, probings=campaign.probings.rows(rows))
+        self.model, self.chain = model, chain_of(campaign.machine)
+        self.problem = problem_of(self.campaign, model)
+        self.workspace = Workspace(self.chain, limits)
+
+    def unit_of(self, parameter: str) -> Unit:
+        """The display unit of a parameter."""
+        return self._units[parameter]
+
+    @cached_property
+    def _units(self) -> dict[str, Unit]:
+        setups = {test.setup.id: test.setup for test in self.tests}.values()
+        texts = dict.fromkeys(text for setup in setups for text in self._base(setup))
+        effects = (*(parse_effect(text, self.chain) for text in texts), *self.problem.added)
+        context = self.problem.context
+        return {name: effect.unit for effect in effects for name in effect.parameters(context)}
+
+    @cached_property
+    def tests(self) -> tuple[CandidateTest, ...]:
+        """Tests of the campaign's own instruments, then of usual ones that it does not have."""
+        own = self.problem.setups
+        have = {(setup.reading, setup.direction) for setup in own}
+        point = next((setup.tool_point for setup in own if any(setup.tool_point)), (0.0, 0.0, 0.0))
+        others = [setup for setup in usual_instruments(point) if (setup.reading, setup.direction) not in have]
+        return (
+            *self.workspace.tests(own, available=True),
+            *self.workspace.tests(others, available=False),
+        )
+
+    def present(self) -> dict[str, float]:
+        """Standard uncertainties in internal units of one run as it was measured, NaN where there is no number."""
+        return self._measured(tuple(effect.text for effect in self.problem.base)).u()
+
+    def expected(self) -> Iterable[ExpectedTest]:
+        """What every test promises, beside the readings that are there."""
+        for test in self.tests:
+            yield self._expected((test,))
+
+    def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
+        """What several tests promise together; the last one is named."""
+        return self._expected(tuple(test for test in tests if isinstance(test, CandidateTest)))
+
+    def _expected(self, tests: tuple[CandidateTest, ...]) -> ExpectedTest:
+        base = self._base(*(test.setup for test in tests))
+        information = self._measured(base)
+        for test in tests:
+            information = information.joined(self._of(test, base))
+        return ExpectedTest(tests[-1], information.u())
+
+    def _base(self, *setups: Setup) -> tuple[str, ...]:
+        """The base of a campaign with further setups."""
+        if self.model.base:
+            return self.model.base
+        others = tuple(replace(setup, work_point=(0.0, 0.0, 0.0)) for setup in setups)
+        have = {replace(setup, id="", work_point=(0.0, 0.0, 0.0)) for setup in self.problem.setups}
+        new = {setup.id: setup for setup in others if replace(setup, id="") not in have}
+        return instrument_base(self.chain, (*self.problem.setups, *new.values()))
+
+    def _measured(self, base: tuple[str, ...]) -> _Information:
+        if base not in self._of_base:
+            problem = problem_of(self.campaign, replace(self.model, base=base))
+            self._of_base[base] = _information(problem)
+        return self._of_base[base]
+
+    def _of(self, test: CandidateTest, base: tuple[str, ...]) -> _Information:
+        """The information of a test, computed once."""
+        key = (id(test), base)
+        if key not in self._of_test:
+            self._of_test[key] = _information(self._problem(test, base))
+        return self._of_test[key]
+
+    @cached_property
+    def _of_test(self) -> dict[tuple[int, tuple[str, ...]], _Information]:
+        return {}
+
+    @cached_property
+    def _of_base(self) -> dict[tuple[str, ...], _Information]:
+        return {}
+
+    def _problem(self, test: CandidateTest, base: tuple[str, ...]) -> InstrumentProblem:
+        """The problem of a test alone, read from a machine without errors."""
+        count, setup = len(test.positions), test.setup
+        channels = {SETUP: np.ones(count)}
+        for name, values in zip(readings()[setup.reading].columns, self._read(test).T, strict=True):
+            channels[name] = values
+        probings = Probings(
+            np.full(count, self.campaign.runs[0].run), np.arange(1, count + 1), np.arange(count, dtype=np.float64),
+            np.full(count, setup.id),
+            {
+                joint.name: joint.sign * test.positions[:, index]
+                for index, joint in enumerate(self.chain.joints)
+            },
+            channels,
+        )  # fmt: skip
+        artefact = replace(self.campaign.artefact, setups=(setup,))
+        campaign = replace(self.campaign, artefact=artefact, probings=probings)
+        return problem_of(campaign, replace(self.model, base=base))
+
+    def _read(self, test: CandidateTest) -> Array:
+        """What a machine without errors shows (m, k) in the columns of the kind, as far as a search begins there."""
+        setup, count = test.setup, len(test.positions)
+        columns = readings()[setup.reading].columns
+        if setup.reading == "direction":
+            rows = Rows(
+                self.chain, np.zeros(count, dtype=np.int64), np.full(count, setup.id), np.zeros((count, 3)),
+                test.positions, np.full((count, 3), np.nan), np.zeros((count, 0)),
+            )  # fmt: skip
+            return Direction(setup).pointed(rows)
+        if setup.reading == "point":
+            none = np.zeros((count, len(self.chain.joints), 2, 6))
+            tool = np.tile(setup.tool_point, (count, 1))
+            return evaluate(self.chain, test.positions, none, np.zeros((count, 3)), tool).residual
+        return np.zeros((count, len(columns)))
+
+
+def _information(problem: InstrumentProblem) -> _Information:
+    """The derivatives of a run by base and added coefficients, the setups' own unknowns taken out."""
+    at = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
+    count = len(problem.base_names)
+    wanted = np.hstack([at.local[0, :, :count], at.common[0]])
+    own = at.local[0, :, count:]
+    scale = np.linalg.norm(own, axis=0)
+    scale[scale == 0.0] = 1.0
+    vectors, strength, _ = np.linalg.svd(own / scale, full_matrices=False)
+    basis = vectors[:, strength > RANK_TOLERANCE * strength.max(initial=0.0)]
+    size = np.linalg.norm(wanted, axis=0)
+    wanted = wanted - basis @ (basis.T @ wanted)
+    wanted = np.where(np.linalg.norm(wanted, axis=0) > ROUNDING * size, wanted, 0.0)
+    rows = np.vstack([wanted, np.zeros((wanted.shape[1], wanted.shape[1]))])
+    return _Information((*problem.base_names, *problem.added_names), _triangle(rows))
+
+
+def _triangle(rows: Array) -> Array:
+    """The triangle (k, k) with the information of rows (m, k)."""
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)

@@ -1,0 +1,147 @@
+"""Tables in the text of foreign programs: what separates the cells, where the table begins, what its commas mean."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from monitor.readers.faults import Faults, quoted
+from monitor.readers.foreign_units import foreign_unit
+
+SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "space": " "}
+DECIMALS = {"comma": ",", "point": "."}
+_NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
+_COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
+_POINT = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+#: ``Position [mm]``, ``Position (mm)``, ``Position / mm``, ``Position in mm``.
+_WITH_UNIT = re.compile(
+    r"(?P<name>.*?\S)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|\s/\s*(?P<c>\S+)|\sin\s+(?P<d>\S+))"
+)
+#: Lines at the head of a file in which a table has to begin.
+_LOOKED_AT = 400
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a table is written: its separator and its decimal mark, None where nobody knows yet."""
+
+    separator: str | None = None
+    decimal: str | None = None
+
+    def __str__(self) -> str:
+        names = {mark: name for name, mark in SEPARATORS.items()}
+        marks = {mark: name for name, mark in DECIMALS.items()}
+        separator = "cells separated by " + {"space": "spaces"}.get(
+            names[self.separator or ","], names[self.separator or ","] + "s"
+        )
+        return f"{separator}, decimal {marks[self.decimal or '.']}"
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line without spaces around them; quotes that do not close leave the line as one cell."""
+    if separator == " ":
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True), [])]
+    except csv.Error:
+        return [line]
+
+
+def is_number(cell: str) -> bool:
+    """Return whether a cell is a number with a decimal point or comma."""
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def is_data(cells: Sequence[str]) -> bool:
+    """Return whether a line is one of numbers: two or more cells, the half of them numbers."""
+    return len(cells) > 1 and 2 * sum(map(is_number, cells)) >= len([cell for cell in cells if cell]) > 0
+
+
+def separator_of(lines: Sequence[str]) -> str | None:
+    """Return the mark that makes most lines rows of numbers with equal numbers of cells; None where none does."""
+    best, most = None, 0
+    for mark in SEPARATORS.values():
+        rows = [cells_of(line, mark) for line in lines[:_LOOKED_AT]]
+        widths = [len(cells) for cells in rows if is_data(cells)]
+        count = max((widths.count(width) for width in set(widths)), default=0)
+        if count > most:
+            best, most = mark, count
+    return best
+
+
+def first_row(lines: Sequence[str], separator: str) -> int | None:
+    """Return the index of the first row of numbers that the next row, where there is one, has the same width as."""
+    for index, line in enumerate(lines[:_LOOKED_AT]):
+        cells = cells_of(line, separator)
+        if is_data(cells):
+            following = [
+                cells_of(other, separator) for other in lines[index + 1 : index + 20] if other.strip()
+            ]
+            if not following or len(following[0]) == len(cells):
+                return index
+    return None
+
+
+def with_points(
+    file: str, rows: Sequence[Sequence[str]], lines: Sequence[int], style: Style, faults: Faults
+) -> tuple[list[list[str]], str]:
+    """Return the cells with decimal points, and the decimal mark of the file.
+
+    Where nothing says what a comma is, a file that has numbers with commas and numbers with points is refused: "1,234"
+    may be one and a bit or a thousand.
+    """
+    decimal = style.decimal
+    if decimal is None and style.separator == ",":
+        decimal = "."
+    if decimal is None:
+        comma = _first_of(rows, lines, _COMMA)
+        point = _first_of(rows, lines, _POINT)
+        if comma is not None and point is not None:
+            faults.add(
+                file, comma[0], None,
+                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; say in the mapping "
+                'which is the decimal mark: decimal = "comma" or decimal = "point"',
+            )  # fmt: skip
+        decimal = "." if comma is None else ","
+    if decimal == ".":
+        return [list(row) for row in rows], decimal
+    return [
+        [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
+    ], decimal
+
+
+def _first_of(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], kind: re.Pattern[str]
+) -> tuple[int, str] | None:
+    for line, row in zip(lines, rows, strict=True):
+        for cell in row:
+            if kind.fullmatch(cell):
+                return line, cell
+    return None
+
+
+def name_and_unit(header: str) -> tuple[str, str | None]:
+    """Return the name of a column and the unit that its header states: ``("Position", "mm")``."""
+    match = _WITH_UNIT.fullmatch(header)
+    if match is not None:
+        unit = next((text for text in match.group("a", "b", "c", "d") if text is not None), "")
+        if foreign_unit(unit) is not None:
+            return match["name"], unit.strip()
+    stem, _, suffix = header.rpartition("_")
+    if stem and foreign_unit(suffix) is not None:
+        return stem, suffix
+    return header, None
+
+
+def fact_of(line: str) -> tuple[str, str] | None:
+    """Return the key and the value of a line ``key: value`` or ``key = value``; None for any other."""
+    marks = sorted((line.index(mark), mark) for mark in (":", "=", ";", "\t") if mark in line)
+    for _, mark in marks:
+        key, _, value = line.partition(mark)
+        if key.strip() and value.strip(" ;\t,") and len(key) <= 60:
+            return key.strip(' "'), value.strip(' ;\t,"')
+    return None

@@ -1,0 +1,203 @@
+"""Q-DAS ASCII transfer format (``.dfq``): K-fields of parts and characteristics, and values by characteristic.
+
+Values are coded (``K0001/2 10,023``) or stand in lines that 0x0F separates into characteristics and 0x14 into value,
+attribute, date, event and more (K0001, K0002, K0004, ...). Where all characteristics are coordinates (``P1.X``,
+``P1_Y``, ``P1 Z``) the rows are points with ``target``, ``x``, ``y``, ``z`` and nominal values (K2101); else each
+characteristic is a column by its name (K2002). Attributes of 255 and above mark a value that does not count.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.faults import Faults, quoted
+from monitor.readers.foreign_text import decode_foreign
+from monitor.readers.foreign_units import foreign_unit
+
+_FIELD = re.compile(r"K([0-9]{4})(?:/([0-9]{1,6}))?(?:\s+(.*?))?\s*")
+_COORDINATE = re.compile(r"(.+?)[ ._-]?([XYZ])", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?(?:[eE][+-]?[0-9]+)?")
+#: Attributes from here on mean that there is no valid value (K0002).
+_INVALID = 255
+#: More characteristics than any part has.
+_MOST = 100_000
+_NAME, _NOMINAL, _UNIT, _VALUE, _ATTRIBUTE, _DATE = "2002", "2101", "2142", "0001", "0002", "0004"
+
+
+@dataclass
+class _Part:
+    """What has been read: fields of each characteristic by its number, and its values with their lines."""
+
+    fields: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
+    values: dict[int, list[tuple[str, int]]] = field(default_factory=dict)
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    started: str | None = None
+
+    def text(self, key: str, number: int) -> str | None:
+        """Return a field of a characteristic, or that of all of them."""
+        entry = self.fields.get((key, number)) or self.fields.get((key, 0))
+        return None if entry is None else entry[0]
+
+    def add(self, number: int, cells: list[str], line: int) -> str | None:
+        """Note a value with its attribute and date; what is wrong with it."""
+        value = cells[0].strip()
+        attribute = cells[1].strip() if len(cells) > 1 else ""
+        if attribute.isdigit() and int(attribute) >= _INVALID:
+            value = ""
+        elif not _NUMBER.fullmatch(value):
+            return f"{quoted(value)} is not a value; attributive characteristics have none"
+        if len(cells) > 2 and cells[2].strip() and self.started is None:
+            self.started = cells[2].strip().replace("/", " ")
+        self.values.setdefault(number, []).append((value.replace(",", "."), line))
+        return None
+
+
+def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
+    """Read the values of all characteristics; None with the faults noted."""
+    decoded = decode_foreign(file.name, file.content, faults)
+    if decoded is None:
+        return None
+    before = len(faults)
+    part = _Part()
+    for number, line in enumerate(decoded[0].split("\n"), start=1):
+        if line.strip():
+            fault = _line(part, line, number)
+            if fault is not None:
+                faults.add(file.name, number, None, fault)
+        if len(faults) > before + 20:
+            return None
+    if len(faults) == before:
+        _complete(part, file.name, faults)
+    if len(faults) > before:
+        return None
+    points = _points(part, file.name, decoded[1], faults)
+    return None if len(faults) > before else points or _table(part, decoded[1])
+
+
+def _line(part: _Part, line: str, number: int) -> str | None:
+    """Read one line; what is wrong with it."""
+    if not line.startswith("K"):
+        return _values(part, line, number)
+    match = _FIELD.fullmatch(line)
+    if match is None:
+        return f"{quoted(line.strip())} is no K-field; write for example K2002/1 P1.X"
+    key, which, value = match[1], int(match[2] or 0), match[3] or ""
+    if key == _VALUE:
+        return part.add(which, [value], number)
+    if key == _ATTRIBUTE and part.values.get(which):
+        if value.isdigit() and int(value) >= _INVALID:
+            part.values[which][-1] = ("", part.values[which][-1][1])
+        return None
+    if key == _DATE and part.started is None:
+        part.started = value.replace("/", " ")
+    elif key.startswith("1") and value:
+        part.facts.append((f"K{key}", value))
+    part.fields[key, which] = (value, number)
+    return None
+
+
+def _values(part: _Part, line: str, number: int) -> str | None:
+    """Read a line of values, one a characteristic; what is wrong with it."""
+    for index, value in enumerate(line.split("\x0f"), start=1):
+        if index > _MOST:
+            return "the line has more characteristics than any part"
+        fault = part.add(index, value.split("\x14"), number)
+        if fault is not None:
+            return fault
+    return None
+
+
+def _complete(part: _Part, name: str, faults: Faults) -> None:
+    """Refuse a file without values, with fewer characteristics than it says, or with values of unequal number."""
+    if not part.values:
+        faults.add(
+            name, 1, None, "the file has no value; export the measurement with its values, not the test plan"
+        )
+        return
+    stated = part.fields.get(("0100", 0))
+    named = {number for key, number in part.fields if key == _NAME}
+    if stated is not None and stated[0].isdigit() and int(stated[0]) != len(named):
+        faults.add(
+            name,
+            stated[1],
+            "K0100",
+            f"{stated[0]} characteristics are announced and {len(named)} named; the file is cut",
+        )
+    nameless = sorted(set(part.values) - named)
+    if nameless:
+        line = part.values[nameless[0]][0][1]
+        faults.add(
+            name, line, None, f"characteristic {nameless[0]} has values and no name (K2002/{nameless[0]})"
+        )
+    counts = {number: len(values) for number, values in part.values.items()}
+    if len(set(counts.values())) > 1:
+        most = max(counts.values())
+        short = next(number for number, count in counts.items() if count < most)
+        faults.add(
+            name, part.values[short][-1][1], None,
+            f"characteristic {short} has {counts[short]} values where others have {most}; the file is cut",
+        )  # fmt: skip
+
+
+def _coordinates(part: _Part) -> dict[str, dict[str, int]] | None:
+    """Return the characteristics of the points by target and letter; None where one is no coordinate of a point."""
+    points: dict[str, dict[str, int]] = {}
+    for number in sorted(part.values):
+        match = _COORDINATE.fullmatch(part.text(_NAME, number) or "")
+        if match is None or match[2].lower() in points.get(match[1], {}):
+            return None
+        points.setdefault(match[1], {})[match[2].lower()] = number
+    letters = set(next(iter(points.values())))
+    return points if all(set(numbers) == letters for numbers in points.values()) else None
+
+
+def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | None:
+    """Return the rows of points where every characteristic with values is a coordinate of one; None otherwise."""
+    points = _coordinates(part)
+    if points is None:
+        return None
+    units = {part.text(_UNIT, number) for number in part.values}
+    if len(units) > 1:
+        shown = ", ".join(sorted(map(str, units)))
+        faults.add(
+            name, None, "K2142", f"the coordinates are in different units ({shown}); export them in one"
+        )
+        return None
+    columns: dict[str, list[str]] = {}
+    lines: list[int] = []
+    for visit in range(len(next(iter(part.values.values())))):
+        for target, numbers in points.items():
+            columns.setdefault("target", []).append(target)
+            for letter, number in sorted(numbers.items()):
+                nominal = (part.text(_NOMINAL, number) or "").replace(",", ".")
+                columns.setdefault(letter, []).append(part.values[number][visit][0])
+                columns.setdefault(f"nominal_{letter}", []).append(nominal)
+            lines.append(part.values[min(numbers.values())][visit][1])
+    columns = {key: cells for key, cells in columns.items() if any(cells)}
+    unit = next(iter(units)) or ""
+    stated = dict.fromkeys(columns.keys() - {"target"}, unit) if foreign_unit(unit) else {}
+    return Export(columns, stated, lines, layout, tuple(part.facts), part.started)
+
+
+def _table(part: _Part, layout: str) -> Export:
+    columns: dict[str, list[str]] = {}
+    units: dict[str, str] = {}
+    for number in sorted(part.values):
+        label = part.text(_NAME, number) or str(number)
+        label = label if label not in columns else f"{label} {number}"
+        columns[label] = [value for value, _ in part.values[number]]
+        unit = part.text(_UNIT, number)
+        if unit is not None and foreign_unit(unit) is not None:
+            units[label] = unit
+    lines = [line for _, line in part.values[min(part.values)]]
+    return Export(columns, units, lines, layout, tuple(part.facts), part.started)
+
+
+EXPORT = ExportFormat(
+    "q-das",
+    "Q-DAS ASCII transfer format: points (target, x, y, z) or a column a characteristic",
+    read,
+    suffixes=(".dfq",),
+)

@@ -1,0 +1,74 @@
+"""Text of foreign programs: its encoding recognised, binary content and endless lines refused by line."""
+
+from __future__ import annotations
+
+import codecs
+import re
+
+from monitor.readers.csv_table import LONGEST_LINE, MOST_LINES
+from monitor.readers.faults import Faults
+
+#: Control characters that no text has; tab, line ends, form feed, the end-of-file mark of DOS and the separators 0x0F
+#: and 0x14 of Q-DAS are let through.
+_CONTROL = re.compile("[\x00-\x08\x0b\x0e\x10-\x13\x15-\x19\x1b-\x1f\x7f]")
+
+
+def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str] | None:
+    """Return the text with LF line ends and the name of its encoding; None with the fault noted.
+
+    UTF-8 with or without byte-order mark, UTF-16 with one, and else Windows-1252, as older Windows programs write it.
+    """
+    if not content.strip():
+        faults.add(name, 1, None, "the file is empty; export the measurement again")
+        return None
+    decoded = _decoded(name, content, faults)
+    if decoded is None:
+        return None
+    text, encoding = decoded
+    text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")
+    if binary := _CONTROL.search(text):
+        line = text.count("\n", 0, binary.start()) + 1
+        faults.add(
+            name, line, None,
+            f"character 0x{ord(binary[0]):02x}: this is no text file; export the measurement as text or CSV",
+        )  # fmt: skip
+        return None
+    if text.count("\n") > MOST_LINES:
+        faults.add(name, None, None, f"the file has more than {MOST_LINES} lines; split it")
+        return None
+    lines = text.split("\n")
+    longest = max(range(len(lines)), key=lambda index: len(lines[index]))
+    if len(lines[longest]) > LONGEST_LINE:
+        faults.add(
+            name, longest + 1, None, f"the line is longer than {LONGEST_LINE} characters; end each row's line"
+        )
+        return None
+    return text, encoding
+
+
+def _decoded(name: str, content: bytes, faults: Faults) -> tuple[str, str] | None:
+    for mark, encoding, label in (
+        (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with byte-order mark"),
+        (codecs.BOM_UTF16_LE, "utf-16", "UTF-16"),
+        (codecs.BOM_UTF16_BE, "utf-16", "UTF-16"),
+    ):
+        if content.startswith(mark):
+            try:
+                return content.decode(encoding), label
+            except UnicodeDecodeError as error:
+                line = content.count(b"\n", 0, error.start) + 1
+                faults.add(name, line, None, f"the file begins as {label} and is not; save it as UTF-8 text")
+                return None
+    try:
+        return content.decode("utf-8"), "ASCII" if content.isascii() else "UTF-8"
+    except UnicodeDecodeError:
+        pass
+    try:
+        return content.decode("cp1252"), "Windows-1252"
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        faults.add(
+            name, line, None,
+            f"byte 0x{content[error.start]:02x} is neither UTF-8 nor Windows-1252; save the file as UTF-8 text",
+        )  # fmt: skip
+        return None

@@ -1,0 +1,214 @@
+"""``mapping.toml``: what ``campaign.toml`` has, and for each file of an instrument what its columns are.
+
+Everything but ``[[exports]]``, ``[[runs]]`` and ``[dates]`` is as in ``campaign.toml``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
+
+from monitor.exceptions import did_you_mean
+from monitor.readers.export import ExportFormat
+from monitor.readers.faults import one_of, quoted
+from monitor.readers.foreign_units import foreign_unit, unit_names
+from monitor.readers.mapping.dates import ORDERS, Dates
+from monitor.readers.registry import export_formats
+from monitor.readers.toml_table import Table
+
+FILE = "mapping.toml"
+_OFFSET = re.compile(r"[+-][0-9]{2}:[0-9]{2}|Z")
+#: Columns that this reader numbers itself.
+_NUMBERED = ("run", "sequence")
+#: A scale beyond this is a slip: a mile in micrometres.
+_LARGEST_FACTOR = 2e9
+
+
+@dataclass(frozen=True)
+class ColumnSource:
+    """Where the cells of a column come from: a ``column`` of the file, or a ``constant``.
+
+    Numbers are carried from ``unit`` (None: the file states it), multiplied by ``scale`` and moved by ``shift``; a
+    ``deviation`` is added to the travel of the axes.
+    """
+
+    column: str | None = None
+    constant: str | None = None
+    unit: str | None = None
+    scale: Decimal = Decimal(1)
+    shift: Decimal = Decimal(0)
+    deviation: bool = False
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One ``[[exports]]``: the files that ``pattern`` names, their format, and the source of each campaign's column.
+
+    ``where`` keeps the rows whose cells are those texts; ``positions`` is a file that says where the axes stood;
+    ``interval`` (s) is the time from row to row where no column has it; an ``optional`` entry may have no file.
+    ``table`` is for faults.
+    """
+
+    table: Table
+    pattern: str
+    format: ExportFormat
+    settings: Any
+    setup: str | None
+    run: int
+    columns: Mapping[str, ColumnSource]
+    where: Mapping[str, str]
+    positions: str | None
+    interval: float
+    optional: bool
+
+
+@dataclass(frozen=True)
+class ExportMapping:
+    """What the tables say that ``campaign.toml`` does not have; ``runs`` are the tables [[runs]]."""
+
+    entries: tuple[Entry, ...]
+    runs: tuple[Table, ...]
+    dates: Dates
+
+
+def read_mapping(top: Table) -> ExportMapping:
+    """Read the exports, the runs and how dates are written; what is wrong is noted."""
+    entries = [entry for row in top.tables("exports") if (entry := _entry(row)) is not None]
+    if "exports" not in top.data:
+        top.fault("exports", "the tables [[exports]] are missing: one for each file of an instrument")
+    return ExportMapping(tuple(entries), tuple(top.tables("runs")), _dates(top.table("dates")))
+
+
+def _entry(table: Table) -> Entry | None:
+    before = len(table.faults)
+    pattern = table.text("file", required=True, example='"laser-x*.rtl"')
+    form = _format(table, pattern)
+    setup = table.text("setup", example='"laser-x"')
+    run = table.raw("run", required=False, example="1")
+    if run is not None and (type(run) is not int or run < 0):
+        table.fault("run", f"{quoted(run)} is no run; write a whole number such as 1")
+    interval = table.number("interval_s", positive=True, largest=1e6, unit="s", example="1.0")
+    positions = table.text("positions", example='"positions.csv"')
+    optional = table.raw("optional", required=False, example="true")
+    if optional is not None and not isinstance(optional, bool):
+        table.fault("optional", f"{quoted(optional)} is neither; write true or false")
+    columns = _columns(table.table("columns"))
+    where = _where(table.table("where"))
+    settings = None if form is None else form.settings(table)
+    table.finish()
+    if len(table.faults) > before or pattern is None or form is None:
+        return None
+    defaults = {name: ColumnSource(column) for name, column in form.columns.items() if name not in columns}
+    return Entry(
+        table, pattern, form, settings, setup, 1 if run is None else run, {**defaults, **columns}, where, positions,
+        interval or 1.0, bool(optional),
+    )  # fmt: skip
+
+
+def _format(table: Table, pattern: str | None) -> ExportFormat | None:
+    """Return the format that the mapping names, or the one whose files end so; None with the fault noted."""
+    formats = export_formats()
+    name = table.text("format", example='"table"')
+    if name is not None and name not in formats:
+        table.fault(
+            "format",
+            f"{quoted(name)} is no format; {did_you_mean(name, formats)}the formats are {one_of(formats)}",
+        )
+        return None
+    if name is not None:
+        return formats[name]
+    if "format" in table.data or pattern is None:
+        return None
+    ending = pattern.casefold()
+    by_suffix = [form for form in formats.values() if any(ending.endswith(end) for end in form.suffixes)]
+    if not by_suffix:
+        table.fault(
+            "file", f"the end of {quoted(pattern)} says no format; write format = one of {one_of(formats)}"
+        )
+        return None
+    return by_suffix[0]
+
+
+def _columns(table: Table | None) -> dict[str, ColumnSource]:
+    """Return the source of each column that the mapping names."""
+    if table is None:
+        return {}
+    sources: dict[str, ColumnSource] = {}
+    for name in table.data:
+        value = table.data[name]
+        if name in _NUMBERED:
+            table.raw(name, required=False, example="")
+            table.fault(
+                name, "rows and runs are numbered here; write run = 2 beside file, and leave this out"
+            )
+        elif isinstance(value, dict):
+            inner = table.table(name)
+            source = None if inner is None else _source(inner)
+            if source is not None:
+                sources[name] = source
+        elif isinstance(value, str):
+            column = table.text(name, example='"Position"')
+            if column is not None:
+                sources[name] = ColumnSource(column)
+        else:
+            number = table.number(name, largest=1e9, unit="the unit of the column's name", example="0.0")
+            if number is not None:
+                sources[name] = ColumnSource(constant=repr(number))
+    table.finish()
+    return sources
+
+
+def _source(table: Table) -> ColumnSource | None:
+    before = len(table.faults)
+    column = table.text("column", required=True, example='"Position"')
+    unit = table.text("unit", example='"mm"')
+    if unit is not None and foreign_unit(unit) is None:
+        table.fault("unit", f"{quoted(unit)} is no unit that is known; there are {unit_names()}")
+    sign = table.sign("sign")
+    factor = table.number("factor", largest=_LARGEST_FACTOR, unit="1", example="0.5")
+    if factor == 0.0:
+        table.fault("factor", "0 leaves nothing of the column; write the constant instead")
+    offset = table.number("offset", largest=1e9, unit="the unit of the column's name", example="0.0")
+    deviation = table.raw("deviation", required=False, example="true")
+    if deviation is not None and not isinstance(deviation, bool):
+        table.fault("deviation", f"{quoted(deviation)} is neither; write true or false")
+    table.finish()
+    if len(table.faults) > before:
+        return None
+    scale = Decimal(sign or 1) * Decimal(repr(1.0 if factor is None else factor))
+    return ColumnSource(column, None, unit, scale, Decimal(repr(offset or 0.0)), bool(deviation))
+
+
+def _where(table: Table | None) -> dict[str, str]:
+    if table is None:
+        return {}
+    texts = {name: text for name in table.data if (text := table.text(name, example='"CW"')) is not None}
+    table.finish()
+    return texts
+
+
+def _dates(table: Table | None) -> Dates:
+    if table is None:
+        return Dates()
+    order = table.text("order", example='"day-month-year"')
+    if order is not None and order not in ORDERS:
+        table.fault("order", f"{quoted(order)} is no order; write one of {one_of(ORDERS)}")
+        order = None
+    offset = table.text("utc_offset", example='"+01:00"')
+    if offset is not None and (not _OFFSET.fullmatch(offset) or not _is_offset(offset)):
+        table.fault("utc_offset", f"{quoted(offset)} is no offset from UTC; write for example '+01:00'")
+        offset = None
+    table.finish()
+    return Dates(order, offset)
+
+
+def _is_offset(offset: str) -> bool:
+    try:
+        datetime.fromisoformat(f"2026-01-01T00:00:00{offset}")
+    except ValueError:
+        return False
+    return True

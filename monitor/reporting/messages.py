@@ -1,0 +1,174 @@
+"""What verbs say of what they did, and of what speaks against a certificate or a database: words for numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+
+
+def backup_made(file: Path, tables: int, rows: int) -> str:
+    """Return what is said of a backup."""
+    return f"{file}: {tables} tables, {rows} rows, checked; its manifest lies beside it"
+
+
+def increment_made(file: Path, entries: tuple[int, int], rows: int, previous: str) -> str:
+    """Return what is said of a backup of the ``entries`` of the audit since the ``previous`` one."""
+    first, last = entries
+    what = f"entries {first} to {last} of the audit, {rows} rows" if last >= first else "nothing new"
+    what += f" since {previous}, which has to stay beside it"
+    return f"{file}: {what}, checked; its manifest lies beside it"
+
+
+def backup_restored(file: Path, made_at: str, moment: datetime | None = None) -> str:
+    """Return what is said of a database that was made from a backup (UTC), or as it was at a ``moment``."""
+    if moment is not None:
+        return f"{file} is the database as it was at {moment:%Y-%m-%d %H:%M:%S%z}"
+    return f"{file} is the backup of {made_at} UTC"
+
+
+def restored_up_to(entry: int, files: Sequence[str], *, verified: bool) -> str:
+    """Return up to which entry of the audit and from which files a database was restored; faults may follow."""
+    outcome = "; it was verified" if verified else "; its verification found:"
+    return f", up to entry {entry} of the audit, from {', '.join(files)}{outcome}"
+
+
+def anchor_unknown(anchor: str) -> str:
+    """Return what is said where the audit lacks a hash that was kept elsewhere."""
+    return (
+        f"no entry of the audit has the hash {anchor}, which was kept elsewhere: the database was rewritten since, put "
+        "back to an earlier state, or it is another database"
+    )
+
+
+def campaign_withdrawn(campaign: str) -> str:
+    """Return what is said of a campaign that counts no longer."""
+    return f"{campaign}: withdrawn, it no longer counts; its name is free for the corrected folder"
+
+
+def likenesses_written(out: Path, campaigns: int, machines: int, pattern: tuple[str, str], truth: str) -> str:
+    """Return what is said of campaigns that are like a ``pattern``: its name and its method."""
+    name, method = pattern
+    return f"{out}: {campaigns} campaigns of {machines} machines like {name} ({method}); {truth} has the true values"
+
+
+def virtual_written(out: Path, runs: int, probings: int, hidden: tuple[str, float] | None) -> str:
+    """Return what is said of a virtual campaign in which an effect is ``hidden``, with its peak in µm."""
+    effect = (
+        "nothing is hidden" if hidden is None else f"{hidden[0]} with a peak of {hidden[1]:g} µm is hidden"
+    )
+    return f"{out}: {runs} run{'s' if runs > 1 else ''} of {probings} probings; {effect}"
+
+
+def name_means_another(name: str, label: str, before: int) -> str:
+    """Return the note for other users of a model's name that means another version from now on."""
+    return (
+        f"'{name}' without a version means {label} from now on, for everybody and every campaign; {name}@{before} is "
+        f"what it was (--as NAME leaves {name} alone)"
+    )
+
+
+def not_reproduced(identification: int, difference: str) -> str:
+    """Return what is said of an identification that comes out otherwise when it is computed again."""
+    return f"identification {identification} cannot be reproduced from the stored readings: {difference}"
+
+
+OTHER_RUNS_OR_PARAMETERS = "its runs or parameters are others"
+
+
+def parameter_differs(name: str, run: int, campaign: str, by_u: float) -> str:
+    """Return by how many standard uncertainties a parameter of a run differs."""
+    return f"{name} of run {run} of {campaign} differs by {by_u:.2g} standard uncertainties"
+
+
+THIS_SOFTWARE = "this software"
+
+
+def remade_with_others(others: Mapping[str, tuple[str, str]]) -> str:
+    """Return why a certificate comes out otherwise: versions then and here, by name."""
+    named = ", ".join(f"{name} {then} (here {present})" for name, (then, present) in others.items())
+    return _remade(f"it was made with {named}")
+
+
+def remade_with_other_texts(version: str) -> str:
+    """Return why a certificate comes out otherwise although all versions are the same."""
+    return _remade(f"it was made with the same {version} of this software, but with other templates or texts")
+
+
+def _remade(why: str) -> str:
+    return f"{why}; the stored document is unchanged where `monitor verify` says so"
+
+
+WITHOUT_SIGNATURE = (
+    "the file is not signed, and who names trusted signers asks for a signature of one of them"
+)
+NO_PDF = "it is no PDF"
+DRAFT = "it is a draft"
+ALTERED = "altered, or not from here"
+
+
+def other_hash(sha256: str) -> str:
+    """Return what is said of a file whose hash is not the one noted elsewhere."""
+    return f"the file has the hash {sha256}, not the one noted elsewhere"
+
+
+def other_signer(stated: tuple[str, str], actual: tuple[str, str] | None) -> str:
+    """Return that another signed than the certificate states: name and SHA-256 of each (None: nobody)."""
+    signer = "nobody" if actual is None else f"{actual[0]} ({actual[1]})"
+    return f"the certificate states that {stated[0]} ({stated[1]}) signs it, and {signer} does"
+
+
+def unknown_content(file: str, why: str) -> str:
+    """Return that a file is no certificate of this database."""
+    return f"no certificate of this database has the content of {file}: {why}"
+
+
+def no_longer_valid(number: str, state: str, replaced_by: str | None, reason: str | None) -> str:
+    """Return that a genuine certificate was amended or withdrawn."""
+    replaced = f", replaced by {replaced_by}" if replaced_by else ""
+    return f"certificate {number} is {state}, no longer valid{replaced}: {reason}"
+
+
+def campaign_of_certificate_withdrawn(campaign: str, number: str, why: str) -> str:
+    """Return that the campaign of a certificate counts no longer."""
+    return f"the campaign {campaign}, which certificate {number} rests on, was withdrawn: {why}"
+
+
+def differs_from(number: str, first: int, length: int, genuine: int) -> str:
+    """Return where a document differs from the certificate whose number it bears; lengths in bytes."""
+    return (
+        f"it bears the number {number}, but differs from the document of that certificate from byte {first} on "
+        f"({length} bytes, where the genuine one has {genuine})"
+    )
+
+
+def limits_of_type(machine_type: str) -> str:
+    """Return where the limits of a trend come from, where they are not the campaign's own."""
+    whose = f"the machine type '{machine_type}' in the configuration"
+    return f"limits are those of {whose}: the latest campaign states none"
+
+
+def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
+    """Return which campaigns a trend leaves out, and how to have them."""
+    return (
+        f"not identified by the model that {machine} is followed by, and left out: {', '.join(campaigns)}; type "
+        f"`monitor identify {campaigns[0]}`"
+    )
+
+
+def no_identified_run(machine: str, campaigns: Sequence[str], since: datetime | None) -> str:
+    """Return that a trend has no run."""
+    when = "yet" if since is None else f"since {since:%Y-%m-%d}"
+    campaign = f" of campaign {', '.join(campaigns)}" if campaigns else ""
+    return f"machine {machine} has no identified run{campaign} {when}"
+
+
+def arrived(campaign: str, state: str, arrival: str, size: tuple[int, str], why_not: str | None) -> str:
+    """Return what came to a watched folder: its size as a number of what, and why it is not identified."""
+    what = "identified" if why_not is None else f"NOT identified: {why_not}"
+    return f"{campaign}: {state} from {arrival}, {size[0]} {size[1]}; {what}"
+
+
+def arrival_refused(folder: object) -> str:
+    """Return that a folder was refused."""
+    return f"refused, and left where it is: {folder}"

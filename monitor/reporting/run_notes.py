@@ -1,0 +1,153 @@
+"""What is noted of runs and campaigns whose numbers one should not use as they are: kinds with their numbers.
+
+Sizes are in internal units (mm, rad).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from monitor.documents import Sentence
+from monitor.units import MICROMETRE
+
+
+@dataclass(frozen=True)
+class AxisAt:
+    """The reading of an axis, in degrees where it ``turns``, else in mm."""
+
+    axis: str
+    reading: float
+    turns: bool
+
+    def __str__(self) -> str:
+        return f"{self.axis}={self.reading:.6g}{'°' if self.turns else ' mm'}"
+
+
+@dataclass(frozen=True)
+class GrossReadingNoted(Sentence):
+    """A reading that is wrong beyond doubt: where it stands in the file; ``others`` may be the wrong one instead."""
+
+    run: int
+    sequence: int
+    target_word: str
+    target: str
+    pose: tuple[AxisAt, ...]
+    size: float
+    axis: str
+    others: tuple[int, ...]
+
+    def __str__(self) -> str:
+        stands = f" at {' '.join(map(str, self.pose))}" if self.pose else ""
+        small = abs(self.size) < 0.1
+        size = f"{MICROMETRE.to_display(self.size):+.3g} µm" if small else f"{self.size:+.3g} mm"
+        others = ", ".join(map(str, self.others))
+        instead = f" (or sequence {others}: these readings cannot say which)" if others else ""
+        return (
+            f"run {self.run}: sequence {self.sequence}, {self.target_word} {self.target}{stands}, is off by {size} in "
+            f"{self.axis}{instead}: no number of this run holds; correct or remove the row in probings.csv, withdraw "
+            "the campaign and import it again"
+        )
+
+
+@dataclass(frozen=True)
+class ResidualsNoted(Sentence):
+    """The residuals are ``times`` what the stated uncertainties leave: much more, or far less (below 1)."""
+
+    run: int
+    times: float
+
+    def __str__(self) -> str:
+        if self.times < 1.0:
+            return (
+                f"run {self.run}: the residuals are far smaller than the stated uncertainties leave ({self.times:.1g} "
+                "of it): check the units of the columns and the statement"
+            )
+        return (
+            f"run {self.run}: the residuals are {self.times:.2g} times what the stated uncertainties leave, so u does "
+            "not hold; compare and explain say where the model fails and what is missing"
+        )
+
+
+@dataclass(frozen=True)
+class AngleNoted(Sentence):
+    """A location error of a joint that is more than an error of a machine."""
+
+    run: int
+    parameter: str
+    angle: float
+    joint: str
+
+    def __str__(self) -> str:
+        return (
+            f"run {self.run}: {self.parameter} comes to {math.degrees(self.angle):.2g} degrees, more than an error of "
+            f"a machine: check the zero, the direction and the sign of {self.joint} in campaign.toml"
+        )
+
+
+@dataclass(frozen=True)
+class OffsetNoted(Sentence):
+    """An offset of a joint, ``length`` from the axis before it, that is more than an error of a machine."""
+
+    run: int
+    parameter: str
+    offset: float
+    joint: str
+    length: float
+
+    def __str__(self) -> str:
+        stands = f"{self.length:.4g} mm from the axis before it" if self.length else "on the axis before it"
+        return (
+            f"run {self.run}: {self.parameter} comes to {self.offset:.4g} mm, where campaign.toml puts {self.joint} "
+            f"{stands}: more than an error of a machine; check offset_mm of {self.joint} and of its neighbours, and "
+            "their units"
+        )
+
+
+@dataclass(frozen=True)
+class CopiedRunsNoted(Sentence):
+    """Runs that are equal in every reading because nothing in them is noise: residuals of ``rms``."""
+
+    runs: tuple[tuple[int, ...], ...]
+    rms: float
+
+    def __str__(self) -> str:
+        named = "; ".join(joined_by_and(runs) for runs in self.runs)
+        return (
+            f"runs {named} are equal in every reading, and their residuals ({self.rms * 1e6:.2g} nm) are no "
+            "measurement's: simulated without noise they count as runs, but their scatter means nothing"
+        )
+
+
+@dataclass(frozen=True)
+class SameHoursNoted(Sentence):
+    """Campaigns whose runs are of the same hours, and whose numbers are mixed."""
+
+    campaigns: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return (
+            f"campaigns {joined_by_and(self.campaigns)} hold runs of the same hours, which one machine cannot have "
+            "made; the numbers here mix them: name the one that counts with --campaign"
+        )
+
+
+@dataclass(frozen=True)
+class LeftOutNoted(Sentence):
+    """A campaign that was left out because of another whose time its runs lie in."""
+
+    campaign: str
+    overlapped: str
+
+    def __str__(self) -> str:
+        return (
+            f"campaign {self.campaign} was left out: its runs lie within the time of {self.overlapped}, which was "
+            "imported first"
+        )
+
+
+def joined_by_and(names: Sequence[object]) -> str:
+    """Return names with commas, the last two joined by ``and``."""
+    *first, last = map(str, names)
+    return f"{', '.join(first)} and {last}" if first else last
