@@ -41,6 +41,33 @@ def anchor_unknown(anchor: str) -> str:
     )
 
 
+def only_understood(campaign: str, rows: int, runs: int | None = None) -> str:
+    """Return what is said of a folder that was read and not stored: ``rows`` of a curve, or probings of ``runs``."""
+    counted = f"{rows} rows" if runs is None else f"{runs} run{'' if runs == 1 else 's'}, {rows} probings"
+    return f"{campaign}: understood, {counted}; nothing was stored"
+
+
+def files_archived(folder: Path, files: int, campaigns: int, size: int, before: datetime) -> str:
+    """Return what is said of files, of ``size`` bytes, that were moved into a folder; ``before`` is in UTC."""
+    if not files:
+        return f"nothing was imported before {before:%Y-%m-%d %H:%M:%S} UTC whose files are still in the database"
+    return (
+        f"{folder}: {files} files of {campaigns} campaigns moved there, {size / 1e6:.1f} MB; `monitor audit` says who "
+        "and when, `monitor compact` gives the room back"
+    )
+
+
+def archive_checked(folder: Path, files: int, faults: int) -> str:
+    """Return what is said of archived files that were looked at again."""
+    state = f"{faults} are not as they were" if faults else "each is there with the hash in the database"
+    return f"{folder}: {files} files were archived; {state}"
+
+
+def compacted(file: str | Path, before: int, after: int, rows: int) -> str:
+    """Return what is said of a database file that was written anew: bytes before and after, rows compared."""
+    return f"{file}: {before / 1e6:.1f} MB before, {after / 1e6:.1f} MB now; {rows} rows, all compared"
+
+
 def campaign_withdrawn(campaign: str) -> str:
     """Return what is said of a campaign that counts no longer."""
     return f"{campaign}: withdrawn, it no longer counts; its name is free for the corrected folder"

@@ -232,7 +232,7 @@ def _document(question: str, request: object) -> dict[str, Any]:
     travels = {*travelling(question).incoming, *travelling(question).outgoing}
     for name, why in STAYING.items():
         if name in document and name not in travels:
-            if document[name] is not None:
+            if document[name] not in (None, False):
                 raise InputError(f"this cannot be asked of a server: {why}")
             del document[name]
     for name in (*_LEFT_TO_THE_SERVER, *(name for name in travels if document.get(name) is None)):

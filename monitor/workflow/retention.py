@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from monitor.exceptions import InputError
+from monitor.reporting import messages
 from monitor.store import Database, archive_faults, archive_files, archived_count, check_machine, compact
 
 
@@ -50,21 +51,13 @@ def archive(db: Database, request: ArchiveRequest) -> ArchiveAnswer:
     if request.before is None:
         with db.reading():
             faults, count = tuple(archive_faults(db, request.folder)), archived_count(db)
-        state = (
-            f"{len(faults)} are not as they were" if faults else "each is there with the hash in the database"
-        )
-        message = f"{request.folder}: {count} files were archived; {state}"
+        message = messages.archive_checked(request.folder, count, len(faults))
         return ArchiveAnswer(0, count, 0, message, faults)
     if request.machine is not None:
         check_machine(db, request.machine)
     moment = request.before.astimezone(UTC).replace(tzinfo=None)
     moved = archive_files(db, request.folder, moment, machine=request.machine)
-    message = (
-        f"{request.folder}: {moved.files} files of {moved.campaigns} campaigns moved there, "
-        f"{moved.bytes / 1e6:.1f} MB; `monitor audit` says who and when, `monitor compact` gives the room back"
-        if moved.files
-        else f"nothing was imported before {moment:%Y-%m-%d %H:%M:%S} UTC whose files are still in the database"
-    )
+    message = messages.files_archived(request.folder, moved.files, moved.campaigns, moved.bytes, moment)
     return ArchiveAnswer(moved.campaigns, moved.files, moved.bytes, message)
 
 
@@ -84,8 +77,5 @@ def compact_database(db: Database) -> CompactAnswer:
     if not db.keeps_answers:
         raise InputError(f"{db.path} is a lake: merge its files (docs/scale.md)")
     result = compact(db)
-    message = (
-        f"{db.path}: {result.bytes_before / 1e6:.1f} MB before, {result.bytes_after / 1e6:.1f} MB now; {result.rows} "
-        "rows, all compared"
-    )
+    message = messages.compacted(db.path, result.bytes_before, result.bytes_after, result.rows)
     return CompactAnswer(Path(db.path), result.bytes_before, result.bytes_after, result.rows, message)

@@ -39,7 +39,7 @@ def test_an_unanswered_template_is_refused_with_the_key_of_every_item(typed: Any
     free = {
         ("laboratory", "accreditation"), ("laboratory", "country"), ("laboratory", "language"),
         ("item", "description"), ("item", "identification"), ("traceability", "scale_bar"), ("statements", "title"),
-        ("laboratory", "mark"), ("laboratory", "dcc_version"),
+        ("traceability", "instruments"), ("laboratory", "mark"), ("laboratory", "dcc_version"),
     }  # fmt: skip
     whole = {"accreditation", "standards", "temperature"}
     every = {(section, key) for section, keys in SECTIONS.items() for key in keys if section not in whole}

@@ -109,7 +109,7 @@ def test_too_few_readings(simulated: Callable[..., Any]) -> None:
     rows = campaign.probings.sequence >= 9
     rows &= campaign.probings.sequence <= 18
     with pytest.raises(
-        DataError, match="run 1 of campaign simulated has 31 readings for 34 unknowns; probe more"
+        DataError, match="run 1 of campaign virtual has 31 readings for 34 unknowns; probe more"
     ):
         samba.identify(replace(campaign, probings=campaign.probings.rows(rows)))
 
@@ -117,7 +117,7 @@ def test_too_few_readings(simulated: Callable[..., Any]) -> None:
 def test_a_bar_that_was_never_probed(simulated: Callable[..., Any]) -> None:
     campaign = simulated(1)[1]
     rows = campaign.probings.target != "S2"
-    with pytest.raises(DataError, match="campaign simulated never probed S2 of the scale bar"):
+    with pytest.raises(DataError, match="campaign virtual never probed S2 of the scale bar"):
         samba.identify(replace(campaign, probings=campaign.probings.rows(rows)))
 
 

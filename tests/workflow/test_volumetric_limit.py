@@ -131,4 +131,4 @@ def test_a_report_of_before_the_limit_is_still_read(limited):
     mapped, _, _ = limited
     document = to_document(_Page(stated_map(mapped)))
     assert not {"limit_um", "probability_out"} & set(document["map"])
-    assert from_document(_Page, document).map == stated_map(mapped)
+    assert to_document(from_document(_Page, document)) == document

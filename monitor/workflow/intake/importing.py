@@ -20,6 +20,7 @@ from monitor.readers import (
     understood_tables,
 )
 from monitor.records import Campaign, CurveCampaign
+from monitor.reporting import messages
 from monitor.store import (
     Database,
     Imported,
@@ -173,13 +174,12 @@ def _look(db: Database, source: _Source) -> ImportedFolder:
     campaign = reading.campaign
     if isinstance(campaign, CurveCampaign):
         rows = len(campaign.lines)
-        message = f"{campaign.name}: understood, {rows} rows; nothing was stored"
+        message = messages.only_understood(campaign.name, rows)
         return ImportedFolder(campaign.name, str(source.path), "not stored", 0, 0, rows, (), message)
     runs, probings = len(campaign.runs), len(campaign.probings)
-    counted = f"{runs} run{'' if runs == 1 else 's'}, {probings} probings"
     return ImportedFolder(
         campaign.name, str(source.path), "not stored", runs, probings, None, reading.notes,
-        f"{campaign.name}: understood, {counted}; nothing was stored",
+        messages.only_understood(campaign.name, probings, runs),
         reading.understood or understood_tables(campaign),
     )  # fmt: skip
 
