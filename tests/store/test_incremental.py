@@ -92,6 +92,7 @@ def weeks(
     return folder, states
 
 
+@pytest.mark.slow
 def test_every_backup_of_a_chain_is_the_database_of_its_moment(
     weeks: tuple[Path, list[State]], tmp_path: Path
 ) -> None:
@@ -115,6 +116,17 @@ def test_every_backup_of_a_chain_is_the_database_of_its_moment(
         assert tables(db) == states[2][1]
         assert take_increment(db, folder / "3.duckdb").tables["audit"] == (0, "0")
     assert sorted(path.name for path in tmp_path.glob("*.partial*")) == []
+
+
+def test_the_middle_of_a_chain_is_the_database_of_its_moment(
+    weeks: tuple[Path, list[State]], tmp_path: Path
+) -> None:
+    """All of them, by file and by moment: the slow test above."""
+    folder, states = weeks
+    moment, expected = states[1]
+    assert restore(folder, tmp_path / "back.duckdb", moment).faults == ()
+    with Database(tmp_path / "back.duckdb") as db:
+        assert tables(db) == expected
 
 
 def test_an_incremental_backup_holds_only_what_is_new(

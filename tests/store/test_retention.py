@@ -212,7 +212,7 @@ with SharedDatabase(sys.argv[1]) as db:
     [
         pytest.param("copy_all", marks=pytest.mark.slow),
         pytest.param("sync", marks=pytest.mark.slow),
-        "replace",
+        pytest.param("replace", marks=pytest.mark.slow),
         "sync_folder",
     ],
 )

@@ -175,7 +175,7 @@ def test_the_model_page_draws_the_machine_and_offers_run_pose_driver_and_effect(
     )
     assert answer.status_code in (200, 202)
     if answer.status_code == 200:
-        assert set(answer.json()) == {"effect", "axis", "explained", "remaining"}
+        assert set(answer.json()) == {"effect", "axis", "explained", "motion", "remaining"}
 
 
 def test_two_periods_differ_as_numpy_says(local: Any) -> None:
