@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from monitor.cli.verbs.plan_instruments import tables
 from monitor.exceptions import InputError
 from monitor.methods import InstrumentPlan, campaign_method
 from monitor.methods.instruments.candidates import CandidateTest, Workspace, usual_instruments
@@ -149,6 +150,17 @@ def test_an_axis_of_unknown_stroke_that_stood_still_is_named(tmp_path: Path) -> 
     answer = _plan(tmp_path)
     assert answer.standing == ("Z",)
     assert all(test.axes["z_mm"][0] == test.axes["z_mm"][1] for test in answer.tests)
+
+
+def test_a_parameter_that_no_single_test_gives_a_number_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = _plan(tmp_path)
+    without = tuple(replace(test, u={**test.u, "EX0C": None}) for test in answer.tests)
+    tables(replace(answer, asked=("EX0C",), present={**answer.present, "EX0C": None}, tests=without))
+    assert "no single test gives EX0C a number" in capsys.readouterr().out
+    tables(replace(answer, asked=("EA0C",)))
+    assert "no single test" not in capsys.readouterr().out
 
 
 def test_wanted_uncertainties_are_reached_by_tests_in_turn(tmp_path: Path) -> None:

@@ -26,10 +26,18 @@ def tables(answer: InstrumentPlanAnswer) -> None:
     for number, test in enumerate(answer.proposed, 1):
         u = ", ".join(f"{name} {_u(test.u.get(name))} {answer.units[name]}" for name in shown)
         output.say(f"{number}. {_name(test)}: {where(test)}; then u of {u}")
+    _remarks(answer)
+
+
+def _remarks(answer: InstrumentPlanAnswer) -> None:
+    """What no test moves, what no test sees, and what would see what has no number yet."""
     for axis in answer.standing:
         output.say(
             f"{axis} stood still and has no stroke in the machine file, so no test moves it; state its stroke_mm"
         )
+    for name in answer.asked:
+        if all(u.get(name) is None for u in (answer.present, *(test.u for test in answer.tests))):
+            output.say(f"no single test gives {name} a number; `monitor identify` says why it has none")
     for parameter in answer.unseen:
         output.say(
             f"{parameter.parameter} has no number yet: {_name(parameter.test)} would give it u = {parameter.u:.2g} "
