@@ -86,6 +86,11 @@ class MeasuredChain(ABC):
         return np.ones(self.sigma.shape, dtype=bool)
 
     @property
+    def series(self) -> npt.NDArray[np.int64]:
+        """Which series (n,) a row belongs to: readings resemble those of one instrument before them, no others."""
+        return np.zeros(len(self.context), dtype=np.int64)
+
+    @property
     def read_columns(self) -> tuple[str, ...]:
         """The recorded columns that are the readings, where ``with_read`` changes them; none for other methods."""
         return ()
