@@ -36,6 +36,11 @@ def _remarks(answer: InstrumentPlanAnswer) -> None:
         output.say(
             f"{axis} stood still and has no stroke in the machine file, so no test moves it; state its stroke_mm"
         )
+    for axis in answer.not_turned:
+        output.say(
+            f"no R-test and no bar around {axis}: the linear axes would have to travel further than they did; state "
+            "stroke_mm of those that can"
+        )
     for name in answer.asked:
         if all(u.get(name) is None for u in (answer.present, *(test.u for test in answer.tests))):
             output.say(f"no single test gives {name} a number; {_pair(answer.pairs.get(name))}")

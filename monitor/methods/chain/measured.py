@@ -183,6 +183,11 @@ class MeasuredChain(ABC):
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         return of_balls(drivers)
 
+    @property
+    def unsettled(self) -> str:
+        """What may keep a fit from settling, as the end of a refusal; empty where nothing is known to."""
+        return ""
+
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""
         return None

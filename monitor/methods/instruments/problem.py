@@ -17,6 +17,7 @@ from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, in_mm
+from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -141,6 +142,24 @@ class InstrumentProblem(ChainProblem):
             measured[np.isnan(part.rows.measured)] = np.nan
             parts.append(replace(part, rows=replace(part.rows, measured=measured)))
         return replace(self, parts=tuple(parts))
+
+    @cached_property
+    def bars_of_one_direction(self) -> tuple[str, ...]:
+        """Setups whose bar kept one direction, so that its centre is held across it where it was stated."""
+        return tuple(
+            part.id
+            for part in self.parts
+            if isinstance(part.reading, DistanceReading) and part.reading.keeps_one_direction
+        )
+
+    @property
+    def unsettled(self) -> str:
+        """Bars that kept one direction: a centre that is stated some millimetres wrong cannot be mended then."""
+        return "".join(
+            f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
+            "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
+            for name in self.bars_of_one_direction
+        )
 
     @property
     def largest_error(self) -> float:

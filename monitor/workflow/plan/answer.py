@@ -176,6 +176,7 @@ class InstrumentPlanAnswer:
     to it leave; ``unseen`` what has no number yet, with the test that would see it. ``standing`` are linear axes that
     stood still and have no stroke in the machine file, so that no test moves them. ``pairs`` are two tests for each
     asked parameter that no single test gives a number, the second with what both leave; none where no pair does.
+    ``not_turned`` are rotary axes that no test turns, because bar and sphere would leave the strokes.
     """
 
     campaign: str
@@ -191,6 +192,7 @@ class InstrumentPlanAnswer:
     unseen: tuple[UnseenParameter, ...]
     standing: tuple[str, ...]
     pairs: Mapping[str, tuple[TestAnswer, ...]] = field(default_factory=dict)
+    not_turned: tuple[str, ...] = ()
 
 
 PlanAnswer = BallPlanAnswer | AnglePlanAnswer | InstrumentPlanAnswer

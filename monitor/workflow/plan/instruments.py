@@ -66,6 +66,7 @@ def plan_instruments(
         unseen=unseen(forecast, joints, present, expected),
         standing=tuple(joint.name for joint in joints if _stands(campaign, joint)),
         pairs=_pairs(forecast, present, expected, asked, joints) if _names_some(request) else {},
+        not_turned=_not_turned(joints, expected),
     )
 
 
@@ -162,6 +163,16 @@ def _stands(campaign: Campaign, joint: Joint) -> bool:
     settings = campaign.machine.axes.get(joint.name)
     is_stated = settings is not None and settings.stroke is not None
     return not joint.turns and not is_stated and np.ptp(campaign.probings.readings[joint.name]) == 0.0
+
+
+def _not_turned(joints: Sequence[Joint], expected: Sequence[ExpectedTest]) -> tuple[str, ...]:
+    """The rotary axes around which no bar or sphere can be followed within the strokes."""
+    followed = [test.test for test in expected if test.test.setup.reading in PLACED]
+    return tuple(
+        joint.name
+        for index, joint in enumerate(joints)
+        if joint.kind == "rotary" and not any(np.ptp(test.positions[:, index]) > 0.0 for test in followed)
+    )
 
 
 def forecast_of(

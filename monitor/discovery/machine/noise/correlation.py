@@ -314,7 +314,10 @@ class NoiseDesign:
         if rows.turned is not None:
             readings = rows.turned[self._runs] @ readings
         readings = np.where(self._weighted[..., None, None], readings, 0.0)
-        return readings.reshape(runs, touches, -1), numbers[:, rows.count :]
+        rest = numbers[:, rows.count :]
+        # What setups state (the length of a bar) may contradict another instrument: that is no noise of readings, and
+        # would be taken for an offset of all readings of the setup, noise that hardly changes.
+        return readings.reshape(runs, touches, -1), rest if rows.begins is None else rest[:, :0]
 
     def _resemblance(self, readings: Array) -> float:
         """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
