@@ -36,13 +36,20 @@ def changes_of(instruments: InstrumentRows, drivers: Iterable[str]) -> Iterator[
     drivers = tuple(drivers)
     for kind in built_in(__name__):
         assert issubclass(kind, InstrumentChange)
-        able = [setup for setup in instruments.setups if setup.kind in kind.kinds]
-        counts = Counter(setup.instrument for setup in able if setup.instrument and kind.of_instruments)
-        several = [name for name, count in counts.items() if count > 1]
-        single = [setup.id for setup in able if setup.instrument not in several]
-        if not kind.needs_driver:
-            names = [setup.id for setup in able] if kind.also_single else single
-            yield from (f"instrument:{name}:{kind.word}" for name in (*names, *several))
-        if kind.needs_driver or kind.of_instruments:
-            for driver in drivers:
-                yield from (f"instrument:{name}:{kind.word}@{driver}" for name in (*single, *several))
+        yield from _of_kind(kind, instruments, drivers)
+
+
+def _of_kind(
+    kind: type[InstrumentChange], instruments: InstrumentRows, drivers: tuple[str, ...]
+) -> Iterator[str]:
+    """One change of all setups that may have it, by itself and with each driver."""
+    able = [setup for setup in instruments.setups if setup.kind in kind.kinds]
+    counts = Counter(setup.instrument for setup in able if setup.instrument and kind.of_instruments)
+    several = [name for name, count in counts.items() if count > 1]
+    single = [setup.id for setup in able if setup.instrument not in several]
+    if not kind.needs_driver:
+        names = [setup.id for setup in able] if kind.also_single else single
+        yield from (f"instrument:{name}:{kind.word}" for name in (*names, *several))
+    if kind.needs_driver or kind.of_instruments:
+        for driver in drivers:
+            yield from (f"instrument:{name}:{kind.word}@{driver}" for name in (*single, *several))
