@@ -7,6 +7,7 @@ tried here. Which module may need what only POSIX has is read from the syntax tr
 from __future__ import annotations
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -60,6 +61,8 @@ def as_on_windows(event, arguments):
             # What is removed by the number of its folder is a temporary folder of Python's own.
             if not (event == "os.remove" and arguments[1] != -1) and is_open(path):
                 raise PermissionError(errno.EACCES, "the process has it open", os.fspath(path))
+        if event == "os.rename" and os.path.isdir(arguments[1]):
+            raise PermissionError(errno.EACCES, "a folder is there", os.fspath(arguments[1]))
     elif event in ("open", "os.mkdir") and isinstance(arguments[0], (str, bytes)):
         path = os.fsdecode(arguments[0])
         makes = event == "os.mkdir" or (arguments[2] or 0) & posix_os["O_CREAT"]
@@ -112,17 +115,38 @@ def typed(folder: Path, *words: str) -> str:
 
 
 VERBS = """watch in --once --rest 0 then campaigns then backup 1.duckdb then archive away --before 2099-01-01
-    then compact then --db again.duckdb restore 1.duckdb then export e.csv"""
+    then compact then --db again.duckdb restore 1.duckdb then export tables"""
 
 
 def test_without_posix_campaigns_are_watched_and_read_and_files_are_copied(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
+    (tmp_path / "tables").mkdir()
     (tmp_path / "in" / "load-cell").symlink_to(EXAMPLES / "load-cell")
     said = typed(tmp_path, *VERBS.split())
     assert "load-cell: imported" in said
     assert (tmp_path / "again.duckdb").is_file()
     assert list((tmp_path / "away").rglob("data.csv"))
+    assert (tmp_path / "tables" / "v_campaigns.csv").is_file()
     assert not list(tmp_path.rglob("*.lock")) + list(tmp_path.rglob("*.partial"))
+
+
+SLOW_VERBS = """import five then uncertainty five-days --run 20 --method guf then
+    certificate issue five-days --run 20 --laboratory five/laboratory.toml --number K:1 --out certificates then
+    certificate issue five-days --run 19 --laboratory five/laboratory.toml --out one.pdf then
+    report --week 2026-W10 --workers 2 --out report then standards laser --figures figures --csv figures.csv"""
+
+
+@pytest.mark.slow
+def test_without_posix_certificates_and_reports_are_written(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES / "five-days", tmp_path / "five")
+    shutil.copy(EXAMPLES / "laboratory.toml", tmp_path / "five" / "laboratory.toml")
+    shutil.copytree(EXAMPLES / "laser", tmp_path / "laser")
+    typed(tmp_path, "import", "laser", "then", *SLOW_VERBS.split())
+    assert [file.name for file in (tmp_path / "certificates").iterdir()] == ["certificate-K-1.pdf"]
+    assert (tmp_path / "one.pdf").is_file()
+    assert (tmp_path / "report" / "health-2026-W10.pdf").is_file()
+    assert list((tmp_path / "figures").glob("*.svg"))
+    assert not list(tmp_path.rglob("*.part"))
 
 
 def posix_uses(tree: ast.AST) -> Iterator[tuple[int, str]]:
