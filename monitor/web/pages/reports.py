@@ -14,8 +14,8 @@ from starlette.responses import RedirectResponse, Response
 from monitor.exceptions import InputError, MonitorError
 from monitor.store import CampaignRow
 from monitor.web.desk import Ticket
-from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
+from monitor.web.sending import attachment
 
 if TYPE_CHECKING:
     from monitor.workflow.health.request import ReportAnswer
