@@ -21,7 +21,7 @@ from monitor.workflow.plan.answer import (
     Pose,
 )
 from monitor.workflow.plan.plan import plan
-from monitor.workflow.plan.request import PlanRequest
+from monitor.workflow.plan.request import PlanRequest, two_effects
 
 EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:poly2"
 
@@ -68,26 +68,11 @@ def _wanted(texts: list[str]) -> dict[str, float]:
     return wanted
 
 
-def _separate(text: str | None) -> tuple[str, str] | None:
-    """Two effects; a comma inside brackets belongs to a formula."""
-    if text is None:
-        return None
-    parts, depth = [""], 0
-    for letter in text:
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    if len(parts) != 2 or not all(part.strip() for part in parts):
-        raise InputError(f"--separate {text}: name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
-    return parts[0].strip(), parts[1].strip()
-
-
 def run(options: Namespace) -> int:
     request = PlanRequest(
         options.campaign, options.model, options.balls, options.poses, _wanted(options.wanted),
-        _separate(options.separate), figures=options.figures, parameters=tuple(options.parameters),
+        None if options.separate is None else two_effects(options.separate), figures=options.figures,
+        parameters=tuple(options.parameters),
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("planning"):

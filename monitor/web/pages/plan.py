@@ -27,6 +27,7 @@ def routes() -> APIRouter:
         """Weigh the plan of a campaign, and the one that the form asks for."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
+        from monitor.workflow.plan.request import two_effects
 
         query = request.query_params
         document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
@@ -35,7 +36,7 @@ def routes() -> APIRouter:
         if keep:
             document["keep"] = keep
         if separate:
-            document["separate"] = _pair(separate)
+            document["separate"] = two_effects(separate)
         ticket = request.app.state.desk.ask(request.state.user, "plan", document)
         answer, refusal = None, ""
         try:
@@ -72,17 +73,3 @@ def _wanted(query: Mapping[str, str]) -> dict[str, dict[str, float]]:
                 raise InputError(f"the wanted uncertainty of {name} is a positive number, not '{text}'")
             wanted[field.removeprefix(WANTED)] = value
     return {"wanted": wanted} if wanted else {}
-
-
-def _pair(text: str) -> list[str]:
-    """Two effects with a comma between them; one inside brackets belongs to a formula."""
-    depth, parts = 0, [""]
-    for letter in text:
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    if len(parts) != 2 or not all(part.strip() for part in parts):
-        raise InputError(f"'{text}': name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
-    return [part.strip() for part in parts]
