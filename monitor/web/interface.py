@@ -57,7 +57,7 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
         user: User = request.state.user
         try:
             check_role(user, question)
-            with tempfile.SpooledTemporaryFile(max_size=_SMALL, dir=working_folder) as content:
+            with tempfile.SpooledTemporaryFile(max_size=_SMALL, dir=str(working_folder)) as content:
                 body = await read_body(request, question, content)
                 return await run_in_threadpool(_answered, asker, user, question, body, working_folder)
         except Exception as error:
