@@ -55,7 +55,7 @@ def covariance_root(covariance: Array, tolerance: float = RANK_TOLERANCE) -> Cov
     if len(values) and values[0] < -max(tolerance, 1e-9) * max(largest, 1e-300):
         raise DataError(
             f"the covariance matrix is not positive semidefinite: its correlation matrix has the eigenvalue "
-            f"{values[0]:.3g}; project it first (nearest_correlation)"
+            f"{values[0]:.3g}, and none may be negative"
         )
     significant = values > tolerance * largest
     lengths = np.sqrt(values[significant])
