@@ -21,7 +21,7 @@ from monitor.workflow.plan.answer import (
     Pose,
 )
 from monitor.workflow.plan.plan import plan
-from monitor.workflow.plan.request import PlanRequest, two_effects
+from monitor.workflow.plan.request import PlanRequest
 
 EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:poly2"
 
@@ -71,7 +71,7 @@ def _wanted(texts: list[str]) -> dict[str, float]:
 def run(options: Namespace) -> int:
     request = PlanRequest(
         options.campaign, options.model, options.balls, options.poses, _wanted(options.wanted),
-        None if options.separate is None else two_effects(options.separate), figures=options.figures,
+        None if options.separate is None else PlanRequest.two_effects(options.separate), figures=options.figures,
         parameters=tuple(options.parameters),
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.

@@ -27,7 +27,7 @@ def routes() -> APIRouter:
         """Weigh the plan of a campaign, and the one that the form asks for."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
-        from monitor.workflow.plan.request import two_effects
+        from monitor.workflow.plan.request import PlanRequest
 
         query = request.query_params
         document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
@@ -36,7 +36,7 @@ def routes() -> APIRouter:
         if keep:
             document["keep"] = keep
         if separate:
-            document["separate"] = two_effects(separate)
+            document["separate"] = PlanRequest.two_effects(separate)
         ticket = request.app.state.desk.ask(request.state.user, "plan", document)
         answer, refusal = None, ""
         try:
