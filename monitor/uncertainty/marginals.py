@@ -77,19 +77,24 @@ class StudentT:
 
 
 @dataclass(frozen=True)
-class Rectangular:
-    """Equally likely between ``low`` and ``high`` (JCGM 101 6.4.2)."""
+class _Limited:
+    """A symmetric distribution between ``low`` and ``high``."""
 
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        _limits("rectangular", self.low, self.high)
+        _limits(type(self).__name__.lower(), self.low, self.high)
 
     @property
     def mean(self) -> float:
         """The middle."""
         return 0.5 * (self.low + self.high)
+
+
+@dataclass(frozen=True)
+class Rectangular(_Limited):
+    """Equally likely between ``low`` and ``high`` (JCGM 101 6.4.2)."""
 
     @property
     def std(self) -> float:
@@ -102,19 +107,8 @@ class Rectangular:
 
 
 @dataclass(frozen=True)
-class Triangular:
+class Triangular(_Limited):
     """Symmetric triangle between ``low`` and ``high`` (JCGM 101 6.4.5)."""
-
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _limits("triangular", self.low, self.high)
-
-    @property
-    def mean(self) -> float:
-        """The middle."""
-        return 0.5 * (self.low + self.high)
 
     @property
     def std(self) -> float:
@@ -129,19 +123,8 @@ class Triangular:
 
 
 @dataclass(frozen=True)
-class Arcsine:
+class Arcsine(_Limited):
     """U-shaped between ``low`` and ``high``: a sine of unknown phase (JCGM 101 6.4.6)."""
-
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _limits("arcsine", self.low, self.high)
-
-    @property
-    def mean(self) -> float:
-        """The middle."""
-        return 0.5 * (self.low + self.high)
 
     @property
     def std(self) -> float:

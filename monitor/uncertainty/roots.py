@@ -109,3 +109,24 @@ def correlation_of(covariance: Array) -> Array:
     correlation = np.asarray(covariance / np.outer(safe, safe))
     np.fill_diagonal(correlation, 1.0)
     return correlation
+
+
+class WithCovariance:
+    """What follows from the ``covariance`` (m, m) of a result's outputs."""
+
+    covariance: Array
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties (m,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix (m, m)."""
+        return correlation_of(self.covariance)
+
+    @property
+    def lambda_max(self) -> float:
+        """The largest eigenvalue of the correlation matrix."""
+        return float(np.linalg.eigvalsh(self.correlation)[-1])

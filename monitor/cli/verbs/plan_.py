@@ -7,7 +7,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.residual_output import files
 from monitor.cli.screen import on_screen
 from monitor.cli.verbs import plan_angles, plan_instruments
@@ -29,11 +29,7 @@ EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN", help="whose machine, artefact and plan are the start")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--balls", type=int, metavar="N", help="the best N balls (1 to 24; places for more are proposed)"
     )

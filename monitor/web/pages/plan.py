@@ -9,7 +9,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from monitor.exceptions import InputError, MonitorError
+from monitor.exceptions import InputError
 from monitor.web.charts.plan import plan_chart
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
@@ -38,11 +38,7 @@ def routes() -> APIRouter:
         if separate:
             document["separate"] = PlanRequest.two_effects(separate)
         ticket = request.app.state.desk.ask(request.state.user, "plan", document)
-        answer, refusal = None, ""
-        try:
-            answer = ticket.answer()
-        except MonitorError as error:
-            refusal = str(error)
+        answer, refusal = ticket.outcome()
         return page(
             request, "plan.html",
             campaign=campaign, model=model, answer=answer, refusal=refusal, asked=document, separate=separate,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import InputError, MonitorError
+from monitor.exceptions import InputError
 from monitor.store import CampaignRow
 from monitor.web.desk import Ticket
 from monitor.web.rendering import link, page
@@ -34,10 +34,7 @@ def routes() -> APIRouter:
         answer, ticket, refusal = None, None, ""
         if week:
             ticket = _asked(request, week, machine)
-            try:
-                answer = ticket.answer()
-            except MonitorError as error:
-                refusal = str(error)
+            answer, refusal = ticket.outcome()
         campaigns = request.app.state.asker(request.state.user, "campaigns").campaigns
         return page(
             request, "reports.html",
