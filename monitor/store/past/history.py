@@ -195,9 +195,7 @@ def _read(
         campaigns={number: name for number, (name, _) in campaigns.items()},
         campaign=np.array([run.campaign for run in runs], dtype=np.str_),
         method=np.array([run.method for run in runs], dtype=np.str_),
-        measured_by=np.array(
-            [run.method + instruments.get(run.campaign_id, "") for run in runs], dtype=np.str_
-        ),
+        measured_by=_measured_by(db, runs),
         run=np.array([run.run for run in runs], dtype=np.int64),
         started_at=tuple(run.started_at for run in runs),
         day=np.array([run.day for run in runs], dtype=np.int64),
