@@ -31,6 +31,7 @@ GROUND = {
     "bounded",
     "stopping",
     "on_demand",
+    "group_sums",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

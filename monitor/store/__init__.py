@@ -379,7 +379,7 @@ else:
             "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
             "load_certificate mark_certificate save_certificate",
             "connection": "Database",
-            "copies.backup": "snapshot take_backup",
+            "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
             "copies.export": "export_tables",
             "copies.increment": "take_increment",

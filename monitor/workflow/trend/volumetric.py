@@ -17,6 +17,7 @@ from monitor import statistics
 from monitor.exceptions import DataError
 from monitor.records import VOLUMETRIC, Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
+from monitor.reporting.origins import ForecastMethod
 from monitor.statistics.trend import Trend, trend
 from monitor.store import Database, MachineHistory, latest_maps, load_campaign
 from monitor.units import DAYS_PER_YEAR, MICROMETRE
@@ -28,10 +29,6 @@ from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
 
 #: Times between the begin of the drifts and now at which the error is compared with its limit, for the day since when.
 SINCE_STEPS = 400
-METHOD = (
-    "all parameters extrapolated together, each by its drift since its last change, correlated as the days are; "
-    "simulated"
-)
 
 
 @dataclass(frozen=True)
@@ -238,7 +235,7 @@ def volumetric_forecast(
     limit = history.tolerances.get(VOLUMETRIC) if question.limit_um is None else question.limit_um
     offset = next(iter(drifts.values())).piece.offset
     none = VolumetricForecast(
-        limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None,
+        limit_um=limit, next_check=date(question.check, offset), method=ForecastMethod.ALL_PARAMETERS, why=None,
         mapped_um=None if limit is None else latest_maps(db, history.machine).get(history.machine),
     )  # fmt: skip
     if limit is None:
