@@ -214,6 +214,7 @@ def test_no_page_but_the_last_is_more_than_half_empty() -> None:
         assert min(y for y in lowest if y > 60.0) < 0.5 * float(page.mediabox.height)
 
 
+@pytest.mark.slow
 def test_a_short_report_is_set_closer_where_that_saves_an_almost_empty_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

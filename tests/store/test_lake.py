@@ -111,6 +111,7 @@ def test_every_table_of_a_plant_is_published_or_said_not_to_be() -> None:
     assert not tables & set(LAKE_TABLES)
 
 
+@pytest.mark.slow
 def test_a_lake_answers_as_one_file_with_the_same_campaigns(plants: dict[str, Path], lake: str) -> None:
     for plant in ("Ulm", "Aalen"):
         done = published(plants[plant], lake, plant=plant)
