@@ -110,6 +110,7 @@ class Ground:
         vectors = residual[:, : 3 * most].reshape(len(residual), most, 3)[run, row]
         fit.__dict__["vectors"] = vectors * fit.problem.sigma
         fit.__dict__["by_error"] = self.plan.fit.by_error
+        fit.__dict__["noise_design"] = self.plan.fit.noise_design
         return fit
 
     def stated(self, noise: np.ndarray, more: np.ndarray) -> tuple[bool, float, np.ndarray]:
