@@ -46,9 +46,7 @@ def lines_of(page: pypdf.PageObject) -> list[Line]:
             pieces.setdefault(round(y), []).append((x, text.strip()))
 
     page.extract_text(visitor_text=note)
-    return [
-        Line(" ".join(text for _, text in sorted(pieces[y])), y) for y in sorted(pieces, reverse=True)
-    ]
+    return [Line(" ".join(text for _, text in sorted(pieces[y])), y) for y in sorted(pieces, reverse=True)]
 
 
 def faults_of(pdf: bytes, heads: tuple[str, ...] = ()) -> list[str]:
@@ -59,7 +57,9 @@ def faults_of(pdf: bytes, heads: tuple[str, ...] = ()) -> list[str]:
         lines = lines_of(page)
         lowest = lines[-1].y / float(page.mediabox.height)
         if lowest > 0.5 and len(reader.pages) > 1:
-            faults.append(f"page {number} of {len(reader.pages)} is more than half empty: ends at {1 - lowest:.2f}")
+            faults.append(
+                f"page {number} of {len(reader.pages)} is more than half empty: ends at {1 - lowest:.2f}"
+            )
         if lines[-1].text.startswith(heads or ("Symbol", "Machine  ")):
             faults.append(f"page {number} ends with the head {lines[-1].text!r}")
     return faults
@@ -80,9 +80,7 @@ def with_budget(result: ResultSet, lines: int = 2) -> ResultSet:
 
 
 EVERY = [
-    pytest.param(
-        count, maps, language, marks=() if (count, maps, language) in QUICK else pytest.mark.slow
-    )
+    pytest.param(count, maps, language, marks=() if (count, maps, language) in QUICK else pytest.mark.slow)
     for count in (1, 13, 51, 149)
     for maps in (0, 1)
     for language in ("en", "de")
@@ -109,7 +107,9 @@ def of_lengths(count: int) -> list[MachineHealth]:
     return machines
 
 
-@pytest.mark.parametrize("count", [1, 12, *(pytest.param(count, marks=pytest.mark.slow) for count in (2, 3, 5, 40))])
+@pytest.mark.parametrize(
+    "count", [1, 12, *(pytest.param(count, marks=pytest.mark.slow) for count in (2, 3, 5, 40))]
+)
 def test_no_page_of_a_report_is_more_than_half_empty(count: int) -> None:
     assert faults_of(health_pdf(*first_page.fleet(*of_lengths(count)))) == []
 

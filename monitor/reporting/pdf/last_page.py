@@ -1,4 +1,4 @@
-"""Keeps the last page of a document from being more than half empty: by breaks before it that leave each page half full.
+"""Keeps the last page of a document from being more than half empty, by breaks that leave each page half full.
 
 A template marks what may begin a page by ids that start with ``break-`` (or ``machine-``), and its end by the id
 ``end``. WeasyPrint tells where these stand; the document is then laid out once more with one or two breaks set by hand.
@@ -49,7 +49,9 @@ def _breaks(document: Document, count: int) -> tuple[str, ...]:
     begins, end = _strip(document, count + 1)
     best: tuple[float, tuple[str, ...]] = (0.0, ())
     for names in combinations(begins, count):
-        heights = [after - before for before, after in pairwise([0.0, *(begins[name] for name in names), end])]
+        heights = [
+            after - before for before, after in pairwise([0.0, *(begins[name] for name in names), end])
+        ]
         if max(heights) <= _ROOM:
             best = max(best, (min(heights), names))
     return best[1] if best[0] + _MARGIN >= _HALF else ()

@@ -26,6 +26,7 @@ from monitor.reporting.certificate.data import Attached, certificate_files
 from monitor.reporting.certificate.page import certificate_context
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.tables import LETTERS_PT
+from monitor.reporting.pdf.last_page import ends_early, filling_breaks, with_breaks_before
 from monitor.reporting.pdf.layout_engine import (
     HTML,
     Attachment,
@@ -35,7 +36,6 @@ from monitor.reporting.pdf.layout_engine import (
     URLFetcher,
     URLFetcherResponse,
 )
-from monitor.reporting.pdf.last_page import ends_early, filling_breaks, with_breaks_before
 from monitor.reporting.resources import FONT_FILES, font_bytes, report_text
 from monitor.reporting.svg.letter_widths import in_mm
 from monitor.reporting.texts import with_subscripts
