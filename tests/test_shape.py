@@ -8,6 +8,7 @@ for every set of types costs more to read than the branches do.
 from __future__ import annotations
 
 import ast
+import functools
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -49,10 +50,20 @@ _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def parsed(package: Path) -> Iterator[tuple[str, ast.Module]]:
-    """Yield the path of every file below the package, and its syntax tree."""
-    for path in sorted(package.rglob("*.py")):
-        yield path.relative_to(package).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+@functools.cache
+def parsed(package: Path) -> list[tuple[str, ast.Module]]:
+    """Return the path of every file below the package, and its syntax tree."""
+    return [
+        (path.relative_to(package).as_posix(), ast.parse(path.read_text(encoding="utf-8")))
+        for path in sorted(package.rglob("*.py"))
+    ]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_longer_parsed() -> Iterator[None]:
+    """Forget the syntax trees: those of the whole package are large, and nobody else asks for them."""
+    yield
+    parsed.cache_clear()
 
 
 def functions(package: Path) -> Iterator[tuple[str, Function]]:

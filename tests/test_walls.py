@@ -30,6 +30,7 @@ GROUND = {
     "sources",
     "bounded",
     "stopping",
+    "group_sums",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.
@@ -120,7 +121,10 @@ def _imported(path: Path, package: Path) -> Iterator[tuple[int, str]]:
 
 def named_in_strings(path: Path) -> Iterator[tuple[int, str]]:
     """Line and value of every string that is a dotted name of the package, as ``import_module`` would take it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
+    source = path.read_text(encoding="utf-8")
+    if not re.search(r"[\"']monitor\.", source):
+        return
+    for node in ast.walk(ast.parse(source, filename=str(path))):
         if (
             isinstance(node, ast.Constant)
             and isinstance(node.value, str)
@@ -279,7 +283,7 @@ def test_house_every_room_starts_with_what_it_is_for() -> None:
     silent = [
         str(path.relative_to(PACKAGE))
         for path in sorted(PACKAGE.rglob("*.py"))
-        if not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+        if not path.read_text(encoding="utf-8").startswith('"""')
     ]
     assert silent == []
 

@@ -69,6 +69,7 @@ def test_parameters_are_those_that_the_command_line_prints(
     assert len(rows) == sum(len(run["parameters"]) for run in runs)
 
 
+@pytest.mark.slow
 def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: Path) -> None:
     campaign = db.campaign(HIDDEN)
     answer = campaign.explain()

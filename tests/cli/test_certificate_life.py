@@ -14,6 +14,7 @@ def text_of(file: Path) -> str:
     return "\n".join(page.extract_text() for page in pypdf.PdfReader(file).pages)
 
 
+@pytest.mark.slow
 def test_withdrawn_is_no_longer_valid_and_says_why(typed: Any, issued: Any) -> None:
     answer = typed(
         "certificate", "withdraw", "2026-0001", "--reason", 'the bar\'s "damage"', "--json", db=issued.db
@@ -32,6 +33,7 @@ def test_withdrawn_is_no_longer_valid_and_says_why(typed: Any, issued: Any) -> N
     assert "certificate 2026-0001 is withdrawn; that is final" in again.err
 
 
+@pytest.mark.slow
 def test_17025_7_8_8_amending_issues_a_new_certificate_that_names_the_old(
     typed: Any, issued: Any, laboratory: Path
 ) -> None:
@@ -56,6 +58,7 @@ def test_17025_7_8_8_amending_issues_a_new_certificate_that_names_the_old(
     assert "certificate 2026-0001 is amended; only an issued one can be replaced" in again.err
 
 
+@pytest.mark.slow
 def test_a_draft_says_so_on_paper_and_when_verified(
     typed: Any, db: Path, laboratory: Path, pdf_unread: Any
 ) -> None:

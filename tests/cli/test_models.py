@@ -89,6 +89,7 @@ def test_a_model_that_cannot_be_shown_on_its_campaign_is_not_kept(typed: Any, db
     ]
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_readings_do_not_determine_is_to_blame_not_the_file(typed: Any, db: Path) -> None:
     answer = typed(
         "model", "add", "EZC1:const@warmup", "--to", "samba", "--as", "m", "--campaign", "five-days", db=db

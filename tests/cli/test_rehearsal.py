@@ -33,6 +33,7 @@ def test_simulate_is_reproducible_by_its_seed(typed: Any) -> None:
     assert files(Path("a/v"))["probings.csv"] != files(Path("c/v"))["probings.csv"]
 
 
+@pytest.mark.slow
 def test_a_virtual_campaign_is_imported_and_its_effect_found(typed: Any, tmp_path: Path) -> None:
     said = typed("simulate", "my rehearsal", "--effect", "EBB:harmonic2", "--peak", 6, "--seed", 7)
     assert said.out == "my rehearsal: 20 runs of 62 probings; EBB:harmonic2 with a peak of 6 µm is hidden\n"

@@ -43,6 +43,7 @@ def curve(script: Any, tmp_path: Path) -> Any:
     return read
 
 
+@pytest.mark.slow
 def test_pontius_line_lacks_the_quadratic_and_nothing_further(told: dict[str, Any]) -> None:
     before, after = told["pontius"].history
     # e-Handbook 4.6.1.5 prints 214.7464 from rounded sums; the data give 214.7469.

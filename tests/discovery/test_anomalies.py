@@ -98,6 +98,7 @@ def test_a_ball_that_moved_between_runs_is_a_step_of_that_ball_alone(virtual_cam
     assert answer.moves == ()
 
 
+@pytest.mark.slow
 def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns, explained):
     """No recorded column follows it, and no bad points or moved balls are invented."""
     sim = simulator()

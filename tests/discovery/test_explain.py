@@ -78,6 +78,7 @@ def test_growth_of_the_artefact_is_not_told_as_that_of_two_axes(virtual_campaign
     assert {one.effect for one in answer.missing} == {one.name for one in hidden}
 
 
+@pytest.mark.slow
 def test_the_plain_effect_leads_where_a_driver_hardly_varies(virtual_campaigns, explained):
     """Ambient less 20 °C varies by a tenth of itself: on few runs the two are the same, and both are told."""
     sim = simulator()
@@ -189,6 +190,7 @@ def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campai
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
+@pytest.mark.slow
 def test_rates_over_forty_small_campaigns(virtual_campaigns, explained, seeds):
     """Nothing hidden, four runs: at 2 % a campaign, five or more alarms in 40, three in ten are a chance of 1e-3."""
     campaigns = seeds(40, 10)
@@ -199,6 +201,7 @@ def test_rates_over_forty_small_campaigns(virtual_campaigns, explained, seeds):
     assert alarms <= {40: 4, 10: 2}[len(campaigns)]
 
 
+@pytest.mark.slow
 def test_the_amplitude_lies_in_its_interval_as_often_as_stated(virtual_campaigns, explained, seeds):
     """40 campaigns of four runs: fewer than 33, of ten fewer than 7 inside their 95 % interval are a chance of 1e-3."""
     sim = simulator()

@@ -74,6 +74,7 @@ def test_reversal_of_x_is_half_the_reversal_error(example):
     within_the_floor(found)
 
 
+@pytest.mark.slow
 def test_a_loose_ball_is_no_law_of_physics(example):
     answer = example("hidden-loose-ball")
     assert answer.missing == ()

@@ -142,6 +142,7 @@ def test_explain_says_it_first_and_tells_nothing_else(tmp_path: Path) -> None:
     assert mistake.rms_undone_um < 100.0 < 2000.0 < mistake.rms_as_recorded_um
 
 
+@pytest.mark.slow
 def test_explain_names_it_where_no_machine_fits(tmp_path: Path) -> None:
     campaign = recorded("five-days", readings(X="Y", Y="X"))
     with Database(tmp_path / "mistaken.duckdb") as db:

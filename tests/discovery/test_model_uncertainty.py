@@ -47,6 +47,7 @@ def hidden():
     return [_evaluated(effect, 100 + seed) for seed, effect in enumerate(HIDDEN)]
 
 
+@pytest.mark.slow
 def test_gum_f_2_4_5_covariance_is_right_on_average_where_an_effect_is_hidden(hidden):
     without = [_distance(deviations, plain) for _, deviations, plain, _, _ in hidden]
     added = [_distance(deviations, plain + extra) for _, deviations, plain, extra, _ in hidden]

@@ -49,6 +49,7 @@ def test_poses_tell_the_table_from_the_pivot(virtual_campaigns, explained, campa
     assert names(alone) == {"EXC:harmonic2"}
 
 
+@pytest.mark.slow
 def test_poses_tell_harmonics_of_the_spindle_apart_where_quarters_do_not(
     virtual_campaigns, explained, campaign_with
 ):

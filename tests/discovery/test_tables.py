@@ -28,6 +28,7 @@ def explanation(bumped, explained):
     return explained(bumped)
 
 
+@pytest.mark.slow
 def test_a_bump_is_one_table_and_nothing_is_missing_once_it_is_added(bumped, explanation):
     found = [one.effect for one in explanation.missing]
     assert len(found) == 2

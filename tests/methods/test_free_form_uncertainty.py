@@ -162,6 +162,7 @@ def test_what_a_plan_promises_is_what_it_gives(sim, made):
         assert promised == pytest.approx(u[name], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_monte_carlo_of_whole_identifications_agrees(sim, made):
     """Spread over 60 runs, each identified by itself, against the stated covariance (first-order is exact here)."""
     _, campaign = made(sim.cross_pocket(), sim.CASE_1_ANGLES, runs=60)

@@ -170,6 +170,7 @@ def test_one_plane_alone_refuses_what_it_does_not_show_and_says_what_to_do(sim, 
     )
 
 
+@pytest.mark.slow
 def test_stepwise_differs_from_all_at_once_by_its_method_and_by_noise_of_the_stated_size(sim, campaign_of):
     rng = np.random.default_rng(5)
     machine, setups = sim.random_machine(rng), sim.random_setups(rng)

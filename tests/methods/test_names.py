@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,21 +71,27 @@ def asked(tree: ast.AST, names: dict[str, str]) -> Iterator[tuple[int, str]]:
 
 def breaches(package: Path) -> list[str]:
     """Every place that asks for a method's name, as ``file:line: name``."""
-    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(package.rglob("*.py"))}
+    sources = {path: path.read_text(encoding="utf-8") for path in sorted(package.rglob("*.py"))}
+    trees = {path: ast.parse(source) for path, source in sources.items()}
     modules = {
         ".".join(path.relative_to(package.parent).with_suffix("").parts): constants(tree)
         for path, tree in trees.items()
     }
-    found = []
+    names_of_methods = set(methods())
+    spelt = re.compile(rf"\.NAME\b|[\"'](?:{'|'.join(map(re.escape, sorted(names_of_methods)))})[\"']")
+    faults = []
     for path, tree in trees.items():
+        names = bound(tree, modules)
+        if not spelt.search(sources[path]) and names_of_methods.isdisjoint(names.values()):
+            continue
         file = path.relative_to(package).as_posix()
-        for line, text in asked(tree, bound(tree, modules)):
-            own = [part.format(folder=text.replace("-", "_")) for part in OWN]
-            if text not in methods() and text != "NAME":
+        for line, text in asked(tree, names):
+            if text not in names_of_methods and text != "NAME":
                 continue
-            if not file.startswith(tuple(own)) and (file, text) not in OTHER_MEANING:
-                found.append(f"{file}:{line}: {text}")
-    return found
+            folders = tuple(part.format(folder=text.replace("-", "_")) for part in OWN)
+            if not file.startswith(folders) and (file, text) not in OTHER_MEANING:
+                faults.append(f"{file}:{line}: {text}")
+    return faults
 
 
 def test_nobody_outside_its_folder_asks_for_the_name_of_a_method() -> None:

@@ -34,6 +34,7 @@ def test_truth_without_noise_comes_back_exactly(simulated: Callable[..., Any], t
     )
 
 
+@pytest.mark.slow
 def test_recovery_is_chi_square_over_200_seeds(
     simulated: Callable[..., Any], truth: Array, distance: Distance, seeds: Callable[[int, int], range]
 ) -> None:

@@ -114,6 +114,7 @@ def test_intervals_hold_the_zero_that_was_set(tracked: Tracks, robots: ModuleTyp
     assert 40.0 < squares < 170.0
 
 
+@pytest.mark.slow
 def test_an_axis_turned_the_wrong_way_is_refused_in_words(tracked: Tracks) -> None:
     _, campaign = tracked(10, poses=150)
     chain = tuple(

@@ -194,6 +194,7 @@ def test_the_picture_takes_any_history(runs: int, value: float) -> None:
     assert np.all(np.abs(numbers) < 2e3)
 
 
+@pytest.mark.slow
 def test_a_short_report_is_set_closer_where_that_saves_an_almost_empty_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -50,6 +50,7 @@ def test_one_parameter_along_one_axis_agrees_with_its_own_forecast():
     assert found.recommended_interval == pytest.approx(own.recommended_interval, rel=0.2)
 
 
+@pytest.mark.slow
 def test_prediction_interval_of_the_longest_vector_covers_the_next_run(rate_agrees):
     # Truth: three correlated parameters that drift, four points; the length of a run 20 weeks ahead.
     rng = np.random.default_rng(2)

@@ -92,6 +92,7 @@ def _killing(model, victim, at):
     return called, killed
 
 
+@pytest.mark.slow
 def test_jcgm102_7_2_same_bits_on_two_processes_of_which_one_is_killed_in_the_middle(evaluation):
     recipe, sampler, alone = evaluation
     with processes(2) as engine, spread(engine, recipe, sampler) as (model, blocks):
@@ -103,6 +104,7 @@ def test_jcgm102_7_2_same_bits_on_two_processes_of_which_one_is_killed_in_the_mi
     assert _same(found, alone)
 
 
+@pytest.mark.slow
 def test_jcgm102_7_2_same_bits_on_a_dask_cluster(evaluation):
     distributed = pytest.importorskip("distributed")
     recipe, sampler, alone = evaluation
@@ -156,6 +158,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
+@pytest.mark.slow
 def test_a_worker_killed_in_the_middle_of_its_answer_is_noticed():
     with processes(2) as engine:
         before = engine.process_ids

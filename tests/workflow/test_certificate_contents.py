@@ -58,6 +58,7 @@ def record_of(db: Database, number: str) -> CertificateRecord:
     return from_document(CertificateRecord, load_certificate(db, number).record)
 
 
+@pytest.mark.slow
 def test_jcgm_102_7_a_monte_carlo_result_is_certified_only_from_what_is_stored(
     db: Database, tmp_path: Path
 ) -> None:
@@ -146,6 +147,7 @@ def test_the_volumetric_error_is_that_of_the_map_and_travels_as_csv(db: Database
     assert remake(db, RemakeRequest("V-1")).identical is True
 
 
+@pytest.mark.slow
 def test_a_german_laboratory_gets_a_german_certificate(db: Database, tmp_path: Path) -> None:
     german = EXAMPLES / "laboratory-de.toml"
     made = issue(

@@ -123,6 +123,7 @@ def test_one_byte_changed_at_200_random_places_is_found_by_the_hash_and_by_the_s
         assert any("altered" in fault or "does not" in fault for fault in found.faults[1:]), where
 
 
+@pytest.mark.slow
 def test_a_certificate_that_another_signs_than_it_states_is_not_confirmed(
     db: Database, key: FileKey, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

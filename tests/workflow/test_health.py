@@ -287,6 +287,7 @@ def test_parts_bound_what_is_laid_out_at_a_time(fleet: Database, week10: dict, m
     assert [len(text_of(path)) for path in found["files"][1:]] == [2, 2]
 
 
+@pytest.mark.slow
 def test_campaigns_that_one_machine_cannot_have_made_at_once_are_not_mixed(
     tmp_path: Path, make_folder: Callable[..., Path], pdf_unread
 ) -> None:
@@ -378,6 +379,7 @@ def test_a_drift_is_trusted_no_longer_than_the_history_is_long() -> None:
     assert drift_forecast(PieceDrift(drift.whole, 58.0), 8.0) is None
 
 
+@pytest.mark.slow
 def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_page(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:
@@ -510,6 +512,7 @@ def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identifie
         assert all(one.drift is None for one in stored(db, "HU40-T").parameters)
 
 
+@pytest.mark.slow
 def test_machines_outside_the_chosen_campaigns_are_left_out(
     fleet: Database, week10: dict, tmp_path: Path, pdf_unread
 ) -> None:

@@ -47,6 +47,7 @@ def fleet(tmp_path: Path, thorough: bool) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_one_process_and_two_write_the_same_bytes_and_store_the_same(
     fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, thorough: bool, laid_out_anew: None
 ) -> None:
@@ -82,6 +83,7 @@ def test_no_worker_is_too_few(fleet: Path, tmp_path: Path) -> None:
         report(db, "2026-W10", out=tmp_path, workers=0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for the workers in /proc")
 def test_ctrl_c_ends_the_workers_without_a_word_of_theirs(fleet: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "monitor.cli", "--db", str(fleet), "report", "--week", "2026-W10"]

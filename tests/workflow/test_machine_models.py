@@ -50,6 +50,7 @@ def worn(tmp_path_factory):
     db.close()
 
 
+@pytest.mark.slow
 def test_the_backlash_that_grows_is_a_trend_of_the_machine_that_has_the_model(worn):
     assert BACKLASH not in trend(worn, TrendRequest("V")).parameters
     answer = use_model(worn, UseModelRequest("with-backlash", "V", WHY))

@@ -336,6 +336,7 @@ def test_one_check_run_after_days_of_many_does_not_stand_out(
     assert sum(row.attention == "the latest day stands out" for row in rows) <= 1
 
 
+@pytest.mark.slow
 def test_a_report_of_an_earlier_week_knows_what_was_known_then(
     stepped: Database, tmp_path: Path, pdf_unread
 ) -> None:

@@ -195,6 +195,7 @@ def printed(file: Path) -> str:
     return " ".join(" ".join(page.extract_text() for page in pypdf.PdfReader(file).pages).split())
 
 
+@pytest.mark.slow
 def test_a_stored_document_without_the_source_is_certified_in_german(db: Database, tmp_path: Path) -> None:
     result = evaluate(db, UncertaintyRequest("five-days", 20, method="guf"))
     document = to_document(answer_of(result))

@@ -117,6 +117,7 @@ def test_what_was_killed_goes_on_without_doing_anything_twice(
     assert counts(path) == (1, 1, 1)
 
 
+@pytest.mark.slow
 def test_two_watchers_at_one_folder_share_the_work(path: Path, arrived: Path) -> None:
     shutil.copytree(EXAMPLES / "load-cell", arrived / "load-cell")
     command = [

@@ -164,6 +164,7 @@ def test_events_need_words_and_a_machine(db: Database) -> None:
     assert event(db, EventRequest("HU40-T")).events == ()
 
 
+@pytest.mark.slow
 def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:
     folder = tmp_path / "figures ü"
     files = compare(db, CompareRequest("hidden-reversal-x", figures=folder)).figures
