@@ -17,8 +17,8 @@ class PlanRequest:
     ``balls`` and ``poses`` ask for the best plan of so many; ``wanted`` (parameter to display unit) for the quickest
     that reaches these standard uncertainties; ``keep`` weighs the campaign's own plan with these of its indexations
     alone (numbers from 1 on in their order); ``parameters`` are those that tests of instruments are ranked for (none
-    named: all); ``separate`` asks for poses that separate two effects. Expanded uncertainties are of the coverage
-    probability ``p``. Raises InputError.
+    named: all); ``separate`` asks for poses, or tests of instruments, that separate two effects. Expanded uncertainties
+    are of the coverage probability ``p``. Raises InputError.
     """
 
     campaign: str
