@@ -99,11 +99,11 @@ def _shortened(text: str, most: int) -> str:
 
 def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
     """Draw the limits that lie in the panel, dashed, with their values at the right."""
-    right = panel.left + panel.width
+    right = panel.x0 + panel.width
     for limit in () if tolerance is None else (-tolerance, tolerance):
         if panel.up[0] <= limit <= panel.up[1]:
             y = panel.y(limit)
-            on.line(panel.left, y, right, y, INK, 3.0, "14 8")
+            on.line(panel.x0, y, right, y, INK, 3.0, "14 8")
             label = ("+" if limit > 0 else "") + tick_words(limit)
             on.text(right + 8, y + 0.36 * LETTER, label, bold=True)
 
