@@ -1,4 +1,4 @@
-"""What ISO 230-2, 230-4, 230-6 and 230-7 call their figures, and what is noted of a test that lacks what they ask for."""
+"""What ISO 230-2, 230-4, 230-6 and 230-7 call their figures, and what is noted of a test that lacks what they ask."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def circle_figure(kind: str, plane: str, way: int = 1) -> tuple[str, str]:
 
 
 def rotation_figure(name: str, error: str, kind: str) -> tuple[str, str]:
-    """Return symbol and name of a value of an error motion: the symbol of the ``error`` (EXC), its ``kind`` (radial)."""
+    """Return symbol and name of a value of an error motion: symbol of the ``error`` (EXC), its ``kind`` (radial)."""
     return f"{error} {name}", f"{name} {kind} error motion value"
 
 
