@@ -85,7 +85,7 @@ def where_it_fails(residual_map: ResidualMap) -> str:
             room + index * (side + gap), 34.0, side, side, ranges[across], ranges[up],
         )  # fmt: skip
         panel.frame(on, f"{'XYZ'[across]} / mm", f"{'XYZ'[up]} / mm", ticks=4)
-        on.text(panel.left, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
+        on.text(panel.x0, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
         for large, colour, width in ((False, BLUE, 2.6), (True, ORANGE, 5.0)):
             shafts, heads = [], []
             for at, vector in zip(position[view.large == large], residual[view.large == large], strict=True):
@@ -97,7 +97,7 @@ def where_it_fails(residual_map: ResidualMap) -> str:
             on.path("".join(heads), fill=colour)
         if index == 0:
             length = side * view.key * 1e-3 * view.magnify / (2.0 * view.reach)
-            x, y = panel.left + 14.0, panel.top + side - 16.0
+            x, y = panel.x0 + 14.0, panel.top + side - 16.0
             on.line(x, y, x + length, y, INK, 7)
             on.text(x, y - 9, f"{view.key:g} µm", bold=True)
     on.text(
@@ -140,7 +140,7 @@ def against_driver(residual: ResidualAgainst) -> str:
     for means in series:
         _draw_means(on, panel, means)
     for index, means in enumerate(series):
-        x = panel.left + 6 + 330 * index
+        x = panel.x0 + 6 + 330 * index
         on.path(means.sign(x, 16, _SIGN), fill=means.colour)
         on.text(x + 16, 24, means.name, bold=True, colour=means.colour)
     return on.svg()
@@ -201,12 +201,12 @@ def error_steps(model: ModelHealth) -> str:
     for index, step in enumerate(steps):
         top = panel.top + index * row
         on.text(
-            panel.left, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
+            panel.x0, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
         )
         y = top + 36
         end = panel.x(step.rms_um)
         on.path(
-            f"M{panel.left:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.left:g}Z",
+            f"M{panel.x0:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.x0:g}Z",
             fill="white" if step.proposed else BLUE, stroke=BLUE, width=3,
         )  # fmt: skip
         held, values = end, _micrometres(step.rms_um)
@@ -222,12 +222,12 @@ def error_steps(model: ModelHealth) -> str:
     stated = f"probe's statement {model.stated_um:.2g} µm"
     half = text_width(stated) / 2.0
     on.text(min(max(at, half), RIGHT_MM * SCALE - half), panel.top - 14, stated, anchor="middle")
-    on.path(f"M{panel.left:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
-    on.text(panel.left + 30, bottom + 32, "fitted runs, µm")
-    on.path(_circle(panel.left + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
-    on.text(panel.left + 268, bottom + 32, "(held-out runs)")
+    on.path(f"M{panel.x0:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
+    on.text(panel.x0 + 30, bottom + 32, "fitted runs, µm")
+    on.path(_circle(panel.x0 + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
+    on.text(panel.x0 + 268, bottom + 32, "(held-out runs)")
     if any(step.proposed for step in steps):
-        on.text(panel.left, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
+        on.text(panel.x0, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
     return on.svg()
 
 

@@ -102,7 +102,7 @@ def _shortened(text: str, most: int) -> str:
 
 def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
     """Draw the limits that lie in the panel, dashed, with their values at the right."""
-    right = panel.left + panel.width
+    right = panel.x0 + panel.width
     low, high = panel.up
     if (
         tolerance is not None
@@ -111,13 +111,13 @@ def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
         and panel.y(-tolerance) - panel.y(tolerance) < LETTER
     ):
         # Next to each other where the scatter is that much larger: one number for both.
-        on.line(panel.left, panel.y(0.0), right, panel.y(0.0), INK, 3.0, "14 8")
+        on.line(panel.x0, panel.y(0.0), right, panel.y(0.0), INK, 3.0, "14 8")
         on.text(right + 8, panel.y(0.0) + 0.36 * LETTER, f"±{tick_words(tolerance)}", bold=True)
         return
     for limit in () if tolerance is None else (-tolerance, tolerance):
         if panel.up[0] <= limit <= panel.up[1]:
             y = panel.y(limit)
-            on.line(panel.left, y, right, y, INK, 3.0, "14 8")
+            on.line(panel.x0, y, right, y, INK, 3.0, "14 8")
             on.text(right + 8, y + 0.36 * LETTER, _limit_words(limit), bold=True)
 
 

@@ -111,7 +111,7 @@ def map_drawing(slices: Sequence[Slice], *, title: str, scale_words: str, sign: 
 class _Frame:
     """The frame of a slice in tenths of a millimetre; ``unit`` of these a mm of the machine, cells in mm."""
 
-    left: float
+    x0: float
     wide: float
     high: float
     unit: float
@@ -134,7 +134,7 @@ def _grey(step: int, steps: int) -> str:
 
 def _slice(on: Drawing, part: Slice, frame: _Frame, longest: float, edges: list[float], sign: str) -> None:
     first, second = np.array(part.first_mm), np.array(part.second_mm)
-    x0, wide, high, unit, cell = frame.left, frame.wide, frame.high, frame.unit, frame.cell
+    x0, wide, high, unit, cell = frame.x0, frame.wide, frame.high, frame.unit, frame.cell
     top = _TOP
 
     def x(value: float) -> float:
