@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from html import escape
 
 from monitor.reporting.palette import INK, MID, PALE
+from monitor.reporting.svg.letter_widths import BOLD, in_units, units_an_em
 
 #: Units a millimetre.
 SCALE = 10.0
@@ -111,7 +112,8 @@ class Panel:
             stroke=MID, width=2.4,
         )  # fmt: skip
         on.text(self.left + self.width / 2, bottom + 18 + 2.1 * LETTER, across, anchor="middle")
-        on.text(self.left - 66, self.top + self.height / 2, up, anchor="middle", turned=True)
+        beside = max(66.0, tick_room(self.up, ticks + 1) + 8.0)
+        on.text(self.left - beside, self.top + self.height / 2, up, anchor="middle", turned=True)
 
 
 def nice_ticks(low: float, high: float, most: int) -> list[float]:
@@ -123,6 +125,16 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     step = next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9))
     first = math.ceil(low / step - 1e-9)
     return [index * step for index in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def text_width(text: str, *, bold: bool = False) -> float:
+    """Return the width of a text in units of a drawing."""
+    return in_units(text) / units_an_em() * LETTER * (BOLD if bold else 1.0)
+
+
+def tick_room(shown: tuple[float, float], most: int) -> float:
+    """Return how far the widest number beside an axis reaches from it."""
+    return 13.0 + max((text_width(tick_words(tick)) for tick in nice_ticks(*shown, most)), default=0.0)
 
 
 def shortened(text: str, room: float) -> str:
