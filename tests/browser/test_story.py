@@ -81,7 +81,8 @@ WORDS_BEFORE = """(element) => { const end = element.getBoundingClientRect().bot
   while (texts.nextNode()) {
     const parent = texts.currentNode.parentElement;
     if (parent.closest('script, select, svg, datalist') || !parent.checkVisibility()) { continue; }
-    if (parent.getBoundingClientRect().top <= end) { words.push(...texts.currentNode.data.split(/\\s+/).filter(Boolean)); }
+    if (parent.getBoundingClientRect().top > end) { continue; }
+    words.push(...texts.currentNode.data.split(/\\s+/).filter(Boolean));
   }
   return words.length; }"""
 
