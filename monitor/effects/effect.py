@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from monitor.effects.artefact import HEADS, ArtefactChange, parse_artefact
+from monitor.effects.change import Change
 from monitor.effects.context import Context
 from monitor.effects.driver import Driver
 from monitor.effects.drivers import Always, SettlingDriver, parse_driver
@@ -194,11 +195,14 @@ class ChainEffect:
         return ChainBasis(self.term, product)
 
 
-@dataclass(frozen=True)
-class ArtefactEffect:
-    """A change of the targets."""
+AnyChange = TypeVar("AnyChange", bound=Change)
 
-    change: ArtefactChange
+
+@dataclass(frozen=True)
+class _DrivenChange(Generic[AnyChange]):
+    """A change and what scales it."""
+
+    change: AnyChange
     driver: Driver
     driver_text: str
 
@@ -215,6 +219,11 @@ class ArtefactEffect:
         return tuple(
             f"{self.text}{s}{d}" for s in self.change.labels(context) for d in self.driver.labels(context)
         )
+
+
+@dataclass(frozen=True)
+class ArtefactEffect(_DrivenChange[ArtefactChange]):
+    """A change of the targets."""
 
     def basis(self, context: Context) -> ArtefactBasis:
         shift = self.change.shifts(context)
@@ -224,55 +233,19 @@ class ArtefactEffect:
 
 
 @dataclass(frozen=True)
-class TurnEffect:
+class TurnEffect(_DrivenChange[Turn]):
     """A turn with one coefficient for several terms."""
 
-    turn: Turn
-    driver: Driver
-    driver_text: str
-
-    @property
-    def text(self) -> str:
-        return self.turn.text + (f"@{self.driver_text}" if self.driver_text else "")
-
-    @property
-    def unit(self) -> Unit:
-        driver = self.driver.unit()
-        return self.turn.unit if driver is ONE else self.turn.unit.per(driver)
-
-    def parameters(self, context: Context) -> tuple[str, ...]:
-        return tuple(
-            f"{self.text}{s}{d}" for s in self.turn.labels(context) for d in self.driver.labels(context)
-        )
-
     def basis(self, context: Context) -> TurnBasis:
-        turns = self.turn.turns(context)
-        driver = self.driver.columns(context, self.turn.joint(context.chain))
+        turns = self.change.turns(context)
+        driver = self.driver.columns(context, self.change.joint(context.chain))
         product = (turns[:, :, :, None] * driver[:, None, None, :]).reshape(len(turns), 3, -1)
-        return TurnBasis(self.turn.joint(context.chain), product)
+        return TurnBasis(self.change.joint(context.chain), product)
 
 
 @dataclass(frozen=True)
-class InstrumentEffect:
+class InstrumentEffect(_DrivenChange[InstrumentChange]):
     """A change of what an instrument shows."""
-
-    change: InstrumentChange
-    driver: Driver
-    driver_text: str
-
-    @property
-    def text(self) -> str:
-        return self.change.text + (f"@{self.driver_text}" if self.driver_text else "")
-
-    @property
-    def unit(self) -> Unit:
-        driver = self.driver.unit()
-        return self.change.unit if driver is ONE else self.change.unit.per(driver)
-
-    def parameters(self, context: Context) -> tuple[str, ...]:
-        return tuple(
-            f"{self.text}{s}{d}" for s in self.change.labels(context) for d in self.driver.labels(context)
-        )
 
     def basis(self, context: Context) -> InstrumentBasis:
         shown = self.change.shown(context)

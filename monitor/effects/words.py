@@ -14,10 +14,8 @@ from monitor.effects.shape import DescribedShape
 
 def describe(effect: ParsedEffect) -> Description:
     """Describe an effect in words."""
-    if isinstance(effect, ArtefactEffect | InstrumentEffect):
+    if isinstance(effect, ArtefactEffect | InstrumentEffect | TurnEffect):
         return effect.change.described(_driver_phrase(effect))
-    if isinstance(effect, TurnEffect):
-        return effect.turn.described(_driver_phrase(effect))
     error = JointError(effect.term, effect.joint)
     explanations: list[Explanation | None] = [error.explanation()]
     phrase = f", of shape {effect.shape_text}"

@@ -58,17 +58,11 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
                 user, "import", document | form.filled("campaign"), _sent_files(form, Path(folder))
             )
         except MonitorError as error:
-            refusal = refusal_of(error)
-            texts = [_worded(text, folder) for text in (refusal.error, *refusal.faults)]
-            return Refusal(refusal.status, texts[0], tuple(texts[1:]))
+            labels = {}
+            for own in (f"{folder}/files", f"{folder}/mapping", folder):
+                labels |= {f"{own}/": "", own: "the upload"}
+            return refusal_of(error, labels)
         return answer
-
-
-def _worded(text: str, folder: str) -> str:
-    """A refusal without the names of the server's own folders."""
-    for own in (f"{folder}/files", f"{folder}/mapping", folder):
-        text = text.replace(f"{own}/", "").replace(own, "the upload")
-    return text
 
 
 def _sent_files(form: Form, folder: Path) -> dict[str, Any]:
