@@ -59,8 +59,8 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
             )
         except MonitorError as error:
             labels = {}
-            for own in (f"{folder}/files", f"{folder}/mapping", folder):
-                labels |= {f"{own}/": "", own: "the upload"}
+            for below in (f"{folder}/files", f"{folder}/mapping", folder):
+                labels |= {f"{below}/": "", below: "the upload"}
             return refusal_of(error, labels)
         return answer
 
