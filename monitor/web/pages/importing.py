@@ -58,7 +58,7 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
                 user, "import", document | form.filled("campaign"), _sent_files(form, Path(folder))
             )
         except MonitorError as error:
-            labels = {}
+            labels: dict[str, str] = {}
             for below in (f"{folder}/files", f"{folder}/mapping", folder):
                 labels |= {f"{below}/": "", below: "the upload"}
             return refusal_of(error, labels)
