@@ -54,7 +54,7 @@ def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer
 
         return comparison_figures(comparison, fit, folder)
 
-    return CompareAnswer(machine_comparison(comparison), fit.problem.target_word), draw
+    return CompareAnswer(machine_comparison(comparison, fit.problem), fit.problem.target_word), draw
 
 
 def _compare_curve(fit: CurveFit, model: str) -> tuple[CompareAnswer, Draw]:

@@ -33,4 +33,9 @@ def show_model(db: Database, request: ShowModelRequest) -> ShowModelAnswer:
 def shown(db: Database, model: StoredModel) -> ShowModelAnswer:
     """A stored version with its base and its effects in words."""
     subjects = subjects_of(db, model)
-    return ShowModelAnswer(model_version(model), subjects.base(), subjects.meaning(model.effects))
+    return ShowModelAnswer(
+        model_version(model),
+        subjects.base(),
+        subjects.meaning(model.effects),
+        subjects.refers_to(model.effects),
+    )

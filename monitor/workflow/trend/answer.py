@@ -193,9 +193,9 @@ class LimitForecast:
 
 @dataclass(frozen=True)
 class ForecastTest:
-    """How good the forecasts of a parameter were: ``inside`` of ``made`` lay in their interval."""
+    """How good the forecasts of a parameter were: ``inside`` of the ``forecasts`` lay in their interval."""
 
-    made: int
+    forecasts: int = field(metadata=named("made"))
     inside: int
     share_inside: float
     level: float
@@ -328,7 +328,7 @@ class ParameterTrend:
 class VolumetricTest:
     """How good the forecasts of the volumetric error were."""
 
-    made: int
+    forecasts: int = field(metadata=named("made"))
     inside: int
     share_inside: float
     level: float

@@ -209,7 +209,7 @@ def _backtest(
     except DataError as error:
         return None, refused(Part.VOLUMETRIC_BACKTEST, error)
     return VolumetricTest(
-        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
+        forecasts=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias_um=test.bias, rms_um=test.rms,
     ), None  # fmt: skip
 
