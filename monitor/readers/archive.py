@@ -40,17 +40,7 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
     """
     if not files:
         raise InputError("choose the folder of a campaign, its files, or a zip of it")
-    room = _Room(folder)
-    for file in files:
-        # A workbook of Excel is a zip too, of files that are nothing by themselves.
-        if zipfile.is_zipfile(file.content) and not file.name.lower().endswith(WORKBOOK):
-            file.content.seek(0)
-            _unpack_zip(file, room)
-        else:
-            file.content.seek(0)
-            if file.name.lower().endswith(".zip"):
-                raise InputError(f"{file.name} is no zip that can be read; pack the folder again")
-            room.write(_safe_path(file.name), file.content)
+    unpack_files(files, folder)
     campaigns = tuple(sorted({path.parent for name in CAMPAIGN_FILES for path in folder.rglob(name)}))
     if not campaigns:
         if any(file.name.lower().endswith(WORKBOOK) for file in files):
@@ -64,6 +54,25 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
             "(docs/campaign-format.md says which files it has)"
         )
     return campaigns
+
+
+def unpack_files(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
+    """Write uploaded files, and what zips among them hold, below ``folder`` and return them by their names.
+
+    Raises InputError for a zip that cannot be trusted or read.
+    """
+    room = _Room(folder)
+    for file in files:
+        # A workbook of Excel is a zip too, of files that are nothing by themselves.
+        if zipfile.is_zipfile(file.content) and not file.name.lower().endswith(WORKBOOK):
+            file.content.seek(0)
+            _unpack_zip(file, room)
+        else:
+            file.content.seek(0)
+            if file.name.lower().endswith(".zip"):
+                raise InputError(f"{file.name} is no zip that can be read; pack the folder again")
+            room.write(_safe_path(file.name), file.content)
+    return tuple(sorted(path for path in folder.rglob("*") if path.is_file()))
 
 
 def unpack_zip(name: str, content: IO[bytes], folder: Path) -> None:

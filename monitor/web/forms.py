@@ -24,6 +24,8 @@ from monitor.web.sessions import Sessions
 PROOF = "proof"
 #: Drawn anew for every page: by it the same form sent twice is known.
 ONCE = "once"
+#: The field of the file that says what the columns of the others are.
+MAPPING = "mapping"
 #: What a form carries besides what people fill in.
 CARRIED = frozenset({PROOF, ONCE})
 
@@ -72,11 +74,15 @@ class StaleFormError(ForbiddenError):
 
 @dataclass(frozen=True)
 class Form:
-    """The texts and files of a form; ``press`` is the same where the same page was sent twice with the same texts."""
+    """The texts and files of a form, and a ``mapping`` of the files where one came along.
+
+    ``press`` is the same where the same page was sent twice with the same texts.
+    """
 
     texts: dict[str, str]
     files: tuple[UploadedFile, ...]
     press: str = ""
+    mapping: UploadedFile | None = None
 
     def text(self, name: str) -> str:
         """Return a text that the form must have. Raises InputError."""
@@ -102,17 +108,19 @@ def _checked(request: Request, form: FormData) -> Form:
     session, proof = request.state.session, form.get(PROOF)
     if session is None or not isinstance(proof, str) or not sessions.is_proof(session, proof):
         raise StaleFormError(typed_of(request.url.path, form))
-    files = [
-        UploadedFile(part.filename or "", part.file)
-        for _, part in form.multi_items()
+    uploads = [
+        (name, UploadedFile(part.filename or "", part.file))
+        for name, part in form.multi_items()
         if isinstance(part, UploadFile) and part.filename
     ]
+    files = tuple(file for name, file in uploads if name != MAPPING)
+    mapping = next((file for name, file in uploads if name == MAPPING), None)
     texts = {
         name: value.strip()
         for name, value in form.multi_items()
         if isinstance(value, str) and name not in CARRIED
     }
-    return Form(texts, tuple(files), _press(request, session, form.get(ONCE), texts))
+    return Form(texts, files, _press(request, session, form.get(ONCE), texts), mapping)
 
 
 async def asked_once(request: Request, form: Form, question: str, document: dict[str, Any]) -> Any:

@@ -72,14 +72,16 @@ def groups(texts: Mapping[str, str], faults: Mapping[str, str]) -> list[Group]:
     """Return the form with what is filled in and what is wrong, by the names of its boxes."""
     shown = []
     for section, keys in SECTIONS.items():
-        for prefix in _prefixes(section):
+        prefixes = _prefixes(section)
+        for number, prefix in enumerate(prefixes, 1):
             boxes = tuple(
                 _box(section, prefix, key, texts, faults)
                 for key in keys
                 if f"{section}.{key}" not in _NOT_IN_FORM
             )
             optional = prefix.endswith((".1", ".2")) or all(box.optional for box in boxes)
-            shown.append(Group(_WORDS[section], boxes, optional))
+            title = _WORDS[section] + (f" ({number} of {len(prefixes)})" if len(prefixes) > 1 else "")
+            shown.append(Group(title, boxes, optional))
     return shown
 
 

@@ -73,6 +73,7 @@ def _environment() -> Environment:
         "plain_name": plain_name,
         "number": words.number,
         "with_u": words.with_u,
+        "channel": words.channel,
         "probability": words.probability,
         "day": words.day,
         "counted": words.counted,

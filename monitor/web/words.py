@@ -62,6 +62,11 @@ URGENCIES = dict(
 )
 
 
+#: Powers of ten below this are written as such.
+SMALLEST_POWER = -5
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number as the tables show it, a dash where there is none."""
     if value is None or not math.isfinite(value):
@@ -72,10 +77,20 @@ def number(value: float | None, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def channel(name: str) -> str:
+    """Return a recorded condition as people write it: ``x axis / °C`` for ``x_axis_degC``."""
+    return name.replace("_degC", " / °C").replace("_", " ")
+
+
 def with_u(value: float | None, u: float | None, unit: str) -> str:
     """Return a value with its standard uncertainty, rounded together (JCGM 100, 7.2.6)."""
     if value is None or u is None or not math.isfinite(value) or not math.isfinite(u) or u <= 0.0:
         return f"{number(value)} {unit}"
+    largest = math.floor(math.log10(max(abs(value), u)))
+    if largest < SMALLEST_POWER:
+        # Nobody counts seven zeros: a coefficient of a square in mm/N² is such a number.
+        share = with_u(value * 10.0**-largest, u * 10.0**-largest, "").rstrip()
+        return f"({share}) · 10{str(largest).translate(_RAISED)} {unit}"
     try:
         rounded = round_result(value, u)
     except (MonitorError, ArithmeticError):

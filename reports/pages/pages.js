@@ -32,6 +32,7 @@ function draw(figure) {
   if (figure.dataset.key === "scene") {
     drawScene(canvas, chart);
   } else {
+    canvas.style.height = chart.layout.height + "px"; // what the style sheet has no rule for
     Plotly.react(canvas, coloured(chart.data), coloured(chart.layout), SETTINGS).then(() => { canvas.dataset.drawn = "1"; });
   }
 }

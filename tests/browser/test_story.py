@@ -72,6 +72,65 @@ def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(sit
         assert visit.faults() == []
 
 
+#: Whether an element stands in the window whole, without scrolling.
+IN_SIGHT = """(element) => { const box = element.getBoundingClientRect();
+  return box.top >= 0 && box.bottom <= window.innerHeight && box.left >= 0 && box.right <= window.innerWidth; }"""
+#: Words of the page down to an element, of what is drawn in the window.
+WORDS_BEFORE = """(element) => { const end = element.getBoundingClientRect().bottom; const words = [];
+  const texts = document.createTreeWalker(document.querySelector('main'), NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const parent = texts.currentNode.parentElement;
+    if (parent.closest('script, select, svg, datalist') || !parent.checkVisibility()) { continue; }
+    if (parent.getBoundingClientRect().top > end) { continue; }
+    words.push(...texts.currentNode.data.split(/\\s+/).filter(Boolean));
+  }
+  return words.length; }"""
+
+
+def test_story_the_next_step_is_in_sight_and_takes_two_clicks(site: Site) -> None:
+    """From the list of campaigns: one click to the answer, one that adds the effect; nothing is scrolled to."""
+    with Visit(site) as visit:
+        page = visit.page
+        visit.open("/campaigns")
+        row = page.locator("tr", has_text="hidden-spindle-growth")
+        row.get_by_role("link", name="model against measurement").click()
+        visit.settle()
+        add = page.locator(".effect").first.get_by_role("button", name="add to the model")
+        for part in (
+            page.locator("#verdict"),
+            page.locator("#answer"),
+            page.locator(".effect h3").first,
+            add,
+        ):
+            assert part.evaluate(IN_SIGHT)
+        # At 200 words a minute some twenty seconds.
+        assert add.evaluate(WORDS_BEFORE) < 200
+        add.click()
+        visit.settle()
+        assert page.locator("#verdict").evaluate(IN_SIGHT)
+        assert "explains the measurement" in page.locator("#verdict").inner_text()
+        page.get_by_role("button", name="undo: take EZC1:const@warmup out").click()
+        visit.settle()
+        assert visit.faults() == []
+
+
+def test_story_the_log_in_ends_while_somebody_types(site: Site) -> None:
+    """Another session than that of the form: what was typed is shown again, and sent at a button."""
+    with Visit(site) as visit:
+        page = visit.page
+        visit.open("/machine?name=HU40-T")
+        page.locator('input[name="text"]').fill("belt changed")
+        page.locator('input[name="at"]').fill("2026-03-04T07:00:00Z")
+        page.locator('input[name="kind"]').fill("note")
+        visit.context.clear_cookies()
+        page.get_by_role("button", name="record the event").click()
+        assert "What you filled in is here" in page.locator("main").inner_text()
+        assert "belt changed" in page.locator("main").inner_text()
+        page.get_by_role("button", name="send it").dblclick()
+        visit.settle()
+        assert page.locator("li", has_text="note, belt changed").count() == 1
+
+
 def test_story_who_asked_for_less_motion_sees_where_it_moves_and_no_motion(site: Site) -> None:
     with Visit(site) as visit:
         page = visit.page

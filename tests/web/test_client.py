@@ -29,6 +29,7 @@ from monitor.workflow.contract import QUESTIONS
 from monitor.workflow.history.periods import Period
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+EXPORTS = EXAMPLES / "files-as-they-come"
 CAMPAIGN, CURVE, MACHINE = "hidden-spindle-growth", "load-cell", "HU40-T"
 #: Differ from one time of asking to the next: moments, times of computing, and hashes over them.
 VOLATILE = {
@@ -39,6 +40,9 @@ VOLATILE = {
 #: Every question of the contract in an order in which each has what it asks for: the fields of its request.
 ASKED: list[tuple[str, Callable[[Path], dict[str, Any]]]] = [
     ("import", lambda out: {"folders": [EXAMPLES / "nothing-hidden", Path("no-such-folder")]}),
+    ("import", lambda out: {
+        "folders": sorted(path for path in EXPORTS.iterdir() if path.suffix not in (".md", ".toml")),
+        "mapping": EXPORTS / "mapping.toml", "campaign": "week-12", "dry_run": True}),
     ("campaigns", lambda out: {}),
     ("machines", lambda out: {}),
     ("runs", lambda out: {"campaign": CAMPAIGN}),

@@ -72,3 +72,52 @@ def test_an_upload_is_refused_without_a_folder_of_the_server(local: Any) -> None
     assert str(lacking.text).count("tmp") == 0
     torn = local.client.post("/import", data=proof, files=[("file", ("c.zip", b"hello"))])
     assert "c.zip is no zip that can be read; pack the folder again" in torn.text
+
+
+def _exports() -> tuple[list[tuple[str, tuple[str, bytes]]], bytes]:
+    folder = EXAMPLES / "files-as-they-come"
+    files = [
+        ("file", (path.name, path.read_bytes()))
+        for path in sorted(folder.iterdir())
+        if path.suffix not in (".md", ".toml")
+    ]
+    return files, (folder / "mapping.toml").read_bytes()
+
+
+def test_files_of_instruments_are_looked_at_with_their_mapping_and_then_imported(
+    imported: Path, serve: Any, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    served = serve(copy, False)
+    files, mapping = _exports()
+
+    def sent(button: str, mapping: bytes = mapping) -> Any:
+        fields = {"proof": served.proof(), "campaign": "week-12", "button": button}
+        both = [*files, ("mapping", ("shop.toml", mapping))]
+        return served.client.post("/import", data=fields, files=both)
+
+    before = served.db.rows("SELECT count(*) FROM campaign")
+    looked = sent("look")
+    assert looked.status_code == 200, looked.text[-2000:]
+    assert "Looked at, nothing was stored: week-12, 1 run, 806 probings" in looked.text
+    text = re.sub(r"<[^>]+>|\s+", " ", looked.text)
+    assert "r-test.csv: table (Windows-1252" in text
+    assert "decimal comma), setup r-test, run 1, 25 rows" in text
+    assert looked.text.count('class="card understood"') == len(files)
+    assert served.db.rows("SELECT count(*) FROM campaign") == before
+    wrong = sent("look", mapping.replace(b"[[exports]]", b"[[nothing]]"))
+    assert wrong.status_code in (400, 422)
+    assert str(tmp_path) not in wrong.text
+    assert "/tmp" not in wrong.text
+    stored = sent("")
+    assert "✓ week-12: imported, 1 run, 806 probings" in re.sub(r"\s+", " ", stored.text)
+    assert served.db.rows("SELECT count(*) FROM campaign") == [(before[0][0] + 1,)]
+
+
+def test_a_mapping_without_files_is_refused(local: Any) -> None:
+    answer = local.client.post(
+        "/import", data={"proof": local.proof()}, files=[("mapping", ("mapping.toml", _exports()[1]))]
+    )
+    assert answer.status_code == 400
+    assert "choose the files of the instruments beside the mapping" in answer.text

@@ -47,7 +47,7 @@ BASE: Mapping[str, Any] = {
     "paper_bgcolor": "rgba(0,0,0,0)",
     "plot_bgcolor": "rgba(0,0,0,0)",
     "font": {"color": "@ink", "family": "DejaVu Sans, sans-serif", "size": 12},
-    "margin": {"l": 56, "r": 16, "t": 12, "b": 44},
+    "margin": {"l": 56, "r": 16, "t": 12, "b": 52},
     "hoverlabel": {"bgcolor": "@paper", "bordercolor": "@mid", "font": {"color": "@ink"}},
     "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
 }

@@ -38,7 +38,7 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
         says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
         traces=machine_traces(residuals),
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.85, "y": -1.15, "z": 0.6}}},
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.0, "y": -1.35, "z": 0.7}}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
             "uirevision": "scene",
             "showlegend": True,

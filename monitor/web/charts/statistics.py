@@ -39,8 +39,10 @@ def correlation_chart(answer: StatisticsAnswer) -> Chart:
             }
         ],
         layout={
-            "xaxis": axis("", type="category"),
-            "yaxis": axis("", type="category", autorange="reversed", scaleanchor="x"),
+            "xaxis": axis("", type="category", constrain="domain", showgrid=False),
+            "yaxis": axis(
+                "", type="category", autorange="reversed", scaleanchor="x", constrain="domain", showgrid=False
+            ),
         },
         height=460,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from monitor.web.charts.chart import DASHES, Chart, Trace, axis, look
-from monitor.web.words import number
+from monitor.web.words import channel, number
 
 if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer
@@ -46,7 +46,7 @@ def trend_chart(
         layout={
             "xaxis": axis("", type="date", anchor="y2" if conditions else "y"),
             "yaxis": axis(f"{parameter} / {series.unit}", domain=[0.34 if conditions else 0.0, 1.0]),
-            **({"yaxis2": axis("°C and others", domain=[0.0, 0.26])} if conditions else {}),
+            **({"yaxis2": axis(_shared_title(values), domain=[0.0, 0.26])} if conditions else {}),
             "shapes": shapes,
             "annotations": notes,
             "hovermode": "closest",
@@ -149,6 +149,11 @@ def _forecast(statement: ParameterTrend) -> list[Trace]:
     return lines
 
 
+def _shared_title(values: ValuesAnswer) -> str:
+    """The unit of the conditions where they share it; the legend has that of each."""
+    return "°C" if all(name.endswith("_degC") for name in values.conditions) else "conditions"
+
+
 def _conditions(values: ValuesAnswer) -> list[Trace]:
     traces = []
     for index, (name, column) in enumerate(values.conditions.items()):
@@ -157,10 +162,10 @@ def _conditions(values: ValuesAnswer) -> list[Trace]:
             x, y = _broken(values, column, rows)
             traces.append(
                 {
-                    "type": "scatter", "mode": "lines+markers", "name": name, "yaxis": "y2",
+                    "type": "scatter", "mode": "lines+markers", "name": channel(name), "yaxis": "y2",
                     "x": x, "y": y,
                     "line": {"color": look(index + 2)[0], "dash": DASHES[index % len(DASHES)], "width": 1.2},
-                    "marker": {"size": 4}, "hovertemplate": name + " %{y:.4g}<extra></extra>",
+                    "marker": {"size": 4}, "hovertemplate": channel(name) + " %{y:.4g}<extra></extra>",
                 }
             )  # fmt: skip
     return traces

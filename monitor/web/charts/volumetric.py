@@ -44,7 +44,7 @@ def vectors_chart(answer: OverStrokeAnswer) -> Chart:
             }
         ],
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.05, "y": -1.25, "z": 0.7}}},
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.45, "y": -1.7, "z": 0.95}}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
         height=520,

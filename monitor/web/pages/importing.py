@@ -1,17 +1,21 @@
-"""Import by upload: the folder of a campaign or a zip of it, all or nothing, every fault with file, line, column."""
+"""Import by upload: the folder of a campaign or a zip of it, all or nothing, every fault with file, line, column.
+
+Files of instruments come with the mapping that explains their columns. What was understood can be looked at first.
+"""
 
 from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from monitor.exceptions import MonitorError
-from monitor.readers.archive import unpack
+from monitor.exceptions import InputError, MonitorError
+from monitor.readers import MAPPING as FILE
+from monitor.readers.archive import UploadedFile, unpack, unpack_files
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
@@ -49,8 +53,23 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
     check_role(user, "import")
     with tempfile.TemporaryDirectory(dir=working_folder) as folder:
         try:
-            folders = list(unpack(form.files, Path(folder)))
-            answer: ImportAnswer = asker(user, "import", {}, {"folders": folders})
+            document = {"dry_run": True} if form.texts.get("button") == "look" else {}
+            answer: ImportAnswer = asker(
+                user, "import", document | form.filled("campaign"), _sent_files(form, Path(folder))
+            )
         except MonitorError as error:
-            return refusal_of(error, {f"{folder}/": "", folder: "the upload"})
+            labels: dict[str, str] = {}
+            for below in (f"{folder}/files", f"{folder}/mapping", folder):
+                labels |= {f"{below}/": "", below: "the upload"}
+            return refusal_of(error, labels)
         return answer
+
+
+def _sent_files(form: Form, folder: Path) -> dict[str, Any]:
+    """The files of a form where an import reads them. Raises InputError."""
+    if form.mapping is None:
+        return {"folders": list(unpack(form.files, folder / "files"))}
+    if not form.files:
+        raise InputError("choose the files of the instruments beside the mapping that explains them")
+    mapping = unpack_files([UploadedFile(FILE, form.mapping.content)], folder / "mapping")[0]
+    return {"folders": list(unpack_files(form.files, folder / "files")), "mapping": mapping}

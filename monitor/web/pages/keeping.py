@@ -28,7 +28,7 @@ def routes() -> APIRouter:
     def audit(request: Request) -> Response:
         """List who changed what and when."""
         answer = request.app.state.asker(request.state.user, "audit", {"last": ENTRIES})
-        return page(request, "audit.html", entries=tuple(reversed(answer.entries)))
+        return page(request, "audit.html", entries=answer.entries)
 
     @router.get("/work")
     def work(request: Request) -> Response:
