@@ -22,21 +22,11 @@ FEWEST_WORDS = 4
 LET_OFF = {
     "certificate/files.py": "what is refused",
     "contract.py": "names of questions",
-    "effects.py": "what was searched of a curve",
-    "health/mail.py": "faults of a configuration, joined to one exception",
     "model/change.py": "what is refused",
-    "model/subjects.py": "what a model is of",
-    "standards/standards.py": "names of the figures of ISO 230, and notes on a test",
-    "trend/forecast.py": "how a backtest was made",
-    "trend/volumetric.py": "how a forecast was made",
     "uncertainty/sentences_0_1_0.py": "reads what version 0.1.0 stored",
     "uncertainty/stored.py": "the key of a source in stored results",
-    "volumetric/compensation_header.py": "lines above the tables for a control",
     "volumetric/stating.py": "the origin of a map's region, which is stored",
-    "watching/watch.py": "why a folder still waits",
-    "run_statistics/coordinates.py": "why there is no statistic of coordinates",
     "models.py": "the note of a method's own model, which is stored",
-    "plan/candidates.py": "the name of the present times",
 }
 
 Node = ast.AST

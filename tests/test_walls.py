@@ -30,6 +30,7 @@ GROUND = {
     "sources",
     "bounded",
     "stopping",
+    "group_sums",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

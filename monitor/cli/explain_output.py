@@ -5,16 +5,19 @@ from __future__ import annotations
 from monitor.cli import output, residual_output
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
+from monitor.cli.verbs.plan_instruments import where
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
     BadRow,
     CurveExplanation,
     CurveMissing,
     ExplainAnswer,
+    InstrumentAlias,
     MachineExplanation,
     MachineMissing,
 )
 from monitor.workflow.explain.ties import Tie, TieBreak
+from monitor.workflow.plan.test_answer import TestAnswer
 
 #: So many blind spots are named.
 NAMED_BLIND_SPOTS = 6
@@ -45,6 +48,8 @@ def _machine(explanation: MachineExplanation) -> None:
     output.say(explanation.answer)
     _remaining(explanation)
     _next_step(explanation)
+    for alias in explanation.taken_for_machine:
+        output.say(_alias(alias, explanation.comparison.campaign))
     for sentence in explanation.undecided:
         output.say(sentence)
     if explanation.blind_spots:
@@ -53,6 +58,23 @@ def _machine(explanation: MachineExplanation) -> None:
             f"blind spots of this plan: {len(explanation.blind_spots)} effects leave nothing to see "
             f"({names}, ...); --json lists them"
         )
+
+
+def _alias(alias: InstrumentAlias, campaign: str) -> str:
+    """Errors of instruments that nobody could tell from the machine's, and what would."""
+    effects, parameters = " or ".join(alias.effects), ", ".join(alias.parameters)
+    if alias.measurement is not None:
+        would = f"{_test(alias.measurement)} would tell"
+    elif alias.searched:
+        would = "no single further test tells"
+    else:
+        would = f'what would tell: monitor plan {campaign} --for "{alias.effects[0]}"'
+    return f"{effects} would be read as {parameters}: {would}"
+
+
+def _test(test: TestAnswer) -> str:
+    """A test as one reads it: its instrument, its poses."""
+    return f"{test.instrument} ({where(test)})"
 
 
 def _remaining(explanation: MachineExplanation) -> None:
@@ -133,6 +155,10 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
     if tie.broken_by is TieBreak.PLAN:
         return f'to tell {rivals} apart: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+    if tie.broken_by is TieBreak.INSTRUMENT and tie.measurement is not None:
+        return f"to tell {rivals} apart: {_test(tie.measurement)}"
+    if tie.broken_by is TieBreak.INSTRUMENT:
+        return f"to tell {rivals} apart, measure the same movements with another instrument"
     if tie.broken_by is TieBreak.MORE_POSES:
         axes = " and ".join(tie.axes)
         return f"to tell {rivals} apart, measure more poses over the whole range of {axes}, and some under another load"

@@ -12,6 +12,7 @@ from typing import Any
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.configuration import configuration
+from monitor.cli.parser import add_model
 from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.dcc_elements import DccVersion
@@ -38,11 +39,7 @@ def add_issuing(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
     parser.add_argument("--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes (TOML), for methods that take these axes as known",

@@ -39,6 +39,17 @@ def document(answer: object) -> None:
     sys.stdout.write(text + "\n")
 
 
+def checked(answer: object, message: str, faults: Sequence[object], *, as_json: bool) -> int:
+    """Write an answer that may have faults, as JSON or as its message with them; return the exit status."""
+    if as_json:
+        document(answer)
+    else:
+        say(message)
+        for fault in faults:
+            say(f"  {fault}")
+    return 1 if faults else 0
+
+
 def _plain(answer: object) -> Any:
     """Return an answer as JSON has it."""
     if isinstance(answer, (list, tuple)):

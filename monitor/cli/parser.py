@@ -122,6 +122,15 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     )
 
 
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Add the option of the model under which a campaign is looked at."""
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
+
+
 def described(summary: str, example: str) -> dict[str, Any]:
     """Return what a subverb is added with: its summary in the list and in its own help, with an example."""
     return {

@@ -1,11 +1,12 @@
 """What a model contains: effects written ``term:shape@driver``, and the catalogue of them with words."""
 
-from monitor.effects.context import Context, context_of, positions_of
+from monitor.effects.context import Context, InstrumentRows, ReadBy, context_of, positions_of
 from monitor.effects.effect import (
     ArtefactEffect,
     Basis,
     ChainEffect,
     Effect,
+    InstrumentEffect,
     ParsedEffect,
     TurnEffect,
     parse_effect,
@@ -18,7 +19,10 @@ __all__ = [
     "ChainEffect",
     "Context",
     "Effect",
+    "InstrumentEffect",
+    "InstrumentRows",
     "ParsedEffect",
+    "ReadBy",
     "TurnEffect",
     "context_of",
     "parse_effect",

@@ -13,8 +13,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from monitor.effects.context import Context
+from monitor.effects.context import Context, InstrumentRows
 from monitor.effects.effect import ParsedEffect, parse_effect
+from monitor.effects.instrument import changes_of
 from monitor.machine import COMPONENTS, Chain
 from monitor.units import CONDITION_SUFFIXES
 
@@ -117,6 +118,11 @@ def of_sight(chain: Chain) -> tuple[str, ...]:
         *(f"flexure:{name}@gravity" for name in sagging),
         "sight:up:formula(1/tan(elevation))",
     )
+
+
+def of_instruments(instruments: InstrumentRows, drivers: Iterable[str]) -> tuple[str, ...]:
+    """Return the errors of the instruments themselves, of every setup that may have them."""
+    return tuple(changes_of(instruments, drivers))
 
 
 def drivers_of(context: Context) -> tuple[str, ...]:

@@ -24,6 +24,38 @@ SMALLEST_MOVE_RAD = 50e-6
 
 
 @dataclass(frozen=True)
+class ReadBy:
+    """A setup as effects know it: its ``id``, its ``instrument`` (empty where nobody says it), its ``kind`` of reading,
+    and how many ``numbers`` it reads a row."""
+
+    id: str
+    instrument: str
+    kind: str
+    numbers: int
+
+
+@dataclass(frozen=True)
+class InstrumentRows:
+    """What instruments read at the n rows, d numbers a row.
+
+    ``setup`` (n,) is the index of each row's setup among ``setups``; ``ideal`` (n, d) mm what a machine without errors
+    shows to instruments that stand as stated, NaN where nothing is read; ``towards`` (n, d, 3) unit vectors along which
+    the tool moves where a number grows, in the frame of the last tool axis, zero for angles. Angles stand in these
+    numbers as what they come to at ``lever`` mm.
+    """
+
+    setups: tuple[ReadBy, ...]
+    setup: npt.NDArray[np.int64]
+    ideal: Array
+    towards: Array
+    lever: float
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> InstrumentRows:
+        """Return the chosen rows, in that order, with repetitions; setups without rows stay named."""
+        return replace(self, setup=self.setup[rows], ideal=self.ideal[rows], towards=self.towards[rows])
+
+
+@dataclass(frozen=True)
 class Context:
     """The n probings, as the effects need them.
 
@@ -34,7 +66,7 @@ class Context:
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
-    nothing says them.
+    nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone.
     """
 
     chain: Chain
@@ -49,6 +81,7 @@ class Context:
     columns: Mapping[str, Array]
     expected: Array | None = None
     sight: Array | None = None
+    instruments: InstrumentRows | None = None
 
     def __len__(self) -> int:
         return len(self.run)
@@ -69,7 +102,12 @@ class Context:
             for field in fields(self)
             if isinstance(values := getattr(self, field.name), np.ndarray)
         }
-        return replace(self, **arrays, columns={name: values[rows] for name, values in self.columns.items()})
+        return replace(
+            self,
+            **arrays,
+            columns={name: values[rows] for name, values in self.columns.items()},
+            instruments=None if self.instruments is None else self.instruments.taken(rows),
+        )
 
     def expecting(self, expected: Array) -> Context:
         """Return the same probings with ``expected`` (n, J), in the columns of the axes' readings too."""

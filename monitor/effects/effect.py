@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from monitor.effects.artefact import HEADS, ArtefactChange, parse_artefact
+from monitor.effects.change import Change
 from monitor.effects.context import Context
 from monitor.effects.driver import Driver
 from monitor.effects.drivers import Always, SettlingDriver, parse_driver
+from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS
+from monitor.effects.instrument import InstrumentChange, parse_instrument
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape, Shape
 from monitor.effects.shapes import Compliance, Const, Nodes, Poly, parse_shape
@@ -95,7 +98,31 @@ class TurnBasis:
         errors[..., self.joint, MOTION, 3:] += np.sum(self.turns * np.expand_dims(coefficients, -2), axis=-1)
 
 
-Basis = ChainBasis | ArtefactBasis | TurnBasis
+@dataclass(frozen=True)
+class InstrumentBasis:
+    """A change of what instruments show, at n rows of d numbers: ``shown`` (n, d, k) in mm. The machine stays as it
+    is: the problem of the readings adds it to what they should be."""
+
+    shown: Array
+
+    @property
+    def size(self) -> int:
+        """The number of coefficients of the effect."""
+        return int(self.shown.shape[-1])
+
+    def displacement(self, by_error: Array) -> Array:
+        """Return the change (n, d, k) of the numbers for each coefficient."""
+        return self.shown
+
+    def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
+        """Leave the machine as it is."""
+
+    def added(self, coefficients: Array) -> Array:
+        """Return the change (n, d) of the numbers; ``coefficients`` is (k,) or (n, k)."""
+        return np.asarray(np.sum(self.shown * np.expand_dims(coefficients, -2), axis=-1))
+
+
+Basis = ChainBasis | ArtefactBasis | TurnBasis | InstrumentBasis
 
 
 class Effect(Protocol):
@@ -168,11 +195,14 @@ class ChainEffect:
         return ChainBasis(self.term, product)
 
 
-@dataclass(frozen=True)
-class ArtefactEffect:
-    """A change of the targets."""
+AnyChange = TypeVar("AnyChange", bound=Change)
 
-    change: ArtefactChange
+
+@dataclass(frozen=True)
+class _DrivenChange(Generic[AnyChange]):
+    """A change and what scales it."""
+
+    change: AnyChange
     driver: Driver
     driver_text: str
 
@@ -190,6 +220,11 @@ class ArtefactEffect:
             f"{self.text}{s}{d}" for s in self.change.labels(context) for d in self.driver.labels(context)
         )
 
+
+@dataclass(frozen=True)
+class ArtefactEffect(_DrivenChange[ArtefactChange]):
+    """A change of the targets."""
+
     def basis(self, context: Context) -> ArtefactBasis:
         shift = self.change.shifts(context)
         driver = self.driver.columns(context, None)
@@ -198,36 +233,40 @@ class ArtefactEffect:
 
 
 @dataclass(frozen=True)
-class TurnEffect:
+class TurnEffect(_DrivenChange[Turn]):
     """A turn with one coefficient for several terms."""
 
-    turn: Turn
-    driver: Driver
-    driver_text: str
-
-    @property
-    def text(self) -> str:
-        return self.turn.text + (f"@{self.driver_text}" if self.driver_text else "")
-
-    @property
-    def unit(self) -> Unit:
-        driver = self.driver.unit()
-        return self.turn.unit if driver is ONE else self.turn.unit.per(driver)
-
-    def parameters(self, context: Context) -> tuple[str, ...]:
-        return tuple(
-            f"{self.text}{s}{d}" for s in self.turn.labels(context) for d in self.driver.labels(context)
-        )
-
     def basis(self, context: Context) -> TurnBasis:
-        turns = self.turn.turns(context)
-        driver = self.driver.columns(context, self.turn.joint(context.chain))
+        turns = self.change.turns(context)
+        driver = self.driver.columns(context, self.change.joint(context.chain))
         product = (turns[:, :, :, None] * driver[:, None, None, :]).reshape(len(turns), 3, -1)
-        return TurnBasis(self.turn.joint(context.chain), product)
+        return TurnBasis(self.change.joint(context.chain), product)
+
+
+@dataclass(frozen=True)
+class InstrumentEffect(_DrivenChange[InstrumentChange]):
+    """A change of what an instrument shows."""
+
+    def basis(self, context: Context) -> InstrumentBasis:
+        shown = self.change.shown(context)
+        driver = self.driver.columns(context, None)
+        if self.change.needs_driver:
+            driver = self.change.since_the_first(driver, context)
+        product = shown[:, :, :, None] * driver[:, None, None, :]
+        return InstrumentBasis(product.reshape(*shown.shape[:2], -1))
 
 
 #: Every effect that a text can name.
-ParsedEffect = ChainEffect | ArtefactEffect | TurnEffect
+ParsedEffect = ChainEffect | ArtefactEffect | TurnEffect | InstrumentEffect
+
+
+def _instrument_effect(text: str) -> InstrumentEffect:
+    """Return the change of an instrument that a text names. Raises EffectError where it needs a driver."""
+    body, driver_text = _split_driver(text)
+    change = parse_instrument(body)
+    if change.needs_driver and not driver_text:
+        raise EffectError(f"'{text}' is what every run has of its own; name what it follows: {text}@run_time")
+    return InstrumentEffect(change, parse_driver(driver_text), driver_text)
 
 
 def _turn_effect(text: str, chain: Chain) -> TurnEffect:
@@ -246,6 +285,8 @@ def parse_effect(text: str, chain: Chain) -> ParsedEffect:
     """Return the effect that a text names on a chain. Raises EffectError, which says what would be right."""
     if text.strip().partition(":")[0] in TURN_HEADS:
         return _turn_effect(text.strip(), chain)
+    if text.strip().partition(":")[0] in INSTRUMENT_HEADS:
+        return _instrument_effect(text.strip())
     body, driver_text = _split_driver(text.strip())
     head, _, shape_text = body.partition(":")
     if head in HEADS:

@@ -8,29 +8,14 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from monitor.effects.change import Change
 from monitor.effects.context import Context
-from monitor.effects.description import Description
 from monitor.machine import Chain
 from monitor.records import Array
-from monitor.units import Unit
 
 
-class Turn(Protocol):
+class Turn(Change, Protocol):
     """A turn of all that one joint carries."""
-
-    @property
-    def text(self) -> str:
-        """The turn as written."""
-        ...
-
-    @property
-    def unit(self) -> Unit:
-        """The unit of its coefficients."""
-        ...
-
-    def labels(self, context: Context) -> tuple[str, ...]:
-        """Return a suffix for each of the k coefficients."""
-        ...
 
     def joint(self, chain: Chain) -> int:
         """Return the index of the joint that carries what turns. Raises EffectError where the chain has none."""
@@ -39,8 +24,4 @@ class Turn(Protocol):
     def turns(self, context: Context) -> Array:
         """Return the turn vectors (n, 3, k) for a unit of each coefficient, in the frame of the joint after its
         motion."""
-        ...
-
-    def described(self, driven: str) -> Description:
-        """Return the turn in words; ``driven`` is the phrase of its driver, which begins with a comma."""
         ...

@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from monitor.effects.description import Description, Explanation, described
 from monitor.effects.driver import DescribedDriver
-from monitor.effects.effect import ArtefactEffect, ParsedEffect, TurnEffect
+from monitor.effects.effect import ArtefactEffect, InstrumentEffect, ParsedEffect, TurnEffect
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
 
 
 def describe(effect: ParsedEffect) -> Description:
     """Describe an effect in words."""
-    if isinstance(effect, ArtefactEffect):
+    if isinstance(effect, ArtefactEffect | InstrumentEffect | TurnEffect):
         return effect.change.described(_driver_phrase(effect))
-    if isinstance(effect, TurnEffect):
-        return effect.turn.described(_driver_phrase(effect))
     error = JointError(effect.term, effect.joint)
     explanations: list[Explanation | None] = [error.explanation()]
     phrase = f", of shape {effect.shape_text}"

@@ -12,6 +12,7 @@ from monitor.records import Machine
 
 #: Among the added effects: all base effects, one number for all runs of a campaign instead of one in each.
 SHARED_BASE = "base@all_runs"
+SHARED_BASE_MEANING = "the base effects, each one number for all runs of a campaign"
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ def _size(table: Table, quantity: Quantity, rule: QuantityRule, law: Law) -> tup
     return unit.to_internal(float(values[present[0]] or 0.0)), unit
 
 
-def _asked(table: Table, key: str, rule: QuantityRule) -> bool:
+def _asked(key: str, rule: QuantityRule) -> bool:
     """Whether the quantity has such a key; one that it does not have is refused by ``finish``."""
     return key in rule.required or key in rule.optional
 
@@ -191,15 +191,13 @@ def _asked(table: Table, key: str, rule: QuantityRule) -> bool:
 def _number(
     table: Table, key: str, rule: QuantityRule, largest: float, unit: str, example: str
 ) -> float | None:
-    if not _asked(table, key, rule):
+    if not _asked(key, rule):
         return None
     return table.number(key, required=key in rule.required, largest=largest, unit=unit, example=example)
 
 
 def _text(table: Table, key: str, rule: QuantityRule, example: str) -> str | None:
-    return (
-        table.text(key, required=key in rule.required, example=example) if _asked(table, key, rule) else None
-    )
+    return table.text(key, required=key in rule.required, example=example) if _asked(key, rule) else None
 
 
 def _axis(table: Table, quantity: Quantity, rule: QuantityRule, axes: tuple[Axis, ...] | None) -> str | None:
@@ -224,7 +222,7 @@ def _along(table: Table, rule: QuantityRule) -> str | None:
 
 
 def _spacing(table: Table, rule: QuantityRule) -> tuple[float, float] | None:
-    if not _asked(table, "node_spacing_mm", rule):
+    if not _asked("node_spacing_mm", rule):
         return None
     spacing = table.numbers(
         "node_spacing_mm", 2, required=True, largest=_LARGEST_SPACING_MM, unit="mm", example="[20.0, 50.0]"

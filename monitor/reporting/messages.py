@@ -196,6 +196,11 @@ def arrived(campaign: str, state: str, arrival: str, size: tuple[int, str], why_
     return f"{campaign}: {state} from {arrival}, {size[0]} {size[1]}; {what}"
 
 
+def may_still_be_copied(seconds: float) -> str:
+    """Return why an arrival waits that changed so many seconds ago."""
+    return f"it changed {seconds:.0f} s ago and may still be copied"
+
+
 def arrival_refused(folder: object) -> str:
     """Return that a folder was refused."""
     return f"refused, and left where it is: {folder}"

@@ -147,6 +147,14 @@ class LeftOutNoted(Sentence):
         )
 
 
+@dataclass(frozen=True)
+class RunsOfSeveralPlans(Sentence):
+    """The runs do not follow one plan, so that their coordinates cannot be compared one by one."""
+
+    def __str__(self) -> str:
+        return "the runs do not follow one plan"
+
+
 def joined_by_and(names: Sequence[object]) -> str:
     """Return names with commas, the last two joined by ``and``."""
     *first, last = map(str, names)

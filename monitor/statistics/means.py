@@ -44,7 +44,6 @@ class AnalysisOfVariance(GroupTest):
     ss_within: Array
     ms_between: Array
     ms_within: Array
-    r_squared: Array
 
     @property
     def residual_sd(self) -> Array:
@@ -73,7 +72,6 @@ def anova_from_sums(sums: GroupedSums) -> AnalysisOfVariance:
         ss_within=sums.ss_within,
         ms_between=sums.ms_between,
         ms_within=sums.ms_within,
-        r_squared=divide(sums.ss_between, sums.ss_between + sums.ss_within),
     )
 
 

@@ -6,35 +6,16 @@ values themselves; here each cell (a machine and parameter) has groups and runs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy
 
 from monitor.exceptions import DataError
+from monitor.group_sums import GroupSums
 from monitor.records import Array
 from monitor.statistics.days.block_lines import DEPENDENT, Blocks, block_lines
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
-
-
-@dataclass(frozen=True)
-class GroupSums:
-    """Sums of c cells about an origin that every cell has for itself; all arrays (c,).
-
-    ``offset`` sums value less origin, ``squares`` the n_j times squared offset of the mean of each group, ``within``
-    the squared deviations from the group means. ``repeated`` groups have two runs or more; ``log_variances`` sums
-    (n_j - 1) ln s_j² and ``inverse_dof`` 1 / (n_j - 1) over them, ``least_variance`` is the smallest s_j².
-    """
-
-    groups: Array
-    runs: Array
-    offset: Array
-    squares: Array
-    within: Array
-    repeated: Array
-    least_variance: Array
-    log_variances: Array
-    inverse_dof: Array
 
 
 @dataclass(frozen=True)
@@ -93,12 +74,8 @@ def cells_from_sums(sums: GroupSums) -> CellTests:
     """
     count = len(np.asarray(sums.runs))
     k, n, offset, squares, within, repeated, least, logs, inverse = (
-        _checked(getattr(sums, name), name, count)
-        for name in (
-            "groups", "runs", "offset", "squares", "within", "repeated", "least_variance", "log_variances",
-            "inverse_dof",
-        )
-    )  # fmt: skip
+        _checked(getattr(sums, field.name), field.name, count) for field in fields(GroupSums)
+    )
     dof1, dof2 = k - 1.0, n - k
     ss = np.maximum(squares - _quotient(offset**2, n), 0.0)
     # Where nothing is repeated, or there is one group, there is no mean square: NaN.

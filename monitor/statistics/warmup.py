@@ -30,7 +30,6 @@ class WarmUp:
     """
 
     final: float
-    u_final: float
     amplitude: float
     u_amplitude: float
     tau: float
@@ -141,7 +140,6 @@ def warm_up(
     longest = np.inf if np.isinf(high) else _stable(profile.tau[inside], size + half, limit).max()
     return WarmUp(
         final=final,
-        u_final=float(np.sqrt(covariance[0, 0])),
         amplitude=amplitude,
         u_amplitude=float(np.sqrt(covariance[1, 1])),
         tau=tau,

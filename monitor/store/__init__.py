@@ -38,7 +38,7 @@ from monitor.store.certificates import (
     save_certificate,
 )
 from monitor.store.connection import Database
-from monitor.store.copies.backup import snapshot, take_backup
+from monitor.store.copies.backup import take_backup
 from monitor.store.copies.compaction import Compaction, compact
 from monitor.store.copies.export import export_tables
 from monitor.store.copies.increment import take_increment
@@ -222,7 +222,6 @@ __all__ = [
     "save_machine_model",
     "save_model",
     "save_selection",
-    "snapshot",
     "stored_analyses",
     "take_backup",
     "take_increment",

@@ -13,8 +13,6 @@ from monitor.uncertainty.coverage_regions.coverage import (
     ellipsoid_factor,
     joint_coverage,
     rectangle_factor,
-    sample_ellipsoid_factor,
-    sample_rectangle_factor,
     single_factor,
 )
 from monitor.uncertainty.coverage_regions.regions import RegionFactors, region_factors
@@ -22,7 +20,6 @@ from monitor.uncertainty.degrees_of_freedom import effective_dof
 from monitor.uncertainty.framework import FrameworkResult, gum_framework
 from monitor.uncertainty.marginals import (
     Arcsine,
-    Empirical,
     Marginal,
     Normal,
     Rectangular,
@@ -44,10 +41,8 @@ from monitor.uncertainty.monte_carlo.sampling import (
     block_generator,
     independent,
     normal_inputs,
-    t_inputs,
 )
 from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
-from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.row_run import RowRun, measured_run, repeated_readings
 from monitor.uncertainty.runs.sensitivity import Sensitivity, sensitivity_of
@@ -60,7 +55,6 @@ __all__ = [
     "BlockSampler",
     "BudgetLine",
     "Comparison",
-    "Empirical",
     "Estimated",
     "FrameworkResult",
     "Inputs",
@@ -72,7 +66,6 @@ __all__ = [
     "MonteCarloResult",
     "Normal",
     "OutputContribution",
-    "Projection",
     "Rectangular",
     "RegionFactors",
     "RowRun",
@@ -96,7 +89,6 @@ __all__ = [
     "joint_coverage",
     "measured_run",
     "monte_carlo",
-    "nearest_correlation",
     "normal_inputs",
     "numerical_tolerance",
     "overall",
@@ -105,11 +97,8 @@ __all__ = [
     "region_factors",
     "repeated_readings",
     "run_estimator",
-    "sample_ellipsoid_factor",
-    "sample_rectangle_factor",
     "sensitivity_of",
     "single_factor",
-    "t_inputs",
     "uncorrelated",
     "validate",
 ]

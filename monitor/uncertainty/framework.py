@@ -17,11 +17,11 @@ from monitor.uncertainty.covariance import Inputs
 from monitor.uncertainty.coverage_regions.regions import RegionFactors, region_factors
 from monitor.uncertainty.degrees_of_freedom import effective_dof
 from monitor.uncertainty.parts import BudgetLine, OutputContribution, known
-from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
+from monitor.uncertainty.roots import WithCovariance, checked_covariance, covariance_root
 
 
 @dataclass(frozen=True)
-class FrameworkResult:
+class FrameworkResult(WithCovariance):
     """Estimates, covariance and coverage factors of the outputs after JCGM 102 clause 6.
 
     ``sensitivity`` is C (m, n) over the inputs ``input_names``. ``dof`` are the effective degrees of freedom
@@ -57,21 +57,6 @@ class FrameworkResult:
     def k_q(self) -> float:
         """Coverage factor of the hyper-rectangle."""
         return self.factors.k_q
-
-    @property
-    def u(self) -> Array:
-        """Standard uncertainties (m,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Array:
-        """Correlation matrix (m, m)."""
-        return correlation_of(self.covariance)
-
-    @property
-    def lambda_max(self) -> float:
-        """The largest eigenvalue of the correlation matrix."""
-        return float(np.linalg.eigvalsh(self.correlation)[-1])
 
     @property
     def expanded(self) -> Array:

@@ -2,8 +2,7 @@
 
 Each has ``mean``, ``std`` and ``quantile``; the copula in ``sampling`` joins them. Choose by what is known:
 ``Normal`` from a certificate with k = 2, ``StudentT`` from a few repeated readings, ``Rectangular`` from
-limits, ``Triangular`` from the sum of two equal limits, ``Arcsine`` from a sinusoidal disturbance,
-``Empirical`` from a recorded sample.
+limits, ``Triangular`` from the sum of two equal limits, ``Arcsine`` from a sinusoidal disturbance.
 """
 
 from __future__ import annotations
@@ -78,19 +77,24 @@ class StudentT:
 
 
 @dataclass(frozen=True)
-class Rectangular:
-    """Equally likely between ``low`` and ``high`` (JCGM 101 6.4.2)."""
+class _Limited:
+    """A symmetric distribution between ``low`` and ``high``."""
 
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        _limits("rectangular", self.low, self.high)
+        _limits(type(self).__name__.lower(), self.low, self.high)
 
     @property
     def mean(self) -> float:
         """The middle."""
         return 0.5 * (self.low + self.high)
+
+
+@dataclass(frozen=True)
+class Rectangular(_Limited):
+    """Equally likely between ``low`` and ``high`` (JCGM 101 6.4.2)."""
 
     @property
     def std(self) -> float:
@@ -103,19 +107,8 @@ class Rectangular:
 
 
 @dataclass(frozen=True)
-class Triangular:
+class Triangular(_Limited):
     """Symmetric triangle between ``low`` and ``high`` (JCGM 101 6.4.5)."""
-
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _limits("triangular", self.low, self.high)
-
-    @property
-    def mean(self) -> float:
-        """The middle."""
-        return 0.5 * (self.low + self.high)
 
     @property
     def std(self) -> float:
@@ -130,19 +123,8 @@ class Triangular:
 
 
 @dataclass(frozen=True)
-class Arcsine:
+class Arcsine(_Limited):
     """U-shaped between ``low`` and ``high``: a sine of unknown phase (JCGM 101 6.4.6)."""
-
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _limits("arcsine", self.low, self.high)
-
-    @property
-    def mean(self) -> float:
-        """The middle."""
-        return 0.5 * (self.low + self.high)
 
     @property
     def std(self) -> float:
@@ -153,34 +135,3 @@ class Arcsine:
         """Quantiles."""
         half = 0.5 * (self.high - self.low)
         return np.asarray(self.mean + half * np.sin(math.pi * (probability - 0.5)))
-
-
-class Empirical:
-    """A recorded sample: its quantiles, linear between the ordered values (JCGM 101 6.5).
-
-    ``values`` (n,) with n >= 2, any order. Nothing beyond the smallest and the largest value is ever drawn,
-    so a short sample gives short tails.
-    """
-
-    def __init__(self, values: Array) -> None:
-        ordered = np.sort(np.asarray(values, dtype=np.float64).ravel())
-        if len(ordered) < 2 or not np.all(np.isfinite(ordered)):
-            raise DataError(f"a sampled distribution needs two finite values or more, but has {len(ordered)}")
-        self.values = ordered
-
-    # Moments of the piecewise linear quantile function, so that they are those of what is drawn.
-    @property
-    def mean(self) -> float:
-        """Expectation of what is drawn."""
-        return float(np.mean(0.5 * (self.values[1:] + self.values[:-1])))
-
-    @property
-    def std(self) -> float:
-        """Return Standard deviation of what is drawn."""
-        low, high = self.values[:-1] - self.mean, self.values[1:] - self.mean
-        return math.sqrt(float(np.mean((low * low + low * high + high * high) / 3.0)))
-
-    def quantile(self, probability: Array) -> Array:
-        """Quantiles."""
-        rank = probability * (len(self.values) - 1)
-        return np.asarray(np.interp(rank, np.arange(len(self.values)), self.values))

@@ -55,7 +55,7 @@ def covariance_root(covariance: Array, tolerance: float = RANK_TOLERANCE) -> Cov
     if len(values) and values[0] < -max(tolerance, 1e-9) * max(largest, 1e-300):
         raise DataError(
             f"the covariance matrix is not positive semidefinite: its correlation matrix has the eigenvalue "
-            f"{values[0]:.3g}; project it first (nearest_correlation)"
+            f"{values[0]:.3g}, and none may be negative"
         )
     significant = values > tolerance * largest
     lengths = np.sqrt(values[significant])
@@ -109,3 +109,24 @@ def correlation_of(covariance: Array) -> Array:
     correlation = np.asarray(covariance / np.outer(safe, safe))
     np.fill_diagonal(correlation, 1.0)
     return correlation
+
+
+class WithCovariance:
+    """What follows from the ``covariance`` (m, m) of a result's outputs."""
+
+    covariance: Array
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties (m,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix (m, m)."""
+        return correlation_of(self.covariance)
+
+    @property
+    def lambda_max(self) -> float:
+        """The largest eigenvalue of the correlation matrix."""
+        return float(np.linalg.eigvalsh(self.correlation)[-1])

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ArtefactEffect, parse_effect
+from monitor.effects import parse_effect
+from monitor.effects.effect import ChainBasis
 from monitor.exceptions import InputError
 from monitor.machine import LOCATION, MOTION
 from monitor.records import Array, Campaign
@@ -211,10 +212,10 @@ def _effect(scene: Scene, source: Source) -> Shared:
         )
     basis = effect.basis(problem.context)
     moved = basis.displacement(scene.by_error)
-    if isinstance(effect, ArtefactEffect):
-        largest = np.linalg.norm(moved, axis=1).max(axis=0)
+    if isinstance(basis, ChainBasis):
+        largest = np.abs(basis.columns).max(axis=0)
     else:
-        largest = np.abs(basis.columns).max(axis=0)  # type: ignore[union-attr]
+        largest = np.linalg.norm(moved, axis=1).max(axis=0)
     return scene.observed(moved / np.where(largest > 0.0, largest, 1.0)), scene.one_for_all
 
 

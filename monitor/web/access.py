@@ -11,6 +11,8 @@ from typing import Any
 from monitor.web.users import Role
 from monitor.workflow.contract import QUESTIONS
 
+#: The path under which everything of the HTTP interface is.
+ROOT = "/api/v1"
 #: What changes the history of machines, models or campaigns.
 ENGINEERS = frozenset(
     {"add effect", "event", "identify all", "import", "remove effect", "select", "use model"}
@@ -96,6 +98,11 @@ STAYING: Mapping[str, str] = {
 NOT_TAKEN = frozenset({"cluster", "incremental", "workers"})
 #: Questions judged by the tolerances by machine type of the configuration of whoever asks.
 JUDGING = frozenset({"fleet", "report", "trend"})
+
+
+def address_of(question: str) -> str:
+    """Return the path of a question: ``add effect`` is ``/api/v1/add-effect``."""
+    return f"{ROOT}/{question.replace(' ', '-')}"
 
 
 def role_needed(question: str) -> Role:

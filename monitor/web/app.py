@@ -12,11 +12,12 @@ from starlette.responses import JSONResponse, Response
 
 from monitor.exceptions import MonitorError
 from monitor.store import Database
+from monitor.web.access import ROOT
 from monitor.web.asking import Asker
 from monitor.web.desk import Desk
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.gate import Gate
-from monitor.web.interface import ROOT, interface
+from monitor.web.interface import interface
 from monitor.web.opening import host_user_name
 from monitor.web.pages import campaign as campaign_page
 from monitor.web.pages import (

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from monitor.exceptions import InputError, MonitorError
 from monitor.store import Database, last_identification, list_campaigns
-from monitor.web.access import FILES, NOT_OFFERED, offered, role_needed, taken_fields, writes
+from monitor.web.access import NOT_OFFERED, offered, role_needed, taken_fields, writes
 from monitor.web.freshness import IDENTIFYING, REMEMBERED, Freshness
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
@@ -161,11 +161,3 @@ def _unknown(question: str, key: str, taken: tuple[str, ...]) -> str:
         return f"'{question}' takes no '{key}'; did you mean '{near[0]}'?"
     listed = f"it takes {', '.join(taken)}" if taken else "it takes nothing"
     return f"'{question}' takes no '{key}'; {listed}"
-
-
-def download_path(question: str, folder: Path) -> dict[str, Path]:
-    """Return the field of the file that a question writes, as a path in a folder of the server's own."""
-    travelling = FILES.get(question)
-    if travelling is None or travelling.download is None:
-        return {}
-    return {travelling.download: folder / travelling.file_name if travelling.file_name else folder}

@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 from monitor import __version__
 from monitor.documents import answer_from_document, to_document
 from monitor.exceptions import InputError, NotFoundError
-from monitor.web.access import JUDGING, NOT_OFFERED, STAYING
+from monitor.web.access import JUDGING, NOT_OFFERED, ROOT, STAYING, address_of
 from monitor.web.note import Note
 from monitor.web.parcel import MEDIA_TYPE, check_targets, packed_question, travelling, unpacked_answer
 from monitor.web.settings import DEFAULT_PORT, UPLOAD_BYTES, is_loopback
@@ -142,7 +142,7 @@ class Server:
             headers["Authorization"] = f"Bearer {self._token}"
         connection = self._connected()
         try:
-            connection.request("POST", f"/api/v1/{question.replace(' ', '-')}", body, headers)
+            connection.request("POST", address_of(question), body, headers)
             response = connection.getresponse()
             return self._read(question, document, response)
         except (OSError, http.client.HTTPException) as error:
@@ -205,7 +205,7 @@ class Server:
         except (InputError, TypeError, ValueError, KeyError) as error:
             raise InputError(
                 f"the answer of {self.address} is not understood ({error}); this is monitor {__version__}, and "
-                f"{self.address}/api/v1/openapi.json says which the server is: use the same"
+                f"{self.address}{ROOT}/openapi.json says which the server is: use the same"
             ) from error
 
     def _refusal(self, status: int, kind: str, body: bytes) -> Exception:

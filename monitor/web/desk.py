@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from threading import Event, Lock
 from typing import Any
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import MonitorError, NotFoundError
 from monitor.stopping import StoppedError, stoppable
 from monitor.web.asking import Asker, ForbiddenError, check_role
 from monitor.web.freshness import Stamp
@@ -88,6 +88,13 @@ class Ticket:
             return self.future.result(timeout=max(patience - self.seconds, 0.0))
         except (StillWorking, CancelledError, StoppedError):
             return None
+
+    def outcome(self) -> tuple[Any, str]:
+        """Return the answer and why there is none; None and nothing while it is computed."""
+        try:
+            return self.answer(), ""
+        except MonitorError as error:
+            return None, str(error)
 
 
 class Desk:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from starlette.exceptions import HTTPException
 
@@ -29,8 +31,25 @@ class Refusal:
     in_full: str = ""
 
 
-def refusal_of(error: Exception) -> Refusal:
-    """Return the refusal for what a question raised; 500 for what it should not have raised."""
+def relabelled(value: Any, labels: Mapping[str, str]) -> Any:
+    """Return a text, or a document with texts, in which labels stand for the paths that only the server knows."""
+    if isinstance(value, str):
+        for path, label in sorted(labels.items(), reverse=True):
+            value = value.replace(path, label)
+        return value
+    if isinstance(value, dict):
+        return {key: relabelled(element, labels) for key, element in value.items()}
+    return [relabelled(element, labels) for element in value] if isinstance(value, list | tuple) else value
+
+
+def refusal_of(error: Exception, labels: Mapping[str, str] | None = None) -> Refusal:
+    """Return the refusal for what a question raised, with ``labels`` for paths; 500 for what should not be raised."""
+    refusal = _refusal_of(error)
+    texts = relabelled((refusal.error, refusal.in_full, *refusal.faults), labels or {})
+    return Refusal(refusal.status, texts[0], tuple(texts[2:]), texts[1])
+
+
+def _refusal_of(error: Exception) -> Refusal:
     if isinstance(error, HTTPException):
         # A form that cannot be read, such as one without its boundary.
         return Refusal(error.status_code, f"the request cannot be read: {error.detail}")

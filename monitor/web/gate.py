@@ -87,7 +87,7 @@ class Gate:
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
-                message["headers"] = [*message.get("headers", []), *self._headers(scope, message, cookie)]
+                message["headers"] = [*message.get("headers", []), *self._headers(message, cookie)]
             await send(message)
 
         try:
@@ -144,9 +144,7 @@ class Gate:
         assert fresh is not None
         return self._sessions.host_user, fresh, session_cookie(fresh, encrypted=self._settings.is_encrypted)
 
-    def _headers(
-        self, scope: Scope, message: MutableMapping[str, Any], cookie: str | None
-    ) -> list[tuple[bytes, bytes]]:
+    def _headers(self, message: MutableMapping[str, Any], cookie: str | None) -> list[tuple[bytes, bytes]]:
         present = {name.lower() for name, _ in message.get("headers", [])}
         added = dict(HEADERS)
         if b"cache-control" not in present:

@@ -13,13 +13,11 @@ from __future__ import annotations
 import json
 import stat
 import zipfile
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from monitor.exceptions import InputError
-from monitor.readers.archive import LONGEST_NAME, unpack_zip
 from monitor.web.access import FILES, FileFields
 
 MEDIA_TYPE = "application/zip"
@@ -39,87 +37,13 @@ def travelling(question: str) -> FileFields:
     return FILES.get(question, FileFields())
 
 
-@dataclass
-class Placed:
-    """The files of a question as the server has them: ``files`` by field, and the label of each of its paths."""
-
-    document: dict[str, Any]
-    tolerances: Mapping[str, Mapping[str, float]] | None = None
-    files: dict[str, Any] = field(default_factory=dict)
-    labels: dict[str, str] = field(default_factory=dict)
-
-    def told(self, value: Any) -> Any:
-        """Return a document, or a text, with labels in place of the server's own paths."""
-        if isinstance(value, str):
-            for path, label in sorted(self.labels.items(), reverse=True):
-                # As pathlib joins them: what is in the folder "." is named without it.
-                value = value.replace(f"{path}/", "" if label == "." else f"{label.rstrip('/')}/")
-                value = value.replace(path, label)
-            return value
-        if isinstance(value, dict):
-            return {key: self.told(element) for key, element in value.items()}
-        return [self.told(element) for element in value] if isinstance(value, list | tuple) else value
-
-
-def placed(question: str, parcel: IO[bytes], incoming: Path, outgoing: Path) -> Placed:
-    """Unpack a question. Raises InputError for a parcel that cannot be trusted, read or understood."""
-    unpack_zip("the parcel", parcel, incoming)
-    try:
-        content = json.loads((incoming / QUESTION_FILE).read_bytes())
-        document, tolerances = content["document"], content.get("tolerances")
-        json.dumps(document, ensure_ascii=False).encode("utf-8")  # half a character is refused here
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(
-            f'the parcel needs a {QUESTION_FILE} such as {{"document": {{}}}}: {error}'
-        ) from error
-    if not isinstance(document, dict):
-        raise InputError('"document" must be an object such as {"campaign": "five-days"}')
-    asked = Placed(document, _limits(tolerances))
-    fields = travelling(question)
-    for name in fields.incoming:
-        _place(asked, name, incoming / name, one_each=True)
-    for name in fields.outgoing:
-        (outgoing / name).mkdir(parents=True, exist_ok=True)
-        _place(asked, name, outgoing / name, one_each=False)
-    return asked
-
-
-def _place(asked: Placed, name: str, folder: Path, *, one_each: bool) -> None:
-    """Put paths below a folder of the server in the place of the labels of a field, in a folder each or all in one."""
-    value = asked.document.pop(name, None)
-    labels = value if isinstance(value, list) else [] if value is None else [value]
-    for label in labels:
-        if not isinstance(label, str) or len(label) > 20 * LONGEST_NAME or "\0" in label:
-            raise InputError(f"'{name}' must be the path of a file, as text")
-    paths = [
-        (folder / str(index) if one_each else folder) / last_part(label) for index, label in enumerate(labels)
-    ]
-    asked.labels |= {str(path): label for path, label in zip(paths, labels, strict=True)}
-    if value is not None:
-        asked.files[name] = paths if isinstance(value, list) else paths[0]
-
-
-def _limits(tolerances: Any) -> Mapping[str, Mapping[str, float]] | None:
-    if tolerances is None:
-        return None
-    rows = tolerances.values() if isinstance(tolerances, dict) else [None]
-    for row in rows:
-        if not isinstance(row, dict) or not all(
-            isinstance(limit, int | float) and not isinstance(limit, bool) and 0.0 < limit < float("inf")
-            for limit in row.values()
-        ):
-            raise InputError(
-                '"tolerances" must be limits by machine type, such as {"HU40-T": {"EC0Y": 20.0}}'
-            )
-    return dict(tolerances)
-
-
-def packed_answer(answer: Any, outgoing: Path, target: IO[bytes]) -> None:
-    """Write an answer with the files below ``outgoing`` as a zip."""
+def packed(files: Iterable[Path], folder: Path, target: IO[bytes], answer: Any = None) -> None:
+    """Write files by their names below ``folder`` as a zip, and before them an answer where there is one."""
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(ANSWER_FILE, json.dumps(answer, ensure_ascii=False, allow_nan=False))
-        for path in sorted(path for path in outgoing.rglob("*") if path.is_file()):
-            archive.write(path, path.relative_to(outgoing).as_posix())
+        if answer is not None:
+            archive.writestr(ANSWER_FILE, json.dumps(answer, ensure_ascii=False, allow_nan=False))
+        for path in files:
+            archive.write(path, path.relative_to(folder).as_posix())
 
 
 def packed_question(question: str, content: Mapping[str, Any], target: IO[bytes], limit: int) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from monitor.documents import INLINED, OMITTED
 from monitor.effects import ParsedEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
-from monitor.effects.curve import SEARCHED, CurveEffect
+from monitor.effects.curve import CurveEffect
 from monitor.effects.curve.words import describe_curve
 from monitor.effects.description import Description
 from monitor.effects.words import describe
@@ -162,6 +162,4 @@ def _describe_of_curve(effect: CurveEffect, problem: CurveProblem) -> Descriptio
     values = grid(effect, problem.inputs)
     if len(values) == 0:
         return None
-    description = describe_curve(effect.at(float(values[0])), curve.response, unit, clock=is_time)
-    meaning = f"{effect.shape} of {effect.column} in {curve.response}, its {SEARCHED[effect.shape]} searched"
-    return replace(description, meaning=meaning)
+    return describe_curve(effect.at(float(values[0])), curve.response, unit, clock=is_time, searched=True)

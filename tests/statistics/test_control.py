@@ -20,7 +20,7 @@ from monitor.statistics import (
 
 def test_handbook_6_3_2_2_individuals(certified):
     right = certified("nist-handbook/individuals_6_3_2_2.json")
-    reference = reference_period(right["x"], scatter="moving range")
+    reference = reference_period(right["x"], by_moving_range=True)
     assert reference.centre == pytest.approx(right["published"]["centre"], abs=5e-3)
     chart = individuals_chart(right["x"], known_reference(reference.centre, reference.sd), limit=3.0)
     # The handbook divides by 1.128 for 2/sqrt(pi) = 1.12838: 2e-3 in the limit.
@@ -159,8 +159,6 @@ def test_refusals_say_what_is_needed():
         reference_period(np.ones(5))
     with pytest.raises(DataError, match="5 runs for 4 parameters; at least 6"):
         t_squared_chart(np.ones((1, 4)), np.random.default_rng(0).normal(size=(5, 4)))
-    with pytest.raises(DataError, match="there are 'standard deviation' and 'moving range'"):
-        reference_period(np.arange(5.0), scatter="range")
     with pytest.raises(DataError, match="k is 7"):
         cusum_chart([0.0], reference, k=7)
     with pytest.raises(DataError, match="sd above zero"):

@@ -17,7 +17,6 @@ from monitor.store import (
     list_backups,
     load_campaign,
     restore,
-    snapshot,
     take_backup,
     verify_audit,
 )
@@ -51,10 +50,9 @@ def test_backup_of_a_database_opened_for_reading(filled: Database, path: Path, t
         assert take_backup(db, tmp_path / "copy.duckdb").tables["run"][0] == 2
 
 
-def test_snapshots_are_listed_in_order(filled: Database, tmp_path: Path) -> None:
-    made = [snapshot(filled, tmp_path / "snapshots") for _ in range(2)]
-    assert list_backups(tmp_path / "snapshots") == tuple(made)
-    assert made[0].path.startswith("o'hara ü-20")
+def test_backups_are_listed_in_the_order_of_their_making(filled: Database, tmp_path: Path) -> None:
+    made = [take_backup(filled, tmp_path / f"{name}.duckdb") for name in ("second ü", "first")]
+    assert list_backups(tmp_path) == tuple(made)
 
 
 def test_backup_refuses_to_overwrite(filled: Database, tmp_path: Path) -> None:

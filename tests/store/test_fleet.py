@@ -17,8 +17,8 @@ import pytest
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
-from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, machine_history
+from monitor.statistics.sufficient import cells_from_sums, drift_from_sums
+from monitor.store import Database, fleet_sums, machine_history
 from monitor.store.events import record_event
 from monitor.store.past.campaign_runs import gather_runs
 from monitor.store.past.identified_values import gather_values
@@ -77,15 +77,6 @@ def keep(
     return own
 
 
-def cells(sums: FleetSums):
-    return cells_from_sums(
-        GroupSums(
-            sums.groups, sums.runs, sums.offset, sums.squares, sums.within, sums.repeated, sums.least_variance,
-            sums.log_variances, sums.inverse_dof,
-        )
-    )  # fmt: skip
-
-
 def strd(name: str) -> list[list[float]]:
     """The treatments of a NIST StRD ANOVA file."""
     lines = (STRD / "anova" / f"{name}.dat").read_text(encoding="latin-1").splitlines()
@@ -122,7 +113,7 @@ def digits(computed: float, certified: str | float) -> float:
 def test_nist_strd_anova_through_sql(db: Database, name: str, least: float) -> None:
     certified = json.loads((STRD / "certified_anova.json").read_text(encoding="utf-8"))
     keep(db, "M", strd(name), name)
-    found = cells(fleet_sums(db, cut=CUT))
+    found = cells_from_sums(fleet_sums(db, cut=CUT))
     reached = digits(found.anova_f[0], certified[name]["certified"]["F"])
     assert reached >= least, (name, reached)
 
@@ -140,7 +131,7 @@ def test_the_same_as_from_the_values_themselves_for_days_and_campaigns_of_any_si
             values.setdefault(machine, []).extend(days)
     sums = fleet_sums(db, cut=CUT)
     assert sums.machine.tolist() == ["A", "B"]
-    found = cells(sums)
+    found = cells_from_sums(sums)
     for i, machine in enumerate(("A", "B")):
         y = np.concatenate(values[machine])[:, np.newaxis] / 1e-3
         labels = np.repeat(np.arange(len(values[machine])), [len(day) for day in values[machine]])
@@ -203,7 +194,7 @@ def test_machines_may_have_parameters_of_their_own_and_identify_some_of_their_ru
 def test_groups_that_never_vary_or_stand_alone_say_nothing(db: Database) -> None:
     keep(db, "still", [[1.0, 1.0], [1.0, 2.0]], "a")
     keep(db, "single", [[1.0], [2.0]], "b")
-    found = cells(fleet_sums(db, cut=CUT))
+    found = cells_from_sums(fleet_sums(db, cut=CUT))
     assert np.isnan(found.anova_f[0])
     assert np.isnan(found.bartlett_p).all()
     assert found.anova_f[1] == pytest.approx(1.0)
@@ -241,7 +232,7 @@ def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> No
     assert sums.since_d[2] == pytest.approx(at.timestamp() / 86400.0, abs=1e-9)
     own = np.array(days["repaired"][4:]).ravel()[:, np.newaxis]
     labels = np.repeat([0, 1], 3)
-    found = cells(sums)
+    found = cells_from_sums(sums)
     assert found.anova_f[2] == pytest.approx(anova(own, labels).statistic[0], rel=1e-10)
     assert sums.origin[2] + found.mean[2] == pytest.approx(own.mean(), rel=1e-12)
     assert sums.origin[2] + sums.latest[2] == pytest.approx(own[3:].mean(), rel=1e-12)

@@ -97,7 +97,7 @@ def test_every_backup_of_a_chain_is_the_database_of_its_moment(
     weeks: tuple[Path, list[State]], tmp_path: Path
 ) -> None:
     folder, states = weeks
-    assert [backup.is_incremental for backup in list_backups(folder)] == [False, True, True]
+    assert [backup.span.previous is not None for backup in list_backups(folder)] == [False, True, True]
     for number, (moment, expected) in enumerate(states):
         for name, source, at in (
             ("file", folder / f"{number}.duckdb", None),

@@ -10,7 +10,6 @@ from monitor.uncertainty import (
     Inputs,
     effective_dof,
     joined,
-    nearest_correlation,
     overall,
     pooled_by_day,
     uncorrelated,
@@ -103,25 +102,6 @@ def test_effective_degrees_of_freedom_do_not_depend_on_units():
     mixed = [mix @ part @ mix.T for part in parts]
     assert effective_dof(mixed, [8, 3]) == pytest.approx(effective_dof(parts, [8, 3]), rel=1e-9)
     assert effective_dof(parts[:1], [8]) == pytest.approx(8.0)
-
-
-@pytest.mark.parametrize("table", ["los2017_table_7_4_GUF", "los2017_table_7_6_MCM_1e6"])
-def test_los_2017_tables_7_4_and_7_6_are_projected_to_a_correlation_matrix(references, table):
-    rows = (references / "papers" / f"{table}.csv").read_text(encoding="utf-8").splitlines()[1:]
-    printed = np.array([[float(cell) for cell in row.split(",")[1:]] for row in rows])
-    projected = nearest_correlation(0.5 * (printed + printed.T))
-    # Erratum E41: lambda_min of the printed matrices lies between -0.0016 and -0.002.
-    assert -0.0025 < projected.smallest_eigenvalue < -0.001
-    assert projected.largest_change < 0.005
-    assert np.linalg.eigvalsh(projected.matrix)[0] > -1e-12
-    assert np.diag(projected.matrix) == pytest.approx(1.0)
-
-
-def test_higham_2002_example_of_the_nearest_correlation_matrix():
-    # Higham, IMA J. Numer. Anal. 22 (2002) 329, section 4: the printed solution to four digits.
-    given = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
-    printed = np.array([[1.0, 0.7607, 0.1573], [0.7607, 1.0, 0.7607], [0.1573, 0.7607, 1.0]])
-    assert nearest_correlation(given).matrix == pytest.approx(printed, abs=5e-5)
 
 
 def test_refusals_of_inputs():

@@ -6,7 +6,6 @@ import pytest
 from monitor.uncertainty import (
     Arcsine,
     BlockSampler,
-    Empirical,
     JointDistribution,
     MonteCarloOptions,
     Normal,
@@ -102,6 +101,18 @@ def test_jcgm101_9_4_comparison_loss_in_microwave_power_meter(gum):
         assert result.u[0] == pytest.approx(scale, rel=0.008)
         shortest = coverage_interval(result.sample, form="shortest")
         assert shortest == pytest.approx(case["mc_shortest95_1e6"], abs=0.06 * scale)
+
+
+class Empirical:
+    """A recorded sample as a marginal: its quantiles, linear between the ordered values (JCGM 101 6.5)."""
+
+    def __init__(self, values):
+        self.values = np.sort(values)
+        self.mean, self.std = float(np.mean(self.values)), float(np.std(self.values))
+
+    def quantile(self, probability):
+        rank = probability * (len(self.values) - 1)
+        return np.interp(rank, np.arange(len(self.values)), self.values)
 
 
 def curved_trapezoid(low, high, inexactness, size=400_001):

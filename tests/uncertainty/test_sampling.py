@@ -10,8 +10,6 @@ from monitor.exceptions import DataError
 from monitor.uncertainty import (
     Arcsine,
     BlockSampler,
-    Empirical,
-    Inputs,
     JointDistribution,
     Normal,
     Rectangular,
@@ -19,11 +17,8 @@ from monitor.uncertainty import (
     Triangular,
     block_generator,
     independent,
-    joined,
     normal_inputs,
     overall,
-    t_inputs,
-    uncorrelated,
 )
 
 MARGINALS = [
@@ -41,15 +36,6 @@ def test_jcgm101_6_4_marginals_agree_with_scipy(ours, scipys):
     assert ours.quantile(probability) == pytest.approx(scipys.ppf(probability), rel=1e-9, abs=1e-9)
     assert ours.mean == pytest.approx(scipys.mean())
     assert ours.std == pytest.approx(scipys.std())
-
-
-def test_sampled_marginal_gives_back_its_sample():
-    values = np.random.default_rng(1).gamma(2.0, size=2000)
-    marginal = Empirical(values)
-    drawn = marginal.quantile(np.random.default_rng(2).random(100_000))
-    assert stats.ks_2samp(drawn, values).pvalue > 1e-3
-    assert marginal.mean == pytest.approx(drawn.mean(), abs=0.02)
-    assert marginal.std == pytest.approx(drawn.std(), abs=0.02)
 
 
 @pytest.mark.parametrize("copula", ["gaussian", "t"])
@@ -88,18 +74,6 @@ def test_singular_covariance_is_sampled_in_its_rank():
     assert np.max(np.abs(centred - centred @ basis.T @ basis)) < 1e-11
 
 
-def test_t_inputs_are_jointly_t_by_source():
-    values = np.random.default_rng(6).standard_normal((9, 3))
-    probing = overall(values, ("a", "b", "c"), ("mm",) * 3, source="probing")
-    bar = uncorrelated(("bar",), ("mm",), [300.0], [0.001], source="bar")
-    drawn = BlockSampler(t_inputs(joined(probing, bar)), 1, 100_000).draw(0)
-    expected = probing.covariance * 8 / 6
-    assert np.cov(drawn[:, :3], rowvar=False) == pytest.approx(expected, abs=0.06 * expected.max())
-    white = (drawn[:, :3] - probing.estimate) @ np.linalg.inv(np.linalg.cholesky(probing.covariance)).T
-    assert stats.kstest(np.sum(white**2, axis=1) / 3, stats.f(3, 8).cdf).pvalue > 1e-3
-    assert np.std(drawn[:, 3]) == pytest.approx(0.001, rel=0.02)
-
-
 def test_streams_are_those_of_spawned_seed_sequences():
     child = np.random.SeedSequence(42).spawn(4)[3]
     expected = np.random.Generator(np.random.SFC64(child)).standard_normal(5)
@@ -116,9 +90,5 @@ def test_sampling_refusals():
         JointDistribution(("a",), ("mm",), (Normal(0.0, 1.0),), np.eye(1), "t")
     with pytest.raises(DataError, match=r"finite low < high, but has low 1.0, high 1.0"):
         Rectangular(1.0, 1.0)
-    with pytest.raises(DataError, match=r"two finite values or more, but has 1"):
-        Empirical(np.ones(1))
-    with pytest.raises(DataError, match=r"correlated with another source"):
-        t_inputs(Inputs(("a", "b"), ("mm",) * 2, np.zeros(2), np.full((2, 2), 1.0), ("one", "two")))
     with pytest.raises(DataError, match=r"every input of a sampler needs its own name"):
         BlockSampler((independent(("a",), ("mm",), (Normal(0.0, 1.0),)),) * 2, 1)

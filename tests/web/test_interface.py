@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from monitor.web.access import FILES, NOT_OFFERED, offered, path_fields, taken_fields
-from monitor.web.interface import openapi
+from monitor.web.openapi import openapi
 from monitor.workflow.contract import QUESTIONS
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from monitor.web.access import NOT_OFFERED, offered, role_needed
+from monitor.web.access import NOT_OFFERED, address_of, offered, role_needed
 from monitor.web.gate import PUBLIC
-from monitor.web.interface import address_of
 from monitor.web.users import ROLES, Role
 
 #: Every form of the pages with the lowest role that may send it; a new one has to be written down here.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,8 @@ from monitor.workflow.instruments.instruments import instruments
 from monitor.workflow.instruments.request import InstrumentsRequest
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
 from tests.simulator import four_instruments as shop
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -119,3 +123,32 @@ def test_a_run_that_is_not_there_and_a_method_of_one_instrument_are_refused(db: 
     import_campaign(db, read_campaign(EXAMPLES / "tilting-table"))
     with pytest.raises(DataError, match="one instrument measured all of it"):
         instruments(db, InstrumentsRequest("tilting-table"))
+
+
+def test_two_instruments_make_one_history_and_their_step_is_an_e_n(tmp_path: Path) -> None:
+    """A laser in January, a ball bar in June: one history of every gain, and the pitch that hides between them shows as
+    E_n, as it does where both measure in one campaign. What they read is no condition of the machine."""
+    moments = {
+        "laser": datetime(2026, 1, 12, 8, tzinfo=UTC),
+        "ball-bar": datetime(2026, 6, 15, 8, tzinfo=UTC),
+    }
+    with Database(tmp_path / "years.duckdb") as db:
+        for name, moment in moments.items():
+            campaign = read_campaign(EXAMPLES / name)
+            runs = tuple(replace(run, started_at=moment) for run in campaign.runs)
+            import_campaign(db, replace(campaign, runs=runs))
+            identify(db, IdentifyRequest(name))
+        answer = trend(db, TrendRequest("CENTRE-4"))
+    (pair,) = answer.agreement
+    assert pair.methods == ("instruments (laser interferometer)", "instruments (ball bar)")
+    gain = pair.parameters["EXX"]
+    # The pitch times the height of the tool point over X adds to the gain: 120 mm below for the laser, 380 above.
+    assert gain.first == pytest.approx(12.0 - 1e6 * shop.PITCH * 120.0, abs=4.0 * gain.u_first)
+    assert gain.second == pytest.approx(12.0 + 1e6 * shop.PITCH * 380.0, abs=4.0 * gain.u_second)
+    assert set(pair.parameters) == {"EXX", "EYY", "EZZ"}
+    assert pair.disagree == ("EXX",)
+    assert gain.e_n is not None
+    assert gain.e_n == pytest.approx(gain.difference / np.hypot(2.0 * gain.u_first, 2.0 * gain.u_second))
+    assert answer.parameters["EXX"].drift.n == 2
+    channels = {effect.channel for of in answer.parameters.values() for effect in of.conditions}
+    assert channels.isdisjoint({"reading_um", "setup"})

@@ -99,7 +99,7 @@ def test_every_test_is_recognised_and_has_the_figures_that_were_put_in(db: Datab
     circle = figures(tests["bar"])
     assert circle["G(b)"] == pytest.approx(6.0, abs=0.02)
     assert circle["H"] == pytest.approx(0.0, abs=1e-6)
-    assert "5 runs in each direction; the fewest here are 3" in tests["laser-Y"].notes[0]
+    assert "5 runs in each direction; the fewest here are 3" in str(tests["laser-Y"].notes[0])
     lines = (tmp_path / "figures.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + sum(len(test.figures) for test in answer.tests)
 

@@ -35,10 +35,4 @@ def run(options: Namespace) -> int:
     refuse_server(options, "files are moved on the computer that has the database; stop the server first")
     with opened(options) as db, output.working("archiving"):
         answer = ask(db, retention.archive, request)
-    if options.json:
-        output.document(answer)
-    else:
-        output.say(answer.message)
-        for fault in answer.faults:
-            output.say(f"  {fault}")
-    return 1 if answer.faults else 0
+    return output.checked(answer, answer.message, answer.faults, as_json=options.json)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor.cli import output, residual_output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachinePart
 from monitor.workflow.explain.request import CompareRequest
@@ -25,11 +25,7 @@ EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw where the model fails")
 
 

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.workflow.instruments.answer import InstrumentsAnswer
 from monitor.workflow.instruments.instruments import instruments
@@ -20,11 +20,7 @@ def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="the run (default: the last)")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
 
 
 def run(options: Namespace) -> int:

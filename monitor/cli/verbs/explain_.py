@@ -7,7 +7,7 @@ from pathlib import Path
 
 from monitor.cli import explain_output, output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import RATE, ExplainRequest
@@ -18,11 +18,7 @@ EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--rate", type=float, default=RATE, metavar="Q", help=f"false discovery rate (default {RATE:g})"
     )

@@ -10,7 +10,7 @@ from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.cli.trend_output import weekly_lines
 from monitor.workflow.fleet.answer import FleetTableRow
@@ -28,11 +28,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--top", type=int, default=20, metavar="N", help="rows of the table (default 20; 0: all)"
     )
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--weekly-looks",
         action="store_true",

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 
 from monitor.cli import identify_output, output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
@@ -22,11 +22,7 @@ EXAMPLE = "monitor identify five-days"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", nargs="?", metavar="CAMPAIGN")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="this run alone")
     parser.add_argument(
         "--stepwise",

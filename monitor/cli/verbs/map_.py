@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.request import COMPENSATION_FORMATS, POINTS, VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
@@ -20,11 +20,7 @@ def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="the run (default: the last)")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--points", type=int, default=POINTS, metavar="N", help=f"points along each axis (default {POINTS})"
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.residual_output import files
 from monitor.cli.screen import on_screen
 from monitor.cli.verbs import plan_angles, plan_instruments
@@ -29,11 +29,7 @@ EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN", help="whose machine, artefact and plan are the start")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--balls", type=int, metavar="N", help="the best N balls (1 to 24; places for more are proposed)"
     )
@@ -68,26 +64,11 @@ def _wanted(texts: list[str]) -> dict[str, float]:
     return wanted
 
 
-def _separate(text: str | None) -> tuple[str, str] | None:
-    """Two effects; a comma inside brackets belongs to a formula."""
-    if text is None:
-        return None
-    parts, depth = [""], 0
-    for letter in text:
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    if len(parts) != 2 or not all(part.strip() for part in parts):
-        raise InputError(f"--separate {text}: name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
-    return parts[0].strip(), parts[1].strip()
-
-
 def run(options: Namespace) -> int:
     request = PlanRequest(
         options.campaign, options.model, options.balls, options.poses, _wanted(options.wanted),
-        _separate(options.separate), figures=options.figures, parameters=tuple(options.parameters),
+        None if options.separate is None else PlanRequest.two_effects(options.separate), figures=options.figures,
+        parameters=tuple(options.parameters),
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("planning"):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from monitor.cli import output
-from monitor.workflow.plan.answer import InstrumentPlanAnswer, TestAnswer
+from monitor.workflow.plan.answer import InstrumentPlanAnswer
+from monitor.workflow.plan.test_answer import TestAnswer
 
 
 def tables(answer: InstrumentPlanAnswer) -> None:
@@ -35,14 +36,28 @@ def _remarks(answer: InstrumentPlanAnswer) -> None:
         output.say(
             f"{axis} stood still and has no stroke in the machine file, so no test moves it; state its stroke_mm"
         )
+    for axis in answer.not_turned:
+        output.say(
+            f"no R-test and no bar around {axis}: the linear axes would have to travel further than they did; state "
+            "stroke_mm of those that can"
+        )
     for name in answer.asked:
         if all(u.get(name) is None for u in (answer.present, *(test.u for test in answer.tests))):
-            output.say(f"no single test gives {name} a number; `monitor identify` says why it has none")
+            output.say(f"no single test gives {name} a number; {_pair(answer.pairs.get(name))}")
     for parameter in answer.unseen:
         output.say(
             f"{parameter.parameter} has no number yet: {_name(parameter.test)} would give it u = {parameter.u:.2g} "
             f"{parameter.unit} ({where(parameter.test)})"
         )
+
+
+def _pair(tests: tuple[TestAnswer, ...] | None) -> str:
+    """Two tests that do together what no single one does."""
+    if tests is None:
+        return "`monitor identify` says why it has none"
+    if not tests:
+        return "nor do any two of them; `monitor identify` says why it has none"
+    return "together these do: " + " and ".join(f"{_name(test)} ({where(test)})" for test in tests)
 
 
 def where(test: TestAnswer) -> str:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.workflow.predict.predict import predict
 from monitor.workflow.predict.request import PredictRequest
 
@@ -16,11 +16,7 @@ EXAMPLE = "monitor predict tracked-robot --model tracker"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--of",
         metavar="CAMPAIGN",

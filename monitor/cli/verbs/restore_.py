@@ -32,10 +32,4 @@ def run(options: Namespace) -> int:
     at = None if options.at is None else moment(options.at, "--at")
     with output.working("restoring"):
         answer = keeping.restore_backup(keeping.RestoreRequest(options.source, Path(options.db), at))
-    if options.json:
-        output.document(answer)
-    else:
-        output.say(answer.message)
-        for fault in answer.faults:
-            output.say(f"  {fault}")
-    return 1 if answer.faults else 0
+    return output.checked(answer, answer.message, answer.faults, as_json=options.json)

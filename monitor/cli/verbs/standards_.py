@@ -59,4 +59,4 @@ def _say(test: StandardTest) -> None:
     ]
     output.table("", ["symbol", "figure", test.unit, "u"], rows)
     for note in test.notes:
-        output.say(note)
+        output.say(str(note))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.workflow.run_statistics.answer import DIFFERENT, NoVectorTest, StatisticsAnswer, VectorTestAnswer
 from monitor.workflow.run_statistics.request import StatisticsRequest
@@ -29,11 +29,7 @@ def options(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--where", metavar="CONDITION", help="only runs for which it holds")
     parser.add_argument("--select", metavar="NAME", help="only the runs of this stored selection")
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--matrices", type=Path, metavar="DIR", help="write covariance and correlation matrices as CSV files"
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 from monitor.cli import output, trend_output
 from monitor.cli.database import ask, opened
 from monitor.cli.moments import moment
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.workflow.trend.request import TrendRequest
@@ -43,11 +43,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--campaign", action="append", default=[], metavar="NAME", help="only this campaign (may be repeated)"
     )
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--weekly-looks",
         action="store_true",

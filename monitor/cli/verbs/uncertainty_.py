@@ -10,7 +10,7 @@ from monitor.cli import output
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.budget_output import behind
 from monitor.cli.database import ask, opened
-from monitor.cli.parser import common
+from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.readers import read_linear_axes
 from monitor.reporting.certificate.grounds import ground_sentence
@@ -41,11 +41,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-p", type=float, default=0.95, metavar="P", help="coverage probability (default 0.95)"
     )
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
-    )
+    add_model(parser)
     parser.add_argument(
         "--select", metavar="NAME",
         help="covariance of the readings from the runs of this selection, or of a campaign of the same plan",

@@ -21,6 +21,7 @@ from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant
+from monitor.discovery.machine.separation.aliases import taken_for_machine
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
@@ -34,6 +35,7 @@ from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
 from monitor.effects.catalogue import catalogue
+from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, Verdict
 
@@ -49,7 +51,8 @@ class Explanation:
     nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
     recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
     looks wrong, ``mistakes`` says how, and nothing else is reported.
-    ``limits`` says at which ends of the search more may be there.
+    ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
+    leave nothing to see because base parameters do the same.
     """
 
     comparison: ChainComparison
@@ -63,6 +66,7 @@ class Explanation:
     mistakes: tuple[Mistake, ...] = ()
     unfitted: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
+    taken_for_machine: tuple[TakenUp, ...] = ()
 
 
 def variants_of_campaign(
@@ -129,6 +133,7 @@ def explain(
         final=latest.under,
         unfitted=latest.unfitted,
         limits=latest.limits,
+        taken_for_machine=taken_for_machine(latest.scene),
     )
 
 

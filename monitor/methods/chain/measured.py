@@ -86,6 +86,11 @@ class MeasuredChain(ABC):
         return np.ones(self.sigma.shape, dtype=bool)
 
     @property
+    def series(self) -> npt.NDArray[np.int64]:
+        """Which series (n,) a row belongs to: readings resemble those of one instrument before them, no others."""
+        return np.zeros(len(self.context), dtype=np.int64)
+
+    @property
     def read_columns(self) -> tuple[str, ...]:
         """The recorded columns that are the readings, where ``with_read`` changes them; none for other methods."""
         return ()
@@ -177,6 +182,11 @@ class MeasuredChain(ABC):
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         return of_balls(drivers)
+
+    @property
+    def unsettled(self) -> str:
+        """What may keep a fit from settling, as the end of a refusal; empty where nothing is known to."""
+        return ""
 
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""

@@ -43,6 +43,14 @@ class _Information:
         """Both together."""
         return replace(self, triangle=_triangle(np.vstack([self.triangle, other.triangle])))
 
+    def among(self, names: tuple[str, ...]) -> _Information:
+        """The same among more coefficients, of which these rows say nothing."""
+        if names == self.names:
+            return self
+        wider = np.zeros((len(self.triangle), len(names)))
+        wider[:, [names.index(name) for name in self.names]] = self.triangle
+        return _Information(names, _triangle(np.vstack([wider, np.zeros((len(names), len(names)))])))
+
     def u(self) -> dict[str, float]:
         """Standard uncertainties in internal units; NaN where the rows do not determine a coefficient."""
         scale = np.linalg.norm(self.triangle, axis=0)
@@ -131,7 +139,8 @@ class InstrumentForecast:
         """The information of a test, computed once."""
         key = (id(test), base)
         if key not in self._of_test:
-            self._of_test[key] = _information(self._problem(test, base))
+            of_test = _information(self._problem(test, base))
+            self._of_test[key] = of_test.among(self._measured(base).names)
         return self._of_test[key]
 
     @cached_property
@@ -159,7 +168,14 @@ class InstrumentForecast:
         )  # fmt: skip
         artefact = replace(self.campaign.artefact, setups=(setup,))
         campaign = replace(self.campaign, artefact=artefact, probings=probings)
-        return problem_of(campaign, replace(self.model, base=base))
+        # What another instrument does wrong is nothing in these rows.
+        names = [name for name in (setup.id, setup.instrument) if name]
+        added = tuple(
+            text
+            for text in self.model.added
+            if not text.startswith("instrument:") or any(f":{name}:" in text for name in names)
+        )
+        return problem_of(campaign, replace(self.model, base=base, added=added))
 
     def _read(self, test: CandidateTest) -> Array:
         """What a machine without errors shows (m, k) in the columns of the kind, as far as a search begins there."""

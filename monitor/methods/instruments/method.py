@@ -49,7 +49,8 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
 def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
     """What these setups cannot give a number, whatever the plan."""
     assert isinstance(problem, InstrumentProblem)
-    return taken_up(problem.context.chain, problem.setups)
+    centres = (TakenUp(f"the centre of {name} across its bar", ()) for name in problem.bars_of_one_direction)
+    return (*taken_up(problem.context.chain, problem.setups), *centres)
 
 
 METHOD = ChainMethod(

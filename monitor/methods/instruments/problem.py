@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import ArtefactEffect, ChainEffect, Effect
-from monitor.effects.catalogue import of_drives, of_sight
+from monitor.effects.catalogue import of_drives, of_instruments, of_sight
+from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, in_mm
+from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -37,13 +39,14 @@ ALONE = 1e-6
 
 @dataclass(frozen=True)
 class Part:
-    """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, and their indices ``at`` (m,) among
-    all rows."""
+    """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, their indices ``at`` (m,) among all
+    rows, and the ``instrument`` as people call it."""
 
     id: str
     reading: Reading
     rows: Rows
     at: npt.NDArray[np.int64]
+    instrument: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,12 @@ class InstrumentProblem(ChainProblem):
             numbers[part.at, : len(part.reading.numbers)] = True
         return numbers
 
+    @property
+    def series(self) -> npt.NDArray[np.int64]:
+        """The setup of every row."""
+        instruments = self.context.instruments
+        return super().series if instruments is None else instruments.setup
+
     @cached_property
     def read_columns(self) -> tuple[str, ...]:
         """The columns of all kinds that there are."""
@@ -133,6 +142,24 @@ class InstrumentProblem(ChainProblem):
             measured[np.isnan(part.rows.measured)] = np.nan
             parts.append(replace(part, rows=replace(part.rows, measured=measured)))
         return replace(self, parts=tuple(parts))
+
+    @cached_property
+    def bars_of_one_direction(self) -> tuple[str, ...]:
+        """Setups whose bar kept one direction, so that its centre is held across it where it was stated."""
+        return tuple(
+            part.id
+            for part in self.parts
+            if isinstance(part.reading, DistanceReading) and part.reading.keeps_one_direction
+        )
+
+    @property
+    def unsettled(self) -> str:
+        """Bars that kept one direction: a centre that is stated some millimetres wrong cannot be mended then."""
+        return "".join(
+            f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
+            "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
+            for name in self.bars_of_one_direction
+        )
 
     @property
     def largest_error(self) -> float:
@@ -172,10 +199,11 @@ class InstrumentProblem(ChainProblem):
         return True
 
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
-        """Drives for all, the line of sight where something points."""
-        chain = self.context.chain
+        """Drives for all, the line of sight where something points, and what the instruments do wrong themselves."""
+        chain, instruments = self.context.chain, self.context.instruments
         pointing = of_sight(chain) if self.context.sight is not None else ()
-        return (*pointing, *of_drives(chain, dict(self.gear_ratios)))
+        of_setups = of_instruments(instruments, drivers) if instruments is not None else ()
+        return (*pointing, *of_drives(chain, dict(self.gear_ratios)), *of_setups)
 
     def as_vectors(self, rows: Array) -> Array:
         """The shortest vectors (n, 3) mm, in the frame of the last work axis, that would show such numbers (n, d); of a
@@ -238,7 +266,21 @@ class InstrumentProblem(ChainProblem):
             if by_error is not None:
                 derivatives = self._by_error(shown, pose, sides, at)
                 by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
+        residual += self._of_instruments(local, common)
         return InstrumentPose(residual, pose.by_tip, pose.work_rotation, by_error, by_own)
+
+    def _of_instruments(self, local: Array, common: Array) -> Array:
+        """What effects of instruments add to the numbers (n, d)."""
+        added = np.zeros(self.sigma.shape)
+        for basis, columns in zip(self._bases, self.base_columns, strict=True):
+            if isinstance(basis, InstrumentBasis):
+                added += basis.added(local[self._run, columns])
+        for shared, columns in zip(self.shared, self.common_columns, strict=True):
+            unknowns = common[columns]
+            basis = shared.basis(unknowns)
+            if isinstance(basis, InstrumentBasis):
+                added += basis.added(unknowns[: shared.size])
+        return added
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives at (R, p) and (c,), those of what the setups cannot separate taken out.

@@ -113,6 +113,8 @@ class Reading(Protocol):
     turns: ClassVar[int]
     #: Unknowns of each run that a setup may hold, by the word under ``known``.
     holdable: ClassVar[tuple[str, ...]]
+    #: Whether a reading counts from the first row of the run.
+    relative: ClassVar[bool]
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
@@ -160,6 +162,7 @@ class Plain:
     holdable: ClassVar[tuple[str, ...]] = ()
     angular: ClassVar[bool] = False
     turns: ClassVar[int] = 0
+    relative: ClassVar[bool] = False
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:

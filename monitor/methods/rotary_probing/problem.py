@@ -211,11 +211,11 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
         tip=tip,
     )
     if ball.any():
-        problem = _directed(problem, tips)
+        problem = _directed(problem)
     return problem.foreseen() if problem.added else problem
 
 
-def _directed(problem: RotaryProblem, tips: Array) -> RotaryProblem:
+def _directed(problem: RotaryProblem) -> RotaryProblem:
     """The problem with every touch of a sphere telling along the line from its centre to the tip."""
     plain = replace(problem, added=())
     stated = problem.normal[problem.ball]

@@ -69,7 +69,7 @@ class Rows:
 def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Faults) -> Rows | None:
     """Return the rows of a file; None where a column is missing, its unit unknown, or nothing is left."""
     before = len(faults)
-    export = _selected(entry, file, export, faults)
+    export = _selected(entry, file, export)
     if not export.lines:
         return None
     sources = _sources(entry, file, export, wanted)
@@ -100,7 +100,7 @@ def matching(export: Export, name: str) -> str | None:
     return name if name in export.columns else folded.get(name.casefold())
 
 
-def _selected(entry: Entry, file: str, export: Export, faults: Faults) -> Export:
+def _selected(entry: Entry, file: str, export: Export) -> Export:
     """Return the export with the rows that ``where`` asks for."""
     keep = np.ones(len(export.lines), dtype=np.bool_)
     table = entry.table.section("where")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -134,22 +133,18 @@ def known_reference(centre: float, sd: float) -> Reference:
     return Reference(float(centre), float(sd), np.inf, np.inf)
 
 
-def reference_period(
-    values: npt.ArrayLike, *, scatter: Literal["standard deviation", "moving range"] = "standard deviation"
-) -> Reference:
-    """Centre and scatter of a reference period (n,), at least 5 runs.
+def reference_period(values: npt.ArrayLike, *, by_moving_range: bool = False) -> Reference:
+    """Centre and scatter of a reference period (n,), at least 5 runs: the standard deviation, or the moving range.
 
     The moving range ignores slow drift within the period; it has 0.62 (n - 1) effective degrees of freedom
     (D. J. Wheeler, Advanced Topics in Statistical Process Control, 1995, table 1, for large n).
     """
     y = as_vector(values, "values", least=5)
     n = len(y)
-    if scatter == "standard deviation":
-        sd, dof = float(y.std(ddof=1)), n - 1.0
-    elif scatter == "moving range":
+    if by_moving_range:
         sd, dof = float(np.abs(np.diff(y)).mean()) / D2, 0.62 * (n - 1.0)
     else:
-        raise DataError(f"scatter is {scatter!r}; there are 'standard deviation' and 'moving range'.")
+        sd, dof = float(y.std(ddof=1)), n - 1.0
     if sd == 0.0:
         raise DataError(f"all {n} values of the reference period are {y[0]}; a chart needs their scatter.")
     return Reference(float(y.mean()), sd, float(n), dof)

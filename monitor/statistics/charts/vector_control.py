@@ -31,7 +31,6 @@ class VectorChart:
     """
 
     kind: str
-    n_reference: int
     statistic: Array
     limit: float
     arl: float
@@ -114,7 +113,7 @@ def t_squared_chart(
     statistic, shares = _quadratic(z, inverse)
     m = _points_of(runs, p, neighbours)
     limit = _t_squared_limit(m, p, arl)
-    return VectorChart("T²", runs, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
+    return VectorChart("T²", statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 
 def mewma_chart(
@@ -155,7 +154,7 @@ def mewma_chart(
         path[i] = last
     slow = neighbours * (1.0 - lam)
     statistic, shares = _quadratic(path, inverse * (2.0 - lam) / lam * (1.0 - slow) / (1.0 + slow))
-    return VectorChart("MEWMA", m, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
+    return VectorChart("MEWMA", statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 
 def mewma_limit(

@@ -49,7 +49,6 @@ class Forecast:
     crossing: Crossing
     checks: Array
     predicted: Array
-    u_predicted: Array
     probability: Array
     recommended_interval: float
     reliability: float
@@ -128,13 +127,12 @@ def forecast(
     sides.sort(key=lambda c: (np.inf if c.at is None else c.at, c.interval[0]))
     grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 2000)]) * (end - origin)
     out = np.flatnonzero(_probability(line, grid, lower, upper) < reliability)
-    value, _, u = predict(line, at)
+    value = predict(line, at)[0]
     return Forecast(
         origin=origin,
         crossing=sides[0] if sides else Crossing(np.inf, None, (np.inf, np.inf)),
         checks=at,
         predicted=value,
-        u_predicted=u,
         probability=_probability(line, at, lower, upper),
         recommended_interval=np.inf if not out.size else float(grid[max(int(out[0]) - 1, 0)] - origin),
         reliability=reliability,

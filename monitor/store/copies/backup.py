@@ -1,4 +1,4 @@
-"""Full backups and snapshots: a second file, compared with the first table by table, and a manifest beside it.
+"""Full backups: a second file, compared with the first table by table, and a manifest beside it.
 
 A backup can be made while the database is in use by this process; it shows one moment.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import duckdb
 
 from monitor.exceptions import StoreError
-from monitor.store.connection import Database, utc_now
+from monitor.store.connection import Database
 from monitor.store.copies.manifest import (
     Backup,
     Checksums,
@@ -39,13 +39,6 @@ def take_backup(db: Database, target: str | Path) -> Backup:
             begin_copy(db, partial)
             tables = copy_all(db)
         return write_manifest(partial, target, tables, _span(db, tables))
-
-
-def snapshot(db: Database, folder: str | Path) -> Backup:
-    """A backup in ``folder``, named after the database and the present moment. Raises StoreError."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    return take_backup(db, folder / f"{Path(db.path).stem}-{utc_now():%Y%m%dT%H%M%S%fZ}.duckdb")
 
 
 @contextmanager

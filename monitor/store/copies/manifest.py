@@ -57,11 +57,6 @@ class Backup:
     tables: Checksums
     span: Span | None = None
 
-    @property
-    def is_incremental(self) -> bool:
-        """Whether it holds only what was stored after another backup."""
-        return self.span is not None and self.span.previous is not None
-
 
 def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -> Backup:
     """Return the manifest of a file that is to be named ``target``, written beside it and synchronised with it."""
@@ -103,7 +98,7 @@ def read_manifest(path: Path) -> Backup:
 
 
 def list_backups(folder: str | Path) -> tuple[Backup, ...]:
-    """The backups and snapshots in a folder that have a manifest, the oldest first."""
+    """The backups in a folder that have a manifest, the oldest first."""
     backups = [read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
     return tuple(sorted(backups, key=lambda backup: (backup.made_at, backup.path)))
 

@@ -64,9 +64,6 @@ INSERT INTO {lake}.registering VALUES (0);
 """
 # fmt: on
 
-#: Tables of a lake alone.
-LAKE_TABLES = ("plant", "plant_name", "publication", "registering")
-
 
 def has_schema(connection: duckdb.DuckDBPyConnection) -> bool:
     """Whether the attached lake has tables of ours."""

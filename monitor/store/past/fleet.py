@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import NotFoundError
+from monitor.group_sums import GroupSums
 from monitor.records import Array
 from monitor.store.connection import Database
 from monitor.store.past import fleet_queries as queries
@@ -81,33 +82,21 @@ class TemperatureSums:
 
 
 @dataclass(frozen=True)
-class FleetSums:
+class FleetSums(GroupSums):
     """Sufficient statistics of c cells, one a machine and parameter; every array is (c,), in display units.
 
-    Groups are campaigns, or the days of a campaign with several. ``origin`` is what the sums are about:
-    ``offset`` of all values, ``squares`` the sum over the groups of n_j times the squared offset of their mean,
-    ``within`` the sum of squares within the groups. ``repeated`` groups have two runs or more, the smallest
-    of their variances is ``least_variance``; ``log_variances`` sums (n_j - 1) ln s_j² and ``inverse_dof``
-    1 / (n_j - 1) over them. ``sum_t`` to ``sum_tm`` are sums over the groups of t, t², m, m² and t m, with t in days
-    since ``epoch_d`` and m the mean of the group less the origin. ``last_d`` is when the machine's last day began
-    (days since 1970), ``latest`` the mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where
-    the parameter was refused there. ``since_d`` is the last recorded event before that day (days since 1970, NaN:
-    none); groups before it are left out.
+    Groups are campaigns, or the days of a campaign with several; ``origin`` is what the sums are about. ``sum_t``
+    to ``sum_tm`` are sums over the groups of t, t², m, m² and t m, with t in days since ``epoch_d`` and m the mean
+    of the group less the origin. ``last_d`` is when the machine's last day began (days since 1970), ``latest`` the
+    mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where the parameter was refused
+    there. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it are
+    left out.
     """
 
     machine: npt.NDArray[np.str_]
     parameter: npt.NDArray[np.str_]
     unit: npt.NDArray[np.str_]
     origin: Array
-    groups: Array
-    runs: Array
-    offset: Array
-    squares: Array
-    within: Array
-    repeated: Array
-    least_variance: Array
-    log_variances: Array
-    inverse_dof: Array
     epoch_d: float
     sum_t: Array
     sum_tt: Array

@@ -58,6 +58,17 @@ GROUP BY ALL ORDER BY ALL
 """
 
 
+_INSTRUMENTS = """
+SELECT DISTINCT campaign_id, setup ->> 'instrument' AS instrument
+FROM (
+    SELECT campaign_id, unnest(CAST(artefact -> 'setups' AS JSON[])) AS setup
+    FROM campaign WHERE campaign_id IN ({marks})
+)
+WHERE setup ->> 'instrument' IS NOT NULL
+ORDER BY ALL
+"""
+
+
 @dataclass(frozen=True)
 class _Identified:
     """The head of an identification: its number, of how many runs it is, and its parameters."""
@@ -73,7 +84,8 @@ class _Identified:
 class MachineHistory:
     """The n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
-    ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
+    ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign, ``measured_by`` (n,) the same
+    with the instruments of the campaign where its setups name them; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
     the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
     are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
@@ -85,6 +97,7 @@ class MachineHistory:
     campaigns: Mapping[int, str]
     campaign: npt.NDArray[np.str_]
     method: npt.NDArray[np.str_]
+    measured_by: npt.NDArray[np.str_]
     run: npt.NDArray[np.int64]
     started_at: tuple[datetime, ...]
     day: npt.NDArray[np.int64]
@@ -123,6 +136,7 @@ class MachineHistory:
             self,
             campaign=self.campaign[mask],
             method=self.method[mask],
+            measured_by=self.measured_by[mask],
             run=self.run[mask],
             started_at=tuple(at for at, selected in zip(self.started_at, mask, strict=True) if selected),
             day=self.day[mask],
@@ -181,6 +195,7 @@ def _read(
         campaigns={number: name for number, (name, _) in campaigns.items()},
         campaign=np.array([run.campaign for run in runs], dtype=np.str_),
         method=np.array([run.method for run in runs], dtype=np.str_),
+        measured_by=_measured_by(db, runs),
         run=np.array([run.run for run in runs], dtype=np.int64),
         started_at=tuple(run.started_at for run in runs),
         day=np.array([run.day for run in runs], dtype=np.int64),
@@ -292,6 +307,15 @@ def _values(
         values[target] = block.values[recorded]
         uncertainties[target] = np.where(np.isnan(block.values[recorded]), np.nan, block.u[recorded])
     return names, tuple(unit_of[name] for name in names), values, uncertainties
+
+
+def _measured_by(db: Database, runs: list[RecordedRun]) -> npt.NDArray[np.str_]:
+    """The method of every run (n,), and in brackets the instruments that its campaign names: ``(ball bar)``."""
+    named: dict[int, list[str]] = {}
+    for number, instrument in _with_marks(db, _INSTRUMENTS, sorted({run.campaign_id for run in runs})):
+        named.setdefault(int(number), []).append(str(instrument))
+    brackets = {number: f" ({', '.join(instruments)})" for number, instruments in named.items()}
+    return np.array([run.method + brackets.get(run.campaign_id, "") for run in runs], dtype=np.str_)
 
 
 def _conditions(db: Database, runs: list[RecordedRun]) -> tuple[dict[str, Array], frozenset[str]]:

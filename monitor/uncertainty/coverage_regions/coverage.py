@@ -4,8 +4,8 @@ Which to use: ``ellipsoid_factor`` (k_p) for statements on all outputs together 
 correlation; ``rectangle_factor`` (k_q) for intervals y_j ± k_q u_j that all hold at once; ``single_factor``
 (k) for one output alone. They assume normal outputs, or t with the given degrees of freedom.
 ``correlated_rectangle_factor`` is the k_q that the correlations allow, which is smaller; and
-``joint_coverage`` says what "k = 2 each" really covers. From Monte Carlo samples: ``sample_ellipsoid_factor``
-and ``sample_rectangle_factor``.
+``joint_coverage`` says what "k = 2 each" really covers. Of Monte Carlo samples the factors are quantiles
+(``quantile_of``) of ``mahalanobis_distances`` and ``largest_deviations`` (JCGM 102 7.7).
 """
 
 from __future__ import annotations
@@ -123,31 +123,6 @@ def joint_coverage(
     return Sampled(float(np.mean(coverages)), float(np.std(coverages, ddof=1) / math.sqrt(len(coverages))))
 
 
-def sample_ellipsoid_factor(
-    outputs: Array,
-    p: float = 0.95,
-    *,
-    center: Array | None = None,
-    covariance: Array | None = None,
-    tolerance: float = RANK_TOLERANCE,
-) -> float:
-    """Return k_p of Monte Carlo ``outputs`` (trials, m): p-quantile of their Mahalanobis distances (JCGM 102 7.7).
-
-    ``center`` (m,) and ``covariance`` (m, m) default to the sample's own. Directions in which the correlation
-    matrix has an eigenvalue below ``tolerance`` times the largest are left out (rank-deficient U_y).
-    """
-    outputs, center, covariance = _sample(outputs, p, center, covariance)
-    return quantile_of(mahalanobis_distances(outputs, center, covariance, tolerance), p)
-
-
-def sample_rectangle_factor(
-    outputs: Array, p: float = 0.95, *, center: Array | None = None, covariance: Array | None = None
-) -> float:
-    """Return k_q of Monte Carlo ``outputs`` (trials, m): p-quantile of max_j |y_j - center_j| / u_j (JCGM 102 7.7)."""
-    outputs, center, covariance = _sample(outputs, p, center, covariance)
-    return quantile_of(largest_deviations(outputs, center, covariance), p)
-
-
 def mahalanobis_distances(
     outputs: Array, center: Array, covariance: Array, tolerance: float = RANK_TOLERANCE
 ) -> Array:
@@ -191,20 +166,6 @@ def _check(outputs: int, p: float, dof: float) -> None:
         raise DataError(f"the coverage probability p must lie between 0 and 1, but is {p}")
     if not dof > 0.0:
         raise DataError(f"degrees of freedom must be positive, but are {dof}")
-
-
-def _sample(
-    outputs: Array, p: float, center: Array | None, covariance: Array | None
-) -> tuple[Array, Array, Array]:
-    outputs = np.asarray(outputs, dtype=np.float64)
-    if outputs.ndim != 2 or len(outputs) < 2:
-        raise DataError(f"outputs must have shape (trials, m) with two trials or more, not {outputs.shape}")
-    _check(outputs.shape[1], p, math.inf)
-    if center is None:
-        center = outputs.mean(axis=0)
-    if covariance is None:
-        covariance = np.atleast_2d(np.cov(outputs, rowvar=False))
-    return outputs, center, covariance
 
 
 def _reaches(correlation: Array, rng: np.random.Generator | None) -> tuple[list[Array], int]:

@@ -26,7 +26,7 @@ from monitor.uncertainty.coverage_regions.coverage import (
 )
 from monitor.uncertainty.monte_carlo.propagation import Accumulator, Model, Summary, Trials
 from monitor.uncertainty.monte_carlo.sampling import BlockSampler
-from monitor.uncertainty.roots import RANK_TOLERANCE, correlation_of, covariance_root
+from monitor.uncertainty.roots import RANK_TOLERANCE, WithCovariance, covariance_root
 from monitor.uncertainty.tolerance import numerical_tolerance, tolerances_of
 
 
@@ -45,7 +45,7 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
-class MonteCarloResult:
+class MonteCarloResult(WithCovariance):
     """Estimates, covariance and coverage factors of the outputs by Monte Carlo, and how far to trust them.
 
     ``standard_errors`` are those of estimate, u, lambda_max, k_p and k_q from the scatter of the
@@ -77,21 +77,6 @@ class MonteCarloResult:
     seed: int
     block_size: int
     seconds: float
-
-    @property
-    def u(self) -> Array:
-        """Standard uncertainties (m,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Array:
-        """Correlation matrix (m, m)."""
-        return correlation_of(self.covariance)
-
-    @property
-    def lambda_max(self) -> float:
-        """The largest eigenvalue of the correlation matrix."""
-        return float(np.linalg.eigvalsh(self.correlation)[-1])
 
 
 def sequence_length(p: float, block_size: int) -> int:

@@ -69,11 +69,6 @@ class RunEstimator:
     counts: _Counts = field(default_factory=_Counts)
 
     @property
-    def kantorovich_number(self) -> float:
-        """The largest h of all trials so far; 1/2 is the limit."""
-        return self.counts.largest_number
-
-    @property
     def by_gauss_newton(self) -> int:
         """How many trials had to be solved by plain Gauss-Newton so far."""
         return self.counts.by_gauss_newton

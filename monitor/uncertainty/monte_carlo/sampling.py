@@ -112,42 +112,6 @@ def normal_inputs(inputs: Inputs) -> tuple[JointDistribution, ...]:
     return (JointDistribution(inputs.names, inputs.units, marginals, inputs.correlation),)
 
 
-def t_inputs(inputs: Inputs) -> tuple[JointDistribution, ...]:
-    """Each source jointly t with its degrees of freedom, normal where they are infinite (JCGM 102 5.3.2).
-
-    Sources must follow one another (not be interleaved) and be uncorrelated; DataError otherwise.
-    """
-    groups: list[JointDistribution] = []
-    indices: list[int] = []
-    for source in inputs.source_names:
-        at = inputs.indices(source)
-        indices += [int(i) for i in at]
-        others = np.setdiff1d(np.arange(len(inputs.names)), at)
-        if np.any(inputs.covariance[np.ix_(at, others)]):
-            raise DataError(
-                f"'{source}' is correlated with another source; a joint t needs them uncorrelated"
-            )
-        dof = inputs.degrees_of_freedom(source)
-        pairs = [(float(inputs.estimate[i]), float(inputs.u[i])) for i in at]
-        finite = math.isfinite(dof)
-        marginals: tuple[Marginal, ...] = tuple(
-            StudentT(y, u, dof) if finite else Normal(y, u) for y, u in pairs
-        )
-        groups.append(
-            JointDistribution(
-                tuple(inputs.names[i] for i in at),
-                tuple(inputs.units[i] for i in at),
-                marginals,
-                inputs.correlation[np.ix_(at, at)],
-                "t" if finite else "gaussian",
-                dof,
-            )
-        )
-    if indices != sorted(indices):
-        raise DataError("the inputs of a source must follow one another; order them by source")
-    return tuple(groups)
-
-
 def block_generator(seed: int, block: int) -> np.random.Generator:
     """The stream of one block: that of ``SeedSequence(seed).spawn(block + 1)[block]``."""
     return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(block,))))

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from monitor.exceptions import InputError, MonitorError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.web.charts.chart import Chart
 from monitor.web.charts.statistics import cloud_chart, correlation_chart, p_value_chart, region_chart
-from monitor.web.desk import Ticket
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
 
@@ -51,13 +50,13 @@ def routes() -> APIRouter:
             return page(request, "curve.html", row=row)
         runs: RunsAnswer = ask(user, "runs", {"campaign": name})
         tickets = [desk.ask(user, "statistics", {"campaign": name, "by": by})]
-        statistics, why_no_statistics = _answered(tickets[0])
+        statistics, why_no_statistics = tickets[0].outcome()
         trials = bool(request.query_params.get("trials"))
         regions, why_no_regions = None, ""
         if first or second:
             question, document = _regions_asked(name, first, second, run, trials=trials)
             tickets.append(desk.ask(user, question, document))
-            regions, why_no_regions = _answered(tickets[1])
+            regions, why_no_regions = tickets[1].outcome()
         return page(
             request, "campaign.html",
             row=row, runs=runs, conditions=_conditions(runs), by=by, run=run,
@@ -69,14 +68,6 @@ def routes() -> APIRouter:
         )  # fmt: skip
 
     return router
-
-
-def _answered(ticket: Ticket) -> tuple[Any, str]:
-    """The answer of a ticket and why there is none; both empty while it is computed."""
-    try:
-        return ticket.answer(), ""
-    except MonitorError as error:
-        return None, str(error)
 
 
 def _regions_asked(

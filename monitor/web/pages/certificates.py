@@ -104,6 +104,5 @@ def _verified(asker: Asker, user: User, form: Form, working_folder: Path) -> Ver
         try:
             answer: VerificationAnswer = asker(user, "verify certificate", {}, {"file": path})
         except MonitorError as error:
-            refusal = refusal_of(error)
-            return Refusal(refusal.status, refusal.error.replace(str(path), form.files[0].name))
+            return refusal_of(error, {str(path): form.files[0].name})
         return answer

@@ -52,10 +52,5 @@ def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> Imp
             folders = list(unpack(form.files, Path(folder)))
             answer: ImportAnswer = asker(user, "import", {}, {"folders": folders})
         except MonitorError as error:
-            refusal = refusal_of(error)
-            texts = [
-                text.replace(f"{folder}/", "").replace(folder, "the upload")
-                for text in (refusal.error, *refusal.faults)
-            ]
-            return Refusal(refusal.status, texts[0], tuple(texts[1:]))
+            return refusal_of(error, {f"{folder}/": "", folder: "the upload"})
         return answer

@@ -19,9 +19,9 @@ from monitor.reporting.certificate.grounds import GroundKind
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
-from monitor.web.interface import attachment
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
 from monitor.web.rendering import page
+from monitor.web.sending import attachment
 from monitor.web.users import User
 
 #: The largest laboratory's file that fills the form.
@@ -147,8 +147,8 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
 
 def _refused(error: MonitorError, folder: str) -> _Outcome:
     """The refusal in words, and at every box that it names what is missing there."""
-    refusal = refusal_of(error)
-    lines = [line.strip() for line in refusal.error.replace(f"{folder}/", "").splitlines()]
+    refusal = refusal_of(error, {f"{folder}/": ""})
+    lines = [line.strip() for line in refusal.error.splitlines()]
     faults: dict[str, str] = {}
     if isinstance(error, IncompleteCertificateError):
         for gap in error.missing:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import io
 import tempfile
-import zipfile
 from pathlib import Path
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from monitor.web.access import offered, role_needed
+from monitor.web.access import address_of, offered, role_needed
 from monitor.web.forms import own_address, read_form, whole_number
-from monitor.web.interface import address_of, attachment
+from monitor.web.parcel import packed
 from monitor.web.rendering import page
+from monitor.web.sending import attachment
 from monitor.workflow.contract import QUESTIONS
 
 #: Entries of the audit on its page.
@@ -60,11 +60,9 @@ def routes() -> APIRouter:
             answer = request.app.state.asker(request.state.user, "export", document, {"folder": target})
             if format == "xlsx":
                 return attachment(f"{machine or 'monitor'}.xlsx", answer.files[0].read_bytes())
-            packed = io.BytesIO()
-            with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-                for path in sorted(path for path in target.rglob("*") if path.is_file()):
-                    archive.write(path, path.relative_to(folder).as_posix())
-        return attachment(f"{machine or 'export'}-{format}.zip", packed.getvalue())
+            archive = io.BytesIO()
+            packed(sorted(path for path in target.rglob("*") if path.is_file()), Path(folder), archive)
+        return attachment(f"{machine or 'export'}-{format}.zip", archive.getvalue())
 
     @router.get("/interface")
     def interface_list(request: Request) -> Response:

@@ -17,8 +17,8 @@ from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
-from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
+from monitor.web.sending import attachment
 
 if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
-from monitor.exceptions import MonitorError, NotFoundError
+from monitor.exceptions import NotFoundError
 from monitor.web.charts.residuals import (
     MAGNIFICATIONS,
     driver_chart,
@@ -132,11 +132,10 @@ class _Answers:
 
     def _take(self, name: str, ticket: Ticket | None) -> Any:
         """The answer of a ticket; None while it is computed, and where it was refused."""
-        try:
-            return None if ticket is None else ticket.answer()
-        except MonitorError as error:
-            self.refusals[name] = str(error)
-            return None
+        answer, refusal = (None, "") if ticket is None else ticket.outcome()
+        if refusal:
+            self.refusals[name] = refusal
+        return answer
 
 
 def _expected(compare: Any) -> float | None:

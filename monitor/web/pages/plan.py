@@ -9,7 +9,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from monitor.exceptions import InputError, MonitorError
+from monitor.exceptions import InputError
 from monitor.web.charts.plan import plan_chart
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
@@ -27,6 +27,7 @@ def routes() -> APIRouter:
         """Weigh the plan of a campaign, and the one that the form asks for."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
+        from monitor.workflow.plan.request import PlanRequest
 
         query = request.query_params
         document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
@@ -35,13 +36,9 @@ def routes() -> APIRouter:
         if keep:
             document["keep"] = keep
         if separate:
-            document["separate"] = _pair(separate)
+            document["separate"] = PlanRequest.two_effects(separate)
         ticket = request.app.state.desk.ask(request.state.user, "plan", document)
-        answer, refusal = None, ""
-        try:
-            answer = ticket.answer()
-        except MonitorError as error:
-            refusal = str(error)
+        answer, refusal = ticket.outcome()
         return page(
             request, "plan.html",
             campaign=campaign, model=model, answer=answer, refusal=refusal, asked=document, separate=separate,
@@ -72,17 +69,3 @@ def _wanted(query: Mapping[str, str]) -> dict[str, dict[str, float]]:
                 raise InputError(f"the wanted uncertainty of {name} is a positive number, not '{text}'")
             wanted[field.removeprefix(WANTED)] = value
     return {"wanted": wanted} if wanted else {}
-
-
-def _pair(text: str) -> list[str]:
-    """Two effects with a comma between them; one inside brackets belongs to a formula."""
-    depth, parts = 0, [""]
-    for letter in text:
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    if len(parts) != 2 or not all(part.strip() for part in parts):
-        raise InputError(f"'{text}': name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
-    return [part.strip() for part in parts]

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import InputError, MonitorError
+from monitor.exceptions import InputError
 from monitor.store import CampaignRow
 from monitor.web.desk import Ticket
-from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
+from monitor.web.sending import attachment
 
 if TYPE_CHECKING:
     from monitor.workflow.health.request import ReportAnswer
@@ -34,10 +34,7 @@ def routes() -> APIRouter:
         answer, ticket, refusal = None, None, ""
         if week:
             ticket = _asked(request, week, machine)
-            try:
-                answer = ticket.answer()
-            except MonitorError as error:
-                refusal = str(error)
+            answer, refusal = ticket.outcome()
         campaigns = request.app.state.asker(request.state.user, "campaigns").campaigns
         return page(
             request, "reports.html",

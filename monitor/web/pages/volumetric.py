@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from monitor.exceptions import MonitorError
 from monitor.web.charts.volumetric import slice_charts, vectors_chart
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
@@ -35,11 +34,7 @@ def routes() -> APIRouter:
         document = {"campaign": campaign, **asked, **({"absolute": True} if absolute else {})}
         runs: RunsAnswer = request.app.state.asker(user, "runs", {"campaign": campaign})
         ticket = desk.ask(user, "map over the stroke", document)
-        answer, refusal = None, ""
-        try:
-            answer = ticket.answer()
-        except MonitorError as error:
-            refusal = str(error)
+        answer, refusal = ticket.outcome()
         return page(
             request, "map.html",
             campaign=campaign, runs=runs.runs, run=run, minus=minus, pose=pose, points=points or "5",

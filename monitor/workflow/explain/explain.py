@@ -31,11 +31,12 @@ from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation, mistakes_found
+from monitor.workflow.explain.measurements import with_measurements
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
-from monitor.workflow.models import label, resolve_for, subject_of
+from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
@@ -101,7 +102,7 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:
     first = first_fit(campaign, model)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = machine_explanation(explanation)
+    answer = with_measurements(machine_explanation(explanation), campaign, as_model(model))
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.

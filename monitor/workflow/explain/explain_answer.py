@@ -11,6 +11,7 @@ from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate
+from monitor.workflow.plan.test_answer import TestAnswer
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,18 @@ class LikelyMistake:
 
 
 @dataclass(frozen=True)
+class InstrumentAlias:
+    """Errors of instruments (``effects``) that the readings cannot tell from the ``parameters`` of the machine, which
+    are reported in their stead. ``measurement`` is the test that would tell, None where no single one does, or where
+    nobody searched for one (``searched``): `plan` does for any effect that is asked for."""
+
+    effects: tuple[str, ...]
+    parameters: tuple[str, ...]
+    searched: bool = False
+    measurement: TestAnswer | None = None
+
+
+@dataclass(frozen=True)
 class Remaining:
     """What the model with all that was found leaves.
 
@@ -227,7 +240,8 @@ class MachineExplanation:
     ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
     at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
     but could not be fitted, and were skipped. ``remaining`` is what is left with all that is missing in the model, None
-    where nothing is. The residual is pictured where something is missing.
+    where nothing is. The residual is pictured where something is missing. ``taken_for_machine`` are errors of
+    instruments that would be reported as the machine's.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -246,6 +260,7 @@ class MachineExplanation:
     not_fitted: tuple[str, ...] = ()
     limits_reached: tuple[str, ...] = ()
     remaining: Remaining | None = None
+    taken_for_machine: tuple[InstrumentAlias, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

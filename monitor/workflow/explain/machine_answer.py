@@ -28,6 +28,7 @@ from monitor.workflow.explain.explain_answer import (
     ChangedTarget,
     CurvePoint,
     DeviationsApart,
+    InstrumentAlias,
     LikelyMistake,
     MachineExplanation,
     MachineMissing,
@@ -249,4 +250,13 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         not_fitted=explanation.unfitted,
         limits_reached=tuple(explanation.limits),
         remaining=_remaining(explanation.final) if missing else None,
+        taken_for_machine=_aliases(explanation),
     )
+
+
+def _aliases(explanation: Explanation) -> tuple[InstrumentAlias, ...]:
+    """Errors of instruments that base parameters take up, those with the same parameters together."""
+    groups: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for alias in explanation.taken_for_machine:
+        groups[alias.by] = (*groups.get(alias.by, ()), alias.parameter)
+    return tuple(InstrumentAlias(effects, parameters) for parameters, effects in groups.items())

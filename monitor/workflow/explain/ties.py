@@ -9,6 +9,8 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from monitor.documents import OMITTED
+from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS
+from monitor.workflow.plan.test_answer import TestAnswer
 
 if TYPE_CHECKING:
     from monitor.discovery import ChainMissing
@@ -30,6 +32,8 @@ class TieBreak(Enum):
     PLAN = "plan"
     #: More poses over the whole range of ``axes``, or another load: what is seen from outside has no plan of touches.
     MORE_POSES = "more_poses"
+    #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
+    INSTRUMENT = "instrument"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
 
@@ -37,12 +41,13 @@ class TieBreak(Enum):
 @dataclass(frozen=True)
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
-    ``axes`` those to index or to move."""
+    ``axes`` those to index or to move, ``measurement`` the test of an instrument."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak
     drivers: tuple[str, ...] = field(default=(), metadata=OMITTED)
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
 
 
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) -> tuple[Tie, ...]:
@@ -51,10 +56,17 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) ->
     actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...]], list[str]] = {}
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
+        if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
+            kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
         if kind is TieBreak.PLAN and not is_touched:
             kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
         actions.setdefault((kind, drivers, axes), []).append(rival)
     return tuple(Tie(tuple(names), kind, drivers, axes) for (kind, drivers, axes), names in actions.items())
+
+
+def is_of_instrument(text: str) -> bool:
+    """Whether an effect is an error of an instrument."""
+    return text.partition(":")[0] in INSTRUMENT_HEADS
 
 
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:

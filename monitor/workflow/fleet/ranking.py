@@ -13,7 +13,6 @@ from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moment
 from monitor.statistics.sufficient import (
     CellDrift,
     CellTests,
-    GroupSums,
     cells_from_sums,
     drift_from_sums,
     drift_in_blocks,
@@ -39,12 +38,7 @@ STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
     """Bartlett, ANOVA and drift (a day) of every machine and parameter from its sums."""
-    cells = cells_from_sums(
-        GroupSums(
-            sums.groups, sums.runs, sums.offset, sums.squares, sums.within, sums.repeated, sums.least_variance,
-            sums.log_variances, sums.inverse_dof,
-        )
-    )  # fmt: skip
+    cells = cells_from_sums(sums)
     drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
     beside = warmth_beside(sums)
     degrees = np.where(beside[:, np.newaxis], sums.blocks.degrees, 0.0)[:, :, np.newaxis]

@@ -70,7 +70,7 @@ def read_mail_settings(path: Path) -> MailSettings:
         raise InputError(f"{path} has no section [mail]")
     faults = _faults(table)
     if faults:
-        raise InputError("\n  ".join([f"{path} was refused:", *faults]))
+        raise InputError("\n  ".join([f"{path} was refused:", *map(str, faults)]))
     security = table.get("security", "starttls")
     return MailSettings(
         server=table["server"],
@@ -97,49 +97,51 @@ def _file_beside(path: Path, table: Table, key: str) -> Path | None:
     return file
 
 
-def _faults(table: Table) -> list[str]:
+def _faults(table: Table) -> list[InputError]:
     """Everything that is wrong or missing, each in words."""
-    faults = [f"[mail] has no key {key}; it has {', '.join(_KEYS)}" for key in table if key not in _KEYS]
-    faults += [f"[mail] lacks {key}" for key in ("server", "from", "to") if key not in table]
+    faults = [
+        InputError(f"[mail] has no key {key}; it has {', '.join(_KEYS)}") for key in table if key not in _KEYS
+    ]
+    faults += [InputError(f"[mail] lacks {key}") for key in ("server", "from", "to") if key not in table]
     for key, kind in _KEYS.items():
         if key in table and (not isinstance(table[key], kind) or (kind is int and table[key] is True)):
-            faults.append(f"{key} must be a {kind.__name__}, but is {table[key]!r}")
+            faults.append(InputError(f"{key} must be a {kind.__name__}, but is {table[key]!r}"))
     return [*faults, *_faults_of_connection(table), *_faults_of_lines(table), *_faults_of_password(table)]
 
 
-def _faults_of_connection(table: Table) -> list[str]:
+def _faults_of_connection(table: Table) -> list[InputError]:
     faults = []
     if str(table.get("security", "starttls")) not in PORTS:
-        faults.append(f"security is one of {', '.join(PORTS)}, not {table['security']!r}")
+        faults.append(InputError(f"security is one of {', '.join(PORTS)}, not {table['security']!r}"))
     if isinstance(table.get("port"), int) and not 1 <= table["port"] <= 65535:
-        faults.append(f"port is a number from 1 to 65535, not {table['port']}")
+        faults.append(InputError(f"port is a number from 1 to 65535, not {table['port']}"))
     return faults
 
 
-def _faults_of_lines(table: Table) -> list[str]:
+def _faults_of_lines(table: Table) -> list[InputError]:
     """What is wrong with the texts that stand in the head of a message."""
     addresses = table.get("to")
     lines = [(key, table.get(key)) for key in ("server", "from", "user")]
     lines += [("to", address) for address in addresses] if isinstance(addresses, list) else []
     # A line feed in an address would begin another line of the message's head.
     faults = [
-        f"{key} is one line of visible letters, not {line!r}"
+        InputError(f"{key} is one line of visible letters, not {line!r}")
         for key, line in lines
         if isinstance(line, str) and not (line.strip() and line.isprintable())
     ]
     if isinstance(addresses, list) and not (
         addresses and all(isinstance(address, str) and "@" in address for address in addresses)
     ):
-        faults.append('to is a list of addresses, for example ["maintenance@example.org"]')
+        faults.append(InputError('to is a list of addresses, for example ["maintenance@example.org"]'))
     return faults
 
 
-def _faults_of_password(table: Table) -> list[str]:
+def _faults_of_password(table: Table) -> list[InputError]:
     faults = []
     if ("user" in table) != ("password_file" in table):
-        faults.append("user and password_file go together")
+        faults.append(InputError("user and password_file go together"))
     if "user" in table and table.get("security") == "none" and table.get("server") not in _LOOPBACK:
-        faults.append("a password is not sent unencrypted: set security to tls or starttls")
+        faults.append(InputError("a password is not sent unencrypted: set security to tls or starttls"))
     return faults
 
 

@@ -1,7 +1,8 @@
 """Results of one machine that should agree, or should not: two methods, and before against after an event.
 
 A part of `monitor trend`. The latest campaign of each method is compared with that of every other; and the last
-campaign before a recorded event with the first after it, of the same method.
+campaign before a recorded event with the first after it, of the same method. Where setups name their instruments, a
+method with other instruments is another method: a laser in January and an R-test in June should agree.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ def agreement(
 
 def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Iterator[_Comparison]:
     latest: dict[str, str] = {}
-    for campaign, method in zip(history.campaign.tolist(), history.method.tolist(), strict=True):
+    for campaign, method in zip(history.campaign.tolist(), history.measured_by.tolist(), strict=True):
         latest[method] = campaign  # runs are in the order of time
     for first, second in combinations(latest, 2):
         yield _Comparison(
@@ -126,7 +127,7 @@ def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Ite
     moments = np.sort([event.at.timestamp() for event in events])
     for event in events:
         for method in latest:
-            of_method = history.method == method
+            of_method = history.measured_by == method
             before = of_method & (seconds < event.at.timestamp())
             after = of_method & (seconds >= event.at.timestamp())
             if before.any() and after.any():

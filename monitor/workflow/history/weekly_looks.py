@@ -101,7 +101,7 @@ def _machine_weeks(db: Database, name: str, last: Week | None) -> _MachineWeeks 
     )
     if not len(history.run):
         return None
-    history = history.part(history.method == history.method[-1])
+    history = history.part(history.measured_by == history.measured_by[-1])
     history = history.part(steady_runs(history))
     if not len(history.run) or not history.parameters:
         return None

@@ -14,7 +14,7 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.model import SHARED_BASE, Model, chain_of
+from monitor.methods.model import SHARED_BASE, SHARED_BASE_MEANING, Model, chain_of
 from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
 
 Subject = TypeVar("Subject")
@@ -51,7 +51,7 @@ class Machines:
         for _, chain, _ in self._calibrated():
             for text in effects:
                 if text == SHARED_BASE:
-                    meaning[text] = "the base effects, each one number for all runs of a campaign"
+                    meaning[text] = SHARED_BASE_MEANING
                     continue
                 try:
                     meaning.setdefault(text, describe(parse_effect(text, chain)).meaning)

@@ -8,6 +8,7 @@ from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, named
 from monitor.workflow.explain.explain_answer import DeviationsApart
+from monitor.workflow.plan.test_answer import TestAnswer
 
 #: Positions of rotary axes in degrees by the name of the column: ``a_deg``.
 Pose = Mapping[str, float]
@@ -158,22 +159,6 @@ class AnglePlanAnswer:
 
 
 @dataclass(frozen=True)
-class TestAnswer:
-    """A test of an instrument: so many ``poses`` with each axis between two readings (``x_mm``, ``c_deg``), a bar or a
-    sphere at ``work_point_mm`` on the work side. ``available``: the campaign has the instrument, else it is a usual
-    one. ``u`` are standard uncertainties of all parameters with it, in their units; None where there is no number."""
-
-    instrument: str
-    setup: str
-    reading: str
-    available: bool
-    poses: int
-    axes: Mapping[str, tuple[float, float]]
-    u: Mapping[str, float | None]
-    work_point_mm: tuple[float, float, float] | None = field(default=None, metadata=OMITTED)
-
-
-@dataclass(frozen=True)
 class UnseenParameter:
     """A parameter that the readings give no number, and the test that would give it the smallest ``u``."""
 
@@ -189,7 +174,9 @@ class InstrumentPlanAnswer:
 
     ``present`` are standard uncertainties as measured, by parameter; ``proposed`` tests in turn, each with what all up
     to it leave; ``unseen`` what has no number yet, with the test that would see it. ``standing`` are linear axes that
-    stood still and have no stroke in the machine file, so that no test moves them.
+    stood still and have no stroke in the machine file, so that no test moves them. ``pairs`` are two tests for each
+    asked parameter that no single test gives a number, the second with what both leave; none where no pair does.
+    ``not_turned`` are rotary axes that no test turns, because bar and sphere would leave the strokes.
     """
 
     campaign: str
@@ -204,6 +191,8 @@ class InstrumentPlanAnswer:
     proposed: tuple[TestAnswer, ...]
     unseen: tuple[UnseenParameter, ...]
     standing: tuple[str, ...]
+    pairs: Mapping[str, tuple[TestAnswer, ...]] = field(default_factory=dict)
+    not_turned: tuple[str, ...] = ()
 
 
 PlanAnswer = BallPlanAnswer | AnglePlanAnswer | InstrumentPlanAnswer

@@ -13,6 +13,7 @@ from monitor.methods.chain.touch import TouchProblem
 from monitor.methods.planning.candidates import Candidates, Choice, TimeModel, more_balls, pose_grid
 from monitor.methods.planning.touches import candidate_touches, planned_context
 from monitor.records import Array, Campaign
+from monitor.reporting.origins import TimeSource
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model
 from monitor.workflow.plan.strokes import strokes_of
@@ -40,9 +41,9 @@ def _time_model(problem: TouchProblem, pose: Array) -> TimeModel:
     changed = np.diff(pose) != 0
     within, between = steps[~changed & (steps > 0)], steps[changed & (steps > 0)]
     if not len(within) or not len(between):
-        return TimeModel(ASSUMED_PROBING_S, ASSUMED_INDEXATION_S, "assumed")
+        return TimeModel(ASSUMED_PROBING_S, ASSUMED_INDEXATION_S, TimeSource.ASSUMED)
     probing = float(np.median(within))
-    return TimeModel(probing, max(0.0, float(np.median(between)) - probing), "the times of this campaign")
+    return TimeModel(probing, max(0.0, float(np.median(between)) - probing), TimeSource.CAMPAIGN)
 
 
 def _with_identified_tip(problem: TouchProblem) -> TouchProblem:

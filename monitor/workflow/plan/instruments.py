@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
-from monitor.exceptions import InputError, did_you_mean
+from monitor.effects import Effect, parse_effect
+from monitor.exceptions import EffectError, InputError, did_you_mean
 from monitor.machine import Joint
-from monitor.methods import InstrumentPlan
-from monitor.methods.method import ExpectedTest, TestForecast
-from monitor.methods.model import chain_of
+from monitor.methods import ChainMethod, InstrumentPlan, campaign_method
+from monitor.methods.method import ExpectedTest, PlannedTest, TestForecast
+from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model, label
-from monitor.workflow.plan.answer import InstrumentPlanAnswer, TestAnswer, UnseenParameter
+from monitor.workflow.plan.answer import InstrumentPlanAnswer, UnseenParameter
 from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.plan.strokes import strokes_of
+from monitor.workflow.plan.test_answer import TestAnswer
 
 #: So many tests are listed, and at most proposed.
 LISTED, MOST_TESTS = 12, 12
+#: Pairs are made of so many tests at most: some 300 pairs, each a millisecond.
+MOST_PAIRED = 24
 #: A rotary axis that turned by less (rad) may turn all around.
 LEAST_TURN = 0.5
 #: Kinds whose bar or sphere stands at a place that the plan chooses.
@@ -31,11 +38,13 @@ def plan_instruments(
 ) -> InstrumentPlanAnswer:
     """Every test ranked by the u that it would leave of the asked parameters, and the next ones in turn.
 
-    Raises InputError for what such a plan does not have, a number of tests that cannot be, a parameter that there is
-    not, and a wanted uncertainty that no test reaches.
+    ``parameters`` and ``separate`` of the request may name effects that the model lacks: tests are weighed as if it had
+    them. Raises InputError for what such a plan does not have, a number of tests that cannot be, a parameter that there
+    is not, and a wanted uncertainty that no test reaches.
     """
     count = _count(request)
-    forecast, run = forecast_of(method, campaign, model)
+    effects = _effects_asked(request, campaign, model)
+    forecast, run = forecast_of(method, campaign, _with_effects(as_model(model), effects))
     present, expected = forecast.present(), tuple(forecast.expected())
     asked = _asked(request, present, expected)
     internal = {name: forecast.unit_of(name).to_internal(u) for name, u in request.wanted.items()}
@@ -56,15 +65,76 @@ def plan_instruments(
         proposed=tuple(_answer(forecast, test, joints) for test in in_turn),
         unseen=unseen(forecast, joints, present, expected),
         standing=tuple(joint.name for joint in joints if _stands(campaign, joint)),
+        pairs=_pairs(forecast, present, expected, asked, joints) if _names_some(request) else {},
+        not_turned=_not_turned(joints, expected),
     )
+
+
+def measurement_that_tells(
+    method: InstrumentPlan, campaign: Campaign, model: Model, effects: Sequence[str]
+) -> TestAnswer | None:
+    """The test that gives the coefficients of effects numbers, all beside each other; None where no single one does.
+
+    Effects whose recorded drivers only the future has, and those that the chain does not have, have no such test.
+    """
+    try:
+        forecast, _ = forecast_of(method, campaign, _with_effects(model, effects))
+        expected = tuple(forecast.expected())
+    except InputError:
+        return None
+    asked = _coefficients(effects, expected)
+    best = min(
+        expected, key=lambda test: (_rank(test.u, asked)[0], not test.test.available, _rank(test.u, asked)[1])
+    )
+    if not asked or _rank(best.u, asked)[0] > 0:
+        return None
+    return _answer(forecast, best, chain_of(campaign.machine).joints)
+
+
+def _coefficients(effects: Sequence[str], expected: Sequence[ExpectedTest]) -> tuple[str, ...]:
+    """The coefficients of effects among those of the tests: ``EXY:harmonic1.cos``."""
+    names = dict.fromkeys(name for test in expected for name in test.u)
+    return tuple(
+        name for name in names if any(name == text or name.startswith(f"{text}.") for text in effects)
+    )
+
+
+def _with_effects(model: Model, effects: Sequence[str]) -> Model:
+    """The model and effects that it lacks."""
+    return replace(model, added=tuple(dict.fromkeys((*model.added, *effects))))
+
+
+def _effects_asked(request: PlanRequest, campaign: Campaign, model: StoredModel) -> tuple[str, ...]:
+    """The effects that the model lacks and the request names. Raises EffectError for one of ``separate`` that is
+    none."""
+    chain = chain_of(campaign.machine)
+    texts = [parse_effect(text, chain).text for text in request.separate or ()]
+    for name in (*request.parameters, *request.wanted):
+        # A parameter is no effect: EXX is the gain, EXX:poly2 an effect.
+        if ":" in name and name not in model.effects:
+            with suppress(EffectError):
+                texts.append(parse_effect(name, chain).text)
+    base = {effect.text for effect in method_base(campaign, model)}
+    return tuple(text for text in dict.fromkeys(texts) if text not in base)
+
+
+def method_base(campaign: Campaign, model: StoredModel) -> tuple[Effect, ...]:
+    """The effects that a campaign's runs have of their own."""
+    method = campaign_method(campaign)
+    assert isinstance(method, ChainMethod)
+    return method.problem_of(campaign, as_model(model)).base
+
+
+def _names_some(request: PlanRequest) -> bool:
+    return bool(request.parameters or request.wanted or request.separate)
 
 
 def _count(request: PlanRequest) -> int:
     """How many tests are proposed. Raises InputError for what such a plan does not have."""
-    if request.balls is not None or request.keep or request.separate is not None:
+    if request.balls is not None or request.keep:
         raise InputError(
-            "a plan of instruments is tests: --for names parameters, --poses N proposes N tests, --wanted P=U those "
-            "that reach an uncertainty"
+            "a plan of instruments is tests: --for names parameters, --separate two effects, --poses N proposes N "
+            "tests, --wanted P=U those that reach an uncertainty"
         )
     if request.figures is not None:
         raise InputError("--figures: a plan of instruments has no figure yet; leave it out")
@@ -95,8 +165,18 @@ def _stands(campaign: Campaign, joint: Joint) -> bool:
     return not joint.turns and not is_stated and np.ptp(campaign.probings.readings[joint.name]) == 0.0
 
 
+def _not_turned(joints: Sequence[Joint], expected: Sequence[ExpectedTest]) -> tuple[str, ...]:
+    """The rotary axes around which no bar or sphere can be followed within the strokes."""
+    followed = [test.test for test in expected if test.test.setup.reading in PLACED]
+    return tuple(
+        joint.name
+        for index, joint in enumerate(joints)
+        if joint.kind == "rotary" and not any(np.ptp(test.positions[:, index]) > 0.0 for test in followed)
+    )
+
+
 def forecast_of(
-    method: InstrumentPlan, campaign: Campaign, model: StoredModel, run: int | None = None
+    method: InstrumentPlan, campaign: Campaign, model: Model, run: int | None = None
 ) -> tuple[TestForecast, int]:
     """The forecast of a ``run`` (the last with None), whose number is returned too; axes move over their strokes."""
     number = int(campaign.probings.run.max()) if run is None else run
@@ -110,7 +190,7 @@ def forecast_of(
         for index, joint in enumerate(chain.joints)
         if joint.turns
     }
-    return method.forecast(campaign, as_model(model), number, {**around, **rotary, **linear}), number
+    return method.forecast(campaign, model, number, {**around, **rotary, **linear}), number
 
 
 def _angles(joint: Joint, visited: Array) -> tuple[float, float]:
@@ -155,7 +235,11 @@ def _asked(
 ) -> tuple[str, ...]:
     """The parameters that tests are ranked for. Raises InputError for one that there is not."""
     names = _names(present, expected)
-    asked = tuple(dict.fromkeys((*request.parameters, *request.wanted))) or tuple(present)
+    texts = (*(request.separate or ()), *request.parameters, *request.wanted)
+    # An effect is asked for by all of its coefficients.
+    asked = tuple(
+        dict.fromkeys(each for text in texts for each in (_coefficients((text,), expected) or (text,)))
+    ) or tuple(present)
     for name in asked:
         if name not in names:
             raise InputError(
@@ -190,17 +274,68 @@ def _in_turn(
     ``count``, or until the ``wanted`` uncertainties are reached."""
     candidates = [test for test in expected if test.test.available] or list(expected)
     in_turn: list[ExpectedTest] = []
-    for _ in range(count):
-        if wanted and in_turn and _reached(in_turn[-1].u, wanted):
-            break
+    while len(in_turn) < count and not (wanted and in_turn and _reached(in_turn[-1].u, wanted)):
         before = [test.test for test in in_turn]
-        in_turn.append(
-            min(
-                (forecast.together([*before, test.test]) for test in candidates),
-                key=lambda test: _rank(test.u, asked),
-            )
+        present = in_turn[-1].u if in_turn else forecast.present()
+        best = min(
+            (forecast.together([*before, test.test]) for test in candidates),
+            key=lambda test: _rank(test.u, asked),
         )
+        lacking = _rank(present, asked)[0]
+        if _rank(best.u, asked)[0] < lacking or lacking < len(asked):
+            in_turn.append(best)
+            continue
+        # None alone gives any of them a number: only what two give is worth a proposal.
+        pair = _best_pair(forecast, expected, before, asked) if len(in_turn) + 2 <= count else None
+        if pair is None:
+            break
+        in_turn += [forecast.together([*before, pair[0].test]), pair[1]]
     return in_turn
+
+
+def _best_pair(
+    forecast: TestForecast,
+    expected: Sequence[ExpectedTest],
+    before: Sequence[PlannedTest],
+    asked: Sequence[str],
+) -> tuple[ExpectedTest, ExpectedTest] | None:
+    """The two tests, beside those ``before``, that together give most of the asked parameters a number, the second with
+    what both leave; of the campaign's own instruments where these do. None where no two do."""
+    lacking = _rank(forecast.together(before).u if before else forecast.present(), asked)[0]
+    for candidates in ([test for test in expected if test.test.available], list(expected)):
+        pairs = list(combinations(_of_pairs(candidates), 2))
+        weighed = [(first, forecast.together([*before, first.test, second.test])) for first, second in pairs]
+        best = min(weighed, key=lambda pair: _rank(pair[1].u, asked), default=None)
+        if best is not None and _rank(best[1].u, asked)[0] < lacking:
+            return best
+    return None
+
+
+def _of_pairs(candidates: Sequence[ExpectedTest]) -> list[ExpectedTest]:
+    """The tests of which pairs are made: of each setup the first places, so that there are no more than can be
+    weighed."""
+    by_setup: dict[str, list[ExpectedTest]] = {}
+    for test in candidates:
+        by_setup.setdefault(test.test.setup.id, []).append(test)
+    each = max(MOST_PAIRED // max(len(by_setup), 1), 1)
+    return [test for tests in by_setup.values() for test in tests[:each]]
+
+
+def _pairs(
+    forecast: TestForecast,
+    present: Mapping[str, float],
+    expected: Sequence[ExpectedTest],
+    asked: Sequence[str],
+    joints: Sequence[Joint],
+) -> dict[str, tuple[TestAnswer, ...]]:
+    """For every asked parameter that neither the readings nor any single test gives a number, two tests that do."""
+    pairs: dict[str, tuple[TestAnswer, ...]] = {}
+    for name in asked:
+        if any(np.isfinite(u.get(name, np.nan)) for u in (present, *(test.u for test in expected))):
+            continue
+        pair = _best_pair(forecast, expected, (), (name,))
+        pairs[name] = () if pair is None else tuple(_answer(forecast, test, joints) for test in pair)
+    return pairs
 
 
 def _reached(u: Mapping[str, float], wanted: Mapping[str, float]) -> bool:

@@ -17,8 +17,8 @@ class PlanRequest:
     ``balls`` and ``poses`` ask for the best plan of so many; ``wanted`` (parameter to display unit) for the quickest
     that reaches these standard uncertainties; ``keep`` weighs the campaign's own plan with these of its indexations
     alone (numbers from 1 on in their order); ``parameters`` are those that tests of instruments are ranked for (none
-    named: all); ``separate`` asks for poses that separate two effects. Expanded uncertainties are of the coverage
-    probability ``p``. Raises InputError.
+    named: all); ``separate`` asks for poses, or tests of instruments, that separate two effects. Expanded uncertainties
+    are of the coverage probability ``p``. Raises InputError.
     """
 
     campaign: str
@@ -48,3 +48,19 @@ class PlanRequest:
             raise InputError("the indexations to keep are numbers from 1 on, each once")
         if self.separate is not None and self.separate[0] == self.separate[1]:
             raise InputError(f"--separate {','.join(self.separate)}: name two different effects")
+
+    @staticmethod
+    def two_effects(text: str) -> tuple[str, str]:
+        """Read two effects with a comma between them; one inside brackets belongs to a formula. Raises InputError."""
+        parts, depth = [""], 0
+        for letter in text:
+            depth += {"(": 1, ")": -1}.get(letter, 0)
+            if letter == "," and depth == 0:
+                parts.append("")
+            else:
+                parts[-1] += letter
+        if len(parts) != 2 or not all(part.strip() for part in parts):
+            raise InputError(
+                f"--separate {text}: name two effects with a comma, for example EBZ:poly2,EZZ:poly2"
+            )
+        return parts[0].strip(), parts[1].strip()

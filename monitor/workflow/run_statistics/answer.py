@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import OMITTED, WORDED
+from monitor.documents import OMITTED, WORDED, Said
 from monitor.records import Array
 from monitor.reporting.lacks import Lack
 
@@ -137,7 +137,7 @@ class CoordinateStatistics:
     """Statistics of the ``n`` probed coordinates ``names``, µm; ``why`` says why there are none."""
 
     n: int
-    why: str | None = field(default=None, metadata=OMITTED)
+    why: Said | None = field(default=None, metadata=OMITTED)
     names: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     u_all_um: Array | None = field(default=None, metadata=OMITTED)
     u_pooled_um: Array | None = field(default=None, metadata=OMITTED)

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from monitor.documents import Said
 from monitor.methods import Unable, campaign_method
 from monitor.records import Array, Campaign
+from monitor.reporting.run_notes import RunsOfSeveralPlans
 from monitor.statistics import Homogeneity
 from monitor.units import DEGREE
 from monitor.workflow.run_statistics.answer import CoordinateStatistics
@@ -46,18 +48,18 @@ def coordinates(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] 
     return names, values
 
 
-def probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | str:
+def probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | Said:
     """Names and values (R, 3 m), mm, of the probed coordinates, or why there are none."""
     comparable = campaign_method(campaign).coordinates
     if isinstance(comparable, Unable):
         return comparable.why
-    return coordinates(campaign, runs) or "the runs do not follow one plan"
+    return coordinates(campaign, runs) or RunsOfSeveralPlans()
 
 
 def coordinate_statistics(campaign: Campaign, runs: list[int], groups: list[str]) -> CoordinateStatistics:
     """Standard deviations and tests of every probed coordinate, or why there are none."""
     readings = probed(campaign, runs)
-    if isinstance(readings, str):
+    if not isinstance(readings, tuple):
         return CoordinateStatistics(n=0, why=readings, bartlett_p=(), anova_p=(), histograms={})
     names, values = readings
     pooled, tests = pooled_by_group(values, groups, names)

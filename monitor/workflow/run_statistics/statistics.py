@@ -227,7 +227,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
 
 def _coordinate_matrices(folder: Path, campaign: Campaign, runs: list[int], groups: list[str]) -> list[str]:
     readings = probed(campaign, runs)
-    if isinstance(readings, str):
+    if not isinstance(readings, tuple):
         return []
     names, values = readings
     pooled = pooled_by_group(1e3 * values, groups, names)[0]

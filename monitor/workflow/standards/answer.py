@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from monitor.documents import Said
+
 
 @dataclass(frozen=True)
 class StandardFigure:
@@ -47,7 +49,7 @@ class StandardTest:
     unit: str
     figures: tuple[StandardFigure, ...]
     targets: tuple[TargetFigures, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Said, ...]
 
 
 @dataclass(frozen=True)

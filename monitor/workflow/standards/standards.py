@@ -9,9 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.documents import Said
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.methods import campaign_method
 from monitor.methods.method import AxisTest, CircleTest, StandardTests
+from monitor.reporting.standard_tests import (
+    AXIS_FIGURES,
+    FewRunsEachWay,
+    LengthWithoutUncertainty,
+    OneSenseOfRotation,
+    OneSideApproached,
+    circle_figure,
+)
 from monitor.statistics.standards.circles import Circles, circles
 from monitor.statistics.standards.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
 from monitor.store import Database
@@ -23,22 +32,6 @@ from monitor.workflow.standards.request import StandardsRequest
 
 #: Positions within so much are one target, in mm and rad: readings of one programmed position.
 ONE_TARGET, ONE_TARGET_RAD = 0.05, 1e-4
-#: Field of the figures of an axis: symbol and name of ISO 230-2:2014, clause 3. The arrows are + and - here.
-NAMES = {
-    "reversal": ("B", "reversal error of the axis"),
-    "mean_reversal": ("B mean", "mean reversal error of the axis"),
-    "repeatability_forward": ("R+", "unidirectional positioning repeatability, forward"),
-    "repeatability_backward": ("R-", "unidirectional positioning repeatability, backward"),
-    "repeatability": ("R", "bi-directional positioning repeatability"),
-    "systematic_forward": ("E+", "unidirectional systematic positioning error, forward"),
-    "systematic_backward": ("E-", "unidirectional systematic positioning error, backward"),
-    "systematic": ("E", "bi-directional systematic positioning error"),
-    "mean_deviation": ("M", "mean bi-directional positioning error"),
-    "accuracy_forward": ("A+", "unidirectional positioning accuracy, forward"),
-    "accuracy_backward": ("A-", "unidirectional positioning accuracy, backward"),
-    "accuracy": ("A", "bi-directional positioning accuracy"),
-}
-SENSES = {1: "counter-clockwise", -1: "clockwise"}
 
 
 def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
@@ -113,7 +106,7 @@ def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
     standard = "ISO 230-6:2002, clause 3" if diagonal else "ISO 230-2:2014, clause 3"
     figures = tuple(
         StandardFigure(
-            *NAMES[field.name],
+            *AXIS_FIGURES[field.name],
             standard,
             show(getattr(evaluated.figures, field.name)),
             show(evaluated.u[field.name]),
@@ -146,56 +139,41 @@ def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
     )
 
 
-def _lacks(evaluated: Positioning) -> Iterator[str]:
+def _lacks(evaluated: Positioning) -> Iterator[Said]:
     """What the standard asks for and the plan does not have."""
     fewest = int(evaluated.runs.min())
     if fewest == 0:
-        yield "some targets were approached from one side only: no reversal, no bi-directional figure"
+        yield OneSideApproached()
     if fewest < USUAL_RUNS:
-        yield f"ISO 230-2, 5.3.2 asks for {USUAL_RUNS} runs in each direction; the fewest here are {fewest}"
+        yield FewRunsEachWay(fewest, USUAL_RUNS)
 
 
 def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:
     um, plane = MICROMETRE.to_display, "".join(test.plane)
-    back = plane[::-1]
-    names = {1: plane, -1: back}
 
-    def figure(symbol: str, name: str, value: float, u: float) -> StandardFigure:
-        return StandardFigure(symbol, name, "ISO 230-4:2005, clause 3", um(value), um(u), MICROMETRE.name)
+    def figure(kind: str, value: float, u: str, way: int = 1) -> StandardFigure:
+        symbol, name = circle_figure(kind, plane, way)
+        return StandardFigure(
+            symbol, name, "ISO 230-4:2005, clause 3", um(value), um(circle.u[u]), MICROMETRE.name
+        )
 
-    figures = []
-    for way, value in circle.circular.items():
-        figures += [
-            figure(f"G_{names[way]}", f"circular deviation, {SENSES[way]}", value, circle.u[f"G{way}"]),
-            figure(
-                f"G_{names[way]} zone",
-                f"circular deviation between minimum-zone circles, {SENSES[way]}",
-                circle.minimum_zone[way],
-                circle.u[f"G{way}"],
-            ),
-            figure(
-                f"F_{names[way]} max",
-                f"largest radial deviation, {SENSES[way]}",
-                circle.largest[way],
-                circle.u[f"Fmax{way}"],
-            ),
-            figure(
-                f"F_{names[way]} min",
-                f"smallest radial deviation, {SENSES[way]}",
-                circle.smallest[way],
-                circle.u[f"Fmin{way}"],
-            ),
-        ]
-    notes = []
+    figures = [
+        figure(kind, values[way], f"{u}{way}", way)
+        for way in circle.circular
+        for kind, values, u in (
+            ("circular", circle.circular, "G"),
+            ("minimum_zone", circle.minimum_zone, "G"),
+            ("largest", circle.largest, "Fmax"),
+            ("smallest", circle.smallest, "Fmin"),
+        )
+    ]
+    notes: list[Said] = []
     if len(circle.circular) == 2:
-        figures += [
-            figure("G(b)", "bi-directional circular deviation", circle.both, circle.u["G"]),
-            figure("H", "circular hysteresis", circle.hysteresis, circle.u["H"]),
-        ]
+        figures += [figure("both", circle.both, "G"), figure("hysteresis", circle.hysteresis, "H")]
     else:
-        notes.append("one sense of rotation: no hysteresis, no bi-directional deviation")
+        notes.append(OneSenseOfRotation())
     if np.isnan(test.u_radius):
-        notes.append("the bar's length has no stated uncertainty: radial deviations F have none either")
+        notes.append(LengthWithoutUncertainty())
     return StandardTest(
         test.setup, test.run, "circle", plane, MICROMETRE.name, tuple(figures), (), tuple(notes)
     )
@@ -221,7 +199,7 @@ def _axis_figure(test: AxisTest, evaluated: Positioning, answer: StandardTest, f
 
 
 def _circle_figure(test: CircleTest, circle: Circles, answer: StandardTest, folder: Path) -> list[str]:
-    from monitor.reporting.figures.standards import circle_figure
+    from monitor.reporting.figures.standards import circle_figure as drawn_circle
 
     um = 1.0 / MICROMETRE.factor
     text = ", ".join(
@@ -229,7 +207,7 @@ def _circle_figure(test: CircleTest, circle: Circles, answer: StandardTest, fold
         for figure in answer.figures
         if figure.symbol.startswith(("G(", "H", "G_")) and "zone" not in figure.symbol
     )
-    figure = circle_figure(
+    figure = drawn_circle(
         circle.angle,
         circle.radial * um,
         circle.sense,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Cause, Lack, Part, refused
+from monitor.reporting.origins import ForecastMethod
 from monitor.statistics import backtest
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
@@ -70,5 +71,5 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, Lack | None]:
     return ForecastTest(
         made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias=test.bias, rms=test.rms, unit=piece.unit,
-        method="days foretold by the days before them since the last change, 60 at most; the first run of each counts",
+        method=ForecastMethod.DAYS_BY_DAYS_BEFORE,
     ), None  # fmt: skip

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
+from monitor.reporting.origins import ForecastMethod
 from monitor.statistics import (
     ErrorVectors,
     JointLines,
@@ -41,10 +42,6 @@ from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
 SINCE_STEPS = 400
 #: The tolerance of the machine file that is no parameter's.
 VOLUMETRIC = "volumetric"
-METHOD = (
-    "all parameters extrapolated together, each by its drift since its last change, correlated as the days are; "
-    "simulated"
-)
 
 
 @dataclass(frozen=True)
@@ -247,7 +244,7 @@ def volumetric_forecast(
     limit = history.tolerances.get(VOLUMETRIC) if question.limit_um is None else question.limit_um
     offset = next(iter(drifts.values())).piece.offset
     none = VolumetricForecast(
-        limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None,
+        limit_um=limit, next_check=date(question.check, offset), method=ForecastMethod.ALL_PARAMETERS, why=None,
         mapped_um=None if limit is None else latest_maps(db, history.machine).get(history.machine),
     )  # fmt: skip
     if limit is None:

@@ -16,6 +16,7 @@ from datetime import date, datetime
 from pathlib import Path
 
 from monitor.exceptions import DataError, EffectError, InputError, NotFoundError, StoreError
+from monitor.reporting.messages import may_still_be_copied
 from monitor.store import (
     Database,
     list_campaigns,
@@ -97,7 +98,7 @@ def _why_to_wait(arrival: Arrival, rest_s: float) -> str | None:
     still = time.time() - arrival.changed_at
     # A clock that was put back, or that of a server in the future, must not keep an arrival waiting for ever.
     if 0.0 <= still < rest_s or -rest_s < still < 0.0:
-        return f"it changed {max(still, 0.0):.0f} s ago and may still be copied"
+        return may_still_be_copied(max(still, 0.0))
     return None
 
 

@@ -39,6 +39,8 @@ BLOCK = 15
 # Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
 # the trial of power are at most 32 times as large.
 LARGEST_RATIO = 100.0
+# More than this part of what is seen of an effect is what was stated beforehand.
+OF_STATEMENTS = 0.5
 # So many effects within the shape of another are named at most.
 MOST_NAMED = 5
 
@@ -101,6 +103,21 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
         return self.predicts(others, candidate)
+
+    def predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether an effect lowers the errors on what was left out; true where what was stated beforehand (the length
+        of a bar, a beam) is what it takes the contradiction from: no reading is predicted better by that."""
+        return self._is_of_statements(candidate) or super().predicts(others, candidate)
+
+    def _is_of_statements(self, candidate: ChainCandidate) -> bool:
+        """Whether most of what the data see of an effect are calibrated quantities, not readings."""
+        stated = len(self.scene.fit.problem.extra_names)
+        if not stated:
+            return False
+        runs = len(self.scene.fit.problem.runs)
+        columns = candidate.columns.reshape(runs, -1, candidate.columns.shape[1])
+        whole = float(np.sum(columns**2))
+        return float(np.sum(columns[:, -stated:] ** 2)) > OF_STATEMENTS * whole
 
     def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
         """For each selected effect the families that stand out beside all selected ones, but not beside its error in

@@ -61,11 +61,17 @@ def caution(correlation: Correlation | None) -> tuple[float, float]:
 @dataclass(frozen=True)
 class Rows:
     """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
-    into the directions of the readings (None where they are the readings); what stands behind is no reading."""
+    into the directions of the readings (None where they are the readings); what stands behind is no reading.
+
+    ``begins`` (R, T) marks touches that another instrument made than the one before: they have no neighbour before
+    them. ``read`` (R, T) is how many of the d numbers there are. None: one instrument, all numbers.
+    """
 
     weighted: npt.NDArray[np.bool_]
     numbers: int
     turned: Array | None
+    begins: npt.NDArray[np.bool_] | None = None
+    read: Array | None = None
 
     @property
     def count(self) -> int:
@@ -79,56 +85,62 @@ class Filters:
 
     correlations: tuple[Correlation, ...]
     weighted: npt.NDArray[np.bool_]
+    begins: npt.NDArray[np.bool_] | None = None
 
     @cached_property
     def _rho(self) -> Array:
-        return np.array([correlation.rho for correlation in self.correlations])
+        """What every touch has of the one before (C, R, T): nothing where another instrument begins."""
+        rho = np.array([correlation.rho for correlation in self.correlations])[:, None, None]
+        goes_on = np.ones(self.weighted.shape) if self.begins is None else ~self.begins
+        return np.asarray(rho * goes_on)
 
     @cached_property
     def _recursion(self) -> tuple[Array, Array, Array]:
         """Gains and reciprocal standard deviations of the innovations, (C, R, T) each and zero where nothing was read,
-        and the logarithm (C, R) of the product of their variances."""
-        rho = self._rho[:, None]
+        and the logarithms (C, R, T) of their variances."""
         share = np.array([correlation.share for correlation in self.correlations])[:, None]
-        gain = np.zeros((len(rho), *self.weighted.shape))
+        gain = np.zeros((len(share), *self.weighted.shape))
         variance = np.ones_like(gain)
         predicted = np.broadcast_to(share, gain.shape[:2])
         for touch, present in enumerate(self.weighted.T):
             if touch:
+                rho = self._rho[..., touch]
                 predicted = rho**2 * predicted + share * (1.0 - rho**2)
             total = predicted + (1.0 - share)
             gain[..., touch] = np.where(present, predicted / total, 0.0)
             variance[..., touch] = np.where(present, total, 1.0)
             predicted = predicted * (1.0 - gain[..., touch])
-        return gain, self.weighted / np.sqrt(variance), np.log(variance).sum(axis=2)
+        return gain, self.weighted / np.sqrt(variance), np.log(variance)
 
-    @property
-    def logarithm(self) -> Array:
-        """The logarithms (C, R) of the determinants of the noise covariances of one number a touch."""
-        return self._recursion[2]
+    def logarithm(self, numbers: int, read: Array | None = None) -> Array:
+        """The logarithms (C, R) of the determinants of the noise covariances of so many ``numbers`` a touch, or of
+        ``read`` (R, T)."""
+        variances = self._recursion[2]
+        return np.asarray(np.sum(variances * (numbers if read is None else read), axis=2))
 
     def apply(self, readings: Array) -> Array:
         """Innovations (C, R, T, k) of readings (R, T, k), divided by their standard deviations."""
         gain, reciprocal, _ = self._recursion
-        rho = self._rho[:, None, None]
-        white = np.empty((len(rho), *readings.shape))
-        predicted = np.zeros((len(rho), len(readings), readings.shape[2]))
+        white = np.empty((len(gain), *readings.shape))
+        state = np.zeros((len(gain), len(readings), readings.shape[2]))
         for touch in range(readings.shape[1]):
+            predicted = self._rho[..., touch, None] * state
             innovation = readings[None, :, touch] - predicted
             white[:, :, touch] = innovation * reciprocal[..., touch, None]
-            predicted = rho * (predicted + innovation * gain[..., touch, None])
+            state = predicted + innovation * gain[..., touch, None]
         return white
 
     def apply_transposed(self, white: Array) -> Array:
         """The transposed filters, (C, R, T, k), of white numbers (C, R, T, k)."""
         gain, reciprocal, _ = self._recursion
-        rho = self._rho[:, None, None]
         result = np.empty(white.shape)
-        ahead = np.zeros((*white.shape[:2], white.shape[3]))
+        # What later innovations take of the state that a touch leaves.
+        before = np.zeros((*white.shape[:2], white.shape[3]))
         for touch in reversed(range(white.shape[2])):
-            scaled, before = white[:, :, touch] * reciprocal[..., touch, None], rho * ahead
+            scaled = white[:, :, touch] * reciprocal[..., touch, None]
             result[:, :, touch] = scaled + gain[..., touch, None] * before
             ahead = before - gain[..., touch, None] * before - scaled
+            before = self._rho[..., touch, None] * ahead
         return result
 
 
@@ -143,10 +155,10 @@ class Whitening:
     def factors(self) -> tuple[Array, Array]:
         """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
         determinant of the noise covariance for unit variance."""
-        filters = Filters((self.correlation,), self.rows.weighted)
+        filters = Filters((self.correlation,), self.rows.weighted, self.rows.begins)
         runs, touches = self.rows.weighted.shape
         unit = np.broadcast_to(np.eye(touches), (runs, touches, touches))
-        return filters.apply(unit)[0], self.rows.numbers * filters.logarithm[0]
+        return filters.apply(unit)[0], filters.logarithm(self.rows.numbers, self.rows.read)[0]
 
     def __call__(self, numbers: Array) -> Array:
         """Independent numbers (..., R, N) of equal variance from correlated ones."""
@@ -176,10 +188,19 @@ class Whitening:
 
 def rows_of(problem: ChainProblem) -> Rows:
     """The layout of the whitened numbers of a problem."""
-    weighted = np.isfinite(problem.sigma)
-    numbers = problem.sigma.shape[1]
-    padded = problem.padded(weighted.astype(float)).reshape(len(problem.runs), -1, numbers)
-    return Rows(np.all(padded > 0.5, axis=-1), numbers, None)
+    is_number, numbers = problem.is_number, problem.sigma.shape[1]
+    # Rows of several instruments differ in how many numbers they have: what a kind does not have is not lacking.
+    weighted = np.isfinite(problem.sigma) | ~is_number
+    runs = len(problem.runs)
+    padded = problem.padded(weighted.astype(float)).reshape(runs, -1, numbers)
+    is_weighted = np.all(padded > 0.5, axis=-1)
+    series = problem.series
+    if is_number.all() and not np.ptp(series):
+        return Rows(is_weighted, numbers, None)
+    read = problem.padded(is_number.astype(float)).reshape(runs, -1, numbers).sum(axis=2)
+    of_touch = problem.padded(series[:, None].astype(float) + 1.0).reshape(runs, -1)
+    begins = np.diff(of_touch, axis=1, prepend=0.0) != 0.0
+    return Rows(is_weighted, numbers, None, begins, read * is_weighted)
 
 
 def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
@@ -293,26 +314,45 @@ class NoiseDesign:
         if rows.turned is not None:
             readings = rows.turned[self._runs] @ readings
         readings = np.where(self._weighted[..., None, None], readings, 0.0)
-        return readings.reshape(runs, touches, -1), numbers[:, rows.count :]
+        rest = numbers[:, rows.count :]
+        # What setups state (the length of a bar) may contradict another instrument: that is no noise of readings, and
+        # would be taken for an offset of all readings of the setup, noise that hardly changes.
+        return readings.reshape(runs, touches, -1), rest if rows.begins is None else rest[:, :0]
 
     def _resemblance(self, readings: Array) -> float:
         """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
         white noise, in standard deviations; the larger of the two."""
         unknowns = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
-        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(unknowns**2)))
+        number = self._share * (self._numbers - float(np.sum(unknowns**2)))
         variance = max(float(np.sum(readings**2)) / max(number, 1.0), 1e-300)
         lags = np.arange(1, min(FAR, readings.shape[1] - 1) + 1)
         beyond = [
-            float(np.sum(readings[:, lag:] * readings[:, :-lag])) / variance
-            + self._share * float(np.sum(unknowns[:, lag:] * unknowns[:, :-lag]))
+            float(np.sum(readings[:, lag:] * readings[:, :-lag] * alike[:, :, None])) / variance
+            + self._share * float(np.sum(unknowns[:, lag:] * unknowns[:, :-lag] * alike[:, :, None, None]))
             for lag in lags
+            for alike in (self._of_one_series(int(lag)),)
         ]
         deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
         return float(max(deviates[0], deviates[-1])) if len(lags) else 0.0
 
+    @cached_property
+    def _numbers(self) -> float:
+        """How many numbers were read."""
+        rows = self.rows
+        read = rows.numbers * self._weighted if rows.read is None else rows.read[self._runs]
+        return float(np.sum(read))
+
+    def _of_one_series(self, lag: int) -> Array:
+        """Ones (R, T - lag) where a touch and the one so far before it are of one instrument, zeros elsewhere."""
+        begins = self.rows.begins
+        if begins is None:
+            return np.ones((len(self._weighted), self._weighted.shape[1] - lag))
+        series = np.cumsum(begins[self._runs], axis=1)
+        return np.asarray(series[:, lag:] == series[:, :-lag], dtype=np.float64)
+
     def _criteria(self, readings: Array, rest: Array) -> Array:
         """Minus twice the logarithm of the restricted likelihood (C,) of the grid, but for a constant."""
-        whites, numbers = self._whites, self.rows.numbers
+        whites = self._whites
         residual = whites.filters.apply(readings)
         unknowns, unknown_rest = self._own
         spans = unknowns.reshape(*readings.shape, -1)
@@ -322,7 +362,7 @@ class NoiseDesign:
         able = whites.able
         fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
         squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
-        number = self._share * (int(self._weighted.sum()) * numbers - able.sum(axis=(1, 2)))
+        number = self._share * (self._numbers - able.sum(axis=(1, 2)))
         return np.asarray(self._share * whites.logarithm + number * np.log(np.maximum(squares, 1e-300)))
 
     @cached_property
@@ -331,14 +371,19 @@ class NoiseDesign:
         products = [self._products(GRID[first : first + at_once]) for first in range(0, len(GRID), at_once)]
         values, vectors = np.linalg.eigh(np.concatenate(products))
         able = values > SMALLEST_EIGENVALUE
-        filters = Filters(GRID, self._weighted)
-        logarithm = self.rows.numbers * filters.logarithm.sum(axis=1)
+        filters = self._filters(GRID)
+        read = None if self.rows.read is None else self.rows.read[self._runs]
+        logarithm = filters.logarithm(self.rows.numbers, read).sum(axis=1)
         logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
         return _Whites(filters, values, vectors, logarithm)
+
+    def _filters(self, correlations: Sequence[Correlation]) -> Filters:
+        begins = None if self.rows.begins is None else self.rows.begins[self._runs]
+        return Filters(tuple(correlations), self._weighted, begins)
 
     def _products(self, correlations: Sequence[Correlation]) -> Array:
         """The products (C, R, p, p) of the filtered span of what is unknown with itself."""
         unknowns, rest = self._own
-        white = Filters(tuple(correlations), self._weighted).apply(unknowns)
+        white = self._filters(correlations).apply(unknowns)
         span = white.reshape(*white.shape[:2], -1, rest.shape[-1])
         return np.asarray(np.swapaxes(span, 2, 3) @ span + np.swapaxes(rest, 1, 2) @ rest)

@@ -29,6 +29,7 @@ class Displacement(Plain):
     name: ClassVar[str] = "displacement"
     columns: ClassVar[tuple[str, ...]] = ("reading_um",)
     holdable: ClassVar[tuple[str, ...]] = ("direction",)
+    relative: ClassVar[bool] = True
 
     @property
     def numbers(self) -> tuple[str, ...]:

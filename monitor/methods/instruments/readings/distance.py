@@ -27,9 +27,11 @@ STATED_WITHIN = 2.0
 @dataclass(frozen=True)
 class DistanceReading(AtWorkPoint):
     """The length of r. What the bar's length is off is unknown, to its uncertainty where that is stated; ``centre``
-    (3,) mm is where the search for the work point begins."""
+    (3,) mm is where the search for the work point begins, ``shown_directions`` is how many directions of the centre
+    the bar shows to first order."""
 
     centre: tuple[float, ...] = ()
+    shown_directions: int = 3
 
     name: ClassVar[str] = "distance"
     columns: ClassVar[tuple[str, ...]] = ("reading_um",)
@@ -54,11 +56,19 @@ class DistanceReading(AtWorkPoint):
         _, size, axes = np.linalg.svd(
             r / np.maximum(np.linalg.norm(r, axis=1), 1e-12)[:, None], full_matrices=False
         )
+        shown = 0
         for strength, axis in zip(size, axes, strict=True):
             if strength < FLAT * np.sqrt(count):
                 projector -= np.outer(axis, axis)
+            else:
+                shown += 1
         guess = np.tile(projector.reshape(9), (count, 1))
-        return cls(setup, tuple(centre.tolist())), replace(rows, guess=guess)
+        return cls(setup, tuple(centre.tolist()), shown), replace(rows, guess=guess)
+
+    @property
+    def keeps_one_direction(self) -> bool:
+        """Whether nothing of a centre that is not known shows but along the one direction of the bar."""
+        return self.shown_directions == 1 and not self.holds("work_point")
 
     @property
     def numbers(self) -> tuple[str, ...]:

@@ -1,0 +1,75 @@
+"""What ISO 230-2, 230-4 and 230-6 call their figures, and what is noted of a test that lacks what they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from monitor.documents import Sentence
+
+#: Kind of a figure of an axis: symbol and name of ISO 230-2:2014, clause 3. The arrows are + and - here.
+AXIS_FIGURES: Mapping[str, tuple[str, str]] = {
+    "reversal": ("B", "reversal error of the axis"),
+    "mean_reversal": ("B mean", "mean reversal error of the axis"),
+    "repeatability_forward": ("R+", "unidirectional positioning repeatability, forward"),
+    "repeatability_backward": ("R-", "unidirectional positioning repeatability, backward"),
+    "repeatability": ("R", "bi-directional positioning repeatability"),
+    "systematic_forward": ("E+", "unidirectional systematic positioning error, forward"),
+    "systematic_backward": ("E-", "unidirectional systematic positioning error, backward"),
+    "systematic": ("E", "bi-directional systematic positioning error"),
+    "mean_deviation": ("M", "mean bi-directional positioning error"),
+    "accuracy_forward": ("A+", "unidirectional positioning accuracy, forward"),
+    "accuracy_backward": ("A-", "unidirectional positioning accuracy, backward"),
+    "accuracy": ("A", "bi-directional positioning accuracy"),
+}
+#: Kind of a figure of a circle: symbol and name of ISO 230-4:2005, clause 3, with the plane and the sense of rotation.
+_CIRCLE_FIGURES: Mapping[str, tuple[str, str]] = {
+    "circular": ("G_{plane}", "circular deviation, {sense}"),
+    "minimum_zone": ("G_{plane} zone", "circular deviation between minimum-zone circles, {sense}"),
+    "largest": ("F_{plane} max", "largest radial deviation, {sense}"),
+    "smallest": ("F_{plane} min", "smallest radial deviation, {sense}"),
+    "both": ("G(b)", "bi-directional circular deviation"),
+    "hysteresis": ("H", "circular hysteresis"),
+}
+
+
+def circle_figure(kind: str, plane: str, way: int = 1) -> tuple[str, str]:
+    """Return symbol and name of a figure of a circle in a plane such as XY; ``way`` is 1 from X to Y, -1 back."""
+    symbol, name = _CIRCLE_FIGURES[kind]
+    sense = "counter-clockwise" if way > 0 else "clockwise"
+    return symbol.format(plane=plane[::way]), name.format(sense=sense)
+
+
+@dataclass(frozen=True)
+class OneSideApproached(Sentence):
+    """Some targets were approached from one side only."""
+
+    def __str__(self) -> str:
+        return "some targets were approached from one side only: no reversal, no bi-directional figure"
+
+
+@dataclass(frozen=True)
+class FewRunsEachWay(Sentence):
+    """The ``fewest`` runs in a direction are fewer than the ``usual`` number of ISO 230-2, 5.3.2."""
+
+    fewest: int
+    usual: int
+
+    def __str__(self) -> str:
+        return f"ISO 230-2, 5.3.2 asks for {self.usual} runs in each direction; the fewest here are {self.fewest}"
+
+
+@dataclass(frozen=True)
+class OneSenseOfRotation(Sentence):
+    """A circle was run in one sense of rotation."""
+
+    def __str__(self) -> str:
+        return "one sense of rotation: no hysteresis, no bi-directional deviation"
+
+
+@dataclass(frozen=True)
+class LengthWithoutUncertainty(Sentence):
+    """The length of the bar has no stated uncertainty."""
+
+    def __str__(self) -> str:
+        return "the bar's length has no stated uncertainty: radial deviations F have none either"
