@@ -93,7 +93,7 @@ def test_weekly_reports_with_explanations_are_the_same_to_the_bit_on_a_cluster_t
     progress, killed = killer(scheduler)
     monkeypatch.setattr("monitor.workflow.health.report.last_anchor", lambda db: None)
     request = ReportRequest("2026-W08", workers=1, made_at=MADE)
-    with fleet(tmp_path / "here.duckdb", 3) as here, fleet(tmp_path / "there.duckdb", 3) as there:
+    with fleet(tmp_path / "here.duckdb", 2) as here, fleet(tmp_path / "there.duckdb", 2) as there:
         alone = report(here, replace(request, out=tmp_path / "here"))
         spread = report(
             there,
