@@ -30,17 +30,13 @@ VAGUE = {
     "found", "one", "place", "own", "told", "known", "kept", "seen", "chosen", "made", "given", "left", "here", "there",
     "now", "words", "wished", "begun", "done", "thing", "stuff", "item", "data", "obj",
 }  # fmt: skip
-#: Names that stand in files, stored documents and certificates, where they are read for ever, or that mean a side.
+#: Names that stand in files, stored documents and certificates, where they are read for ever.
 KEYS = {
-    ("readers/setups_file.py", "known"),
     ("records.py", "known"),
     ("reporting/certificate/completeness.py", "item"),
     ("reporting/certificate/laboratory.py", "place"),
     ("reporting/certificate/record.py", "place"),
     ("reporting/certificate/record.py", "item"),
-    ("reporting/svg/map_slices.py", "left"),
-    ("reporting/svg/plot.py", "left"),
-    ("workflow/trend/answer.py", "made"),
 }
 
 _BRANCHES = (

@@ -173,6 +173,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
+    if effect.refers_to is not None:
+        output.say(f"   relative to: {effect.refers_to}")
     if effect.shape_unknown:
         output.say(
             f"   shape unknown; nearest in the catalogue: {effect.nearest_shape}; --json has the curve"

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.reporting.lacks import Undecided
-from monitor.reporting.weekly_notice import weekly_sentence
-from monitor.workflow.history.weekly_looks import WeeklyNotices
+from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -276,8 +275,8 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
     )
     if ahead.backtest is not None:
         yield (
-            f"  {ahead.backtest.inside} of {ahead.backtest.made} past days, each foretold by the days before it, lay "
-            f"in the interval ({_three(ahead.backtest.rms_um)} µm off, root mean square)"
+            f"  {ahead.backtest.inside} of {ahead.backtest.forecasts} past days, each foretold by the days before it, "
+            f"lay in the interval ({_three(ahead.backtest.rms_um)} µm off, root mean square)"
         )
 
 
@@ -372,12 +371,15 @@ def _backtest(answer: TrendAnswer) -> Iterator[str]:
     }
     if not tests:
         return
-    forecasts, inside = sum(test.made for test in tests.values()), sum(test.inside for test in tests.values())
+    forecasts, inside = (
+        sum(test.forecasts for test in tests.values()),
+        sum(test.inside for test in tests.values()),
+    )
     name = min(tests, key=lambda parameter: tests[parameter].share_inside)
     yield (
         f"backtest, each day forecast from the days before it: {inside} of {forecasts} later values "
         f"({100 * inside / forecasts:.0f} %) inside the 95 % forecast interval; least for {name}, "
-        f"{tests[name].inside} of {tests[name].made}"
+        f"{tests[name].inside} of {tests[name].forecasts}"
     )
 
 

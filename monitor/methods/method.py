@@ -218,6 +218,23 @@ class CircleTest:
 
 
 @dataclass(frozen=True)
+class RotationTest:
+    """An error motion of an axis of rotation in one run: ``error`` is its symbol (``EXC``), ``angle`` (n,) rad and
+    ``deviation`` (n,) mm, or rad where ``angular``, in the order of measuring. ``setup`` is that of the readings, two
+    of them for a tilt; ``about_circle`` says that what moves once a revolution is the artefact's place."""
+
+    setup: str
+    run: int
+    axis: str
+    error: str
+    angle: Array
+    deviation: Array
+    about_circle: bool
+    u_reading: float
+    angular: bool
+
+
+@dataclass(frozen=True)
 class InstrumentShare:
     """What one instrument says of the k base parameters of a run, in internal units.
 
@@ -255,7 +272,7 @@ class Instruments(Able):
 class StandardTests(Able):
     """Rows are tests that standards evaluate; ``tests`` are those of a problem."""
 
-    tests: Callable[[ChainProblem], tuple[AxisTest | CircleTest, ...]]
+    tests: Callable[[ChainProblem], tuple[AxisTest | CircleTest | RotationTest, ...]]
 
 
 @dataclass(frozen=True)
@@ -338,7 +355,7 @@ def nothing_taken_up(problem: ChainProblem) -> tuple[TakenUp, ...]:
 
 NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STANDARDS = Unable(
-    "its rows are no test of ISO 230-2, -4 or -6; set up a laser or a ball bar (method instruments) for that"
+    "its rows are no test of ISO 230-2, -4, -6 or -7; set up a laser or a ball bar (method instruments) for that"
 )
 ONE_INSTRUMENT = Unable("one instrument measured all of it; uncertainty has the budget of its sources")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")

@@ -38,7 +38,7 @@ class ReadingFormat:
     optional: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     allows: tuple[str, ...] = ()
-    known: tuple[str, ...] = ()
+    holdable: tuple[str, ...] = ()
     turns: bool = False
 
 
@@ -46,25 +46,25 @@ ONE_LENGTH, ONE_ANGLE = ("reading_um",), ("reading_urad",)
 POINTS = ("point_x_mm", "point_y_mm", "point_z_mm")
 QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
-    "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), known=("work_point",)),
-    "component": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("zero",)),
+    "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), holdable=("work_point",)),
+    "component": ReadingFormat(ONE_LENGTH, needs=("direction",), holdable=("zero",)),
     "distance": ReadingFormat(
-        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY,), known=("work_point", "length")
+        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY,), holdable=("work_point", "length")
     ),
     "displacement": ReadingFormat(
-        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY,), known=("direction",)
+        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY,), holdable=("direction",)
     ),
-    "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), known=("zero", "slope")),
-    "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), known=("zero",)),
-    "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), known=("zero",)),
+    "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), holdable=("zero", "slope")),
+    "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), holdable=("zero",)),
+    "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), holdable=("zero",)),
     "direction": ReadingFormat(
-        ("direction_x", "direction_y", "direction_z"), angular=True, needs=("tool_direction",), known=("frame",)
+        ("direction_x", "direction_y", "direction_z"), angular=True, needs=("tool_direction",), holdable=("frame",)
     ),
     "point": ReadingFormat(
-        POINTS, optional=("point_z_mm",), allows=("tool_direction",), known=("frame", "targets")
+        POINTS, optional=("point_z_mm",), allows=("tool_direction",), holdable=("frame", "targets")
     ),
     "pose": ReadingFormat(
-        (*POINTS, *QUATERNION), allows=("tool_direction",), known=("frame", "targets"), turns=True
+        (*POINTS, *QUATERNION), allows=("tool_direction",), holdable=("frame", "targets"), turns=True
     ),
 })  # fmt: skip
 
@@ -210,14 +210,14 @@ def _known(table: Table, form: ReadingFormat) -> tuple[str, ...]:
         return ()
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         table.fault(
-            "known", f'{quoted(value)} is no list of names; write for example known = ["{form.known[0]}"]'
+            "known", f'{quoted(value)} is no list of names; write for example known = ["{form.holdable[0]}"]'
         )
         return ()
     for name in value:
-        if name not in form.known:
+        if name not in form.holdable:
             table.fault(
                 "known",
-                f"{quoted(name)} is no unknown of this reading; what may be known is {one_of(form.known)}",
+                f"{quoted(name)} is no unknown of this reading; what may be known is {one_of(form.holdable)}",
             )
     return tuple(value)
 

@@ -1,4 +1,4 @@
-"""What ISO 230-2, 230-4 and 230-6 call their figures, and what is noted of a test that lacks what they ask for."""
+"""What ISO 230-2, 230-4, 230-6 and 230-7 call their figures, and what is noted of a test that lacks what they ask."""
 
 from __future__ import annotations
 
@@ -38,6 +38,19 @@ def circle_figure(kind: str, plane: str, way: int = 1) -> tuple[str, str]:
     symbol, name = _CIRCLE_FIGURES[kind]
     sense = "counter-clockwise" if way > 0 else "clockwise"
     return symbol.format(plane=plane[::way]), name.format(sense=sense)
+
+
+def rotation_figure(name: str, error: str, kind: str) -> tuple[str, str]:
+    """Return symbol and name of a value of an error motion: symbol of the ``error`` (EXC), its ``kind`` (radial)."""
+    return f"{error} {name}", f"{name} {kind} error motion value"
+
+
+@dataclass(frozen=True)
+class OneRevolution(Sentence):
+    """Some angle of an axis of rotation was read once."""
+
+    def __str__(self) -> str:
+        return "one revolution: no asynchronous error motion"
 
 
 @dataclass(frozen=True)

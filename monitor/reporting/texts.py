@@ -14,13 +14,15 @@ from datetime import date
 from decimal import Decimal
 from functools import cache
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from monitor.exceptions import InputError
 from monitor.reporting.numbers import written
 from monitor.reporting.resources import report_folder, report_text
 
 ENGLISH = "en"
+#: Symbols as sentences write them, with what stands below the line in print.
+_SYMBOL = re.compile(r"\b(k|R|u)_(q|p|C|P|day|Tag)\b")
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
 
 
@@ -51,6 +53,11 @@ class Texts:
     def number(self, number: Decimal) -> str:
         """A decimal number with a true minus sign and the language's decimal sign."""
         return written(number, self.decimal_sign)
+
+
+def with_subscripts(text: str) -> Markup:
+    """A sentence for a page, its symbols (``k_q``) set with subscripts; text that is no markup is escaped."""
+    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text))))
 
 
 @cache

@@ -16,25 +16,27 @@ from monitor.web.access import ROOT
 from monitor.web.asking import Asker
 from monitor.web.desk import Desk
 from monitor.web.faults import Refusal, refusal_of
+from monitor.web.forms import StaleFormError
 from monitor.web.gate import Gate
 from monitor.web.interface import interface
 from monitor.web.opening import host_user_name
-from monitor.web.pages import campaign as campaign_page
 from monitor.web.pages import (
+    campaign as campaign_page,
     certificates,
+    fleet as fleet_page,
     importing,
     issuing,
     keeping,
+    machine as machine_page,
     model,
     plan,
     reports,
     visiting,
     volumetric,
 )
-from monitor.web.pages import fleet as fleet_page
-from monitor.web.pages import machine as machine_page
+from monitor.web.presses import Presses
 from monitor.web.previews import Previews
-from monitor.web.rendering import refusal_page
+from monitor.web.rendering import again_page, refusal_page
 from monitor.web.sessions import Sessions
 from monitor.web.settings import ServerSettings
 from monitor.web.static import static_routes
@@ -71,6 +73,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     desk = Desk(asker)
     app.state.desk = desk
     app.state.previews = Previews()
+    app.state.presses = Presses()
     app.state.working_folder = working_folder
     app.include_router(static_routes())
     app.include_router(interface(asker, working_folder))
@@ -78,6 +81,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
         app.include_router(room.routes())
     app.add_exception_handler(HTTPException, _of_http)
     app.add_exception_handler(RequestValidationError, _of_address)
+    app.add_exception_handler(StaleFormError, _of_stale_form)
     app.add_exception_handler(MonitorError, _of_question)
     app.add_exception_handler(Exception, _of_question)
     # Around everything, what answers a fault of the software included.
@@ -89,7 +93,7 @@ async def _of_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     text = {
         404: f"there is no page {request.url.path}; the first page is /",
-        405: f"{request.url.path} is not asked with {request.method}",
+        405: f"{request.url.path} is not asked with {request.method}: a form is sent there; the first page is /",
     }.get(error.status_code, str(error.detail))
     return _refused(request, Refusal(error.status_code, text))
 
@@ -101,6 +105,12 @@ async def _of_address(request: Request, error: Exception) -> Response:
     return _refused(
         request, Refusal(400, f"the address {request.url.path} is not complete: {'; '.join(faults)}")
     )
+
+
+async def _of_stale_form(request: Request, error: Exception) -> Response:
+    """Show what a form held that is of another session, with the proof of this one, to be sent once more."""
+    assert isinstance(error, StaleFormError)
+    return again_page(request, error.typed, str(error), 403)
 
 
 async def _of_question(request: Request, error: Exception) -> Response:

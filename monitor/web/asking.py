@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from contextlib import closing
 from functools import cache
@@ -26,6 +27,10 @@ class ForbiddenError(MonitorError):
     """A question that the user's role may not ask."""
 
 
+class ReplacedError(MonitorError):
+    """The file that is served is not the one at its path any more."""
+
+
 class _AnsweredError(Exception):
     """Ends a transaction of which nothing is to be stored; ``answer`` is that of its question."""
 
@@ -42,6 +47,8 @@ class Asker:
     def __init__(self, db: Database, trusted_signers: Path | None = None) -> None:
         self._db = db
         self.freshness = Freshness()
+        self._path = os.path.abspath(db.path)
+        self._file = _identity(self._path)
         self._own_files = {question: {"trusted": trusted_signers} for question in _OF_SIGNERS}
 
     def __call__(
@@ -57,6 +64,12 @@ class Asker:
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
+        if _identity(self._path) != self._file:
+            # What is written from now on would go with the old file.
+            raise ReplacedError(
+                f"{Path(self._path).name} was replaced or removed while it is served: nothing is shown or stored "
+                "until the server is stopped and started again"
+            )
         if not storing:
             return self._tried(user, question, document or {}, files or {})
         if question not in REMEMBERED or files or tolerances is not None:
@@ -102,6 +115,15 @@ class Asker:
                     self.freshness.wrote(machines)
                 elif before is not None and last_identification(session) != before:
                     self.freshness.identified()
+
+
+def _identity(path: str) -> tuple[int, int] | None:
+    """What tells the file of a path from every other; None where there is none."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
 
 
 def _touched_machines(db: Database, question: str, request: Any, answer: Any) -> set[str] | None:

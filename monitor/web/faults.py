@@ -9,7 +9,7 @@ from typing import Any
 from starlette.exceptions import HTTPException
 
 from monitor.exceptions import CampaignError, InputError, MonitorError, NotFoundError
-from monitor.web.asking import ForbiddenError
+from monitor.web.asking import ForbiddenError, ReplacedError
 
 OUR_FAULT = "this is a fault of the software, please report it; nothing was stored by this request"
 
@@ -57,6 +57,8 @@ def _refusal_of(error: Exception) -> Refusal:
         return Refusal(413, str(error))
     if isinstance(error, ForbiddenError):
         return Refusal(403, str(error))
+    if isinstance(error, ReplacedError):
+        return Refusal(503, str(error))
     if isinstance(error, NotFoundError):
         return Refusal(404, str(error))
     if isinstance(error, CampaignError):

@@ -47,7 +47,8 @@ HEADERS = {
 #: A document that is no upload: more text than any question of the contract needs.
 DOCUMENT_BYTES = 2**20
 #: What is served before anybody has logged in.
-PUBLIC = ("/login", "/static/")
+LOGIN = "/login"
+PUBLIC = (LOGIN, "/static/")
 #: Where a body may be as large as an upload.
 UPLOADS = ("/import", "/certificates/verify", "/api/v1/")
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -77,10 +78,14 @@ class Gate:
             await _plain(send, *refusal)
             return
         user, session, cookie = self._visitor(scope, headers)
+        limit, too_large = _limit(scope["path"]), _too_large(scope["path"])
+        scope.setdefault("state", {}).update(user=user, session=session, sent_to="")
         if user is None and not _is_public(scope["path"]):
-            await self._send_away(scope, send)
-            return
-        scope.setdefault("state", {}).update(user=user, session=session)
+            if not _is_form(scope, headers):
+                await self._send_away(scope, send)
+                return
+            # What was typed before the session ended is not lost: the log-in holds it until it can be sent.
+            scope = {**scope, "path": LOGIN, "state": {**scope["state"], "sent_to": scope["path"]}}
         started = False
 
         async def send_with_headers(message: MutableMapping[str, Any]) -> None:
@@ -91,12 +96,10 @@ class Gate:
             await send(message)
 
         try:
-            await self._app(
-                scope, _counted(receive, _limit(scope["path"]), _too_large(scope["path"])), send_with_headers
-            )
+            await self._app(scope, _counted(receive, limit, too_large), send_with_headers)
         except TooLargeError:
             if not started:
-                await _plain(send, 413, _too_large(scope["path"]))
+                await _plain(send, 413, too_large)
         except Exception:
             # It was logged and answered where it happened; what follows would only be said twice.
             if not started:
@@ -162,8 +165,9 @@ class Gate:
             )
             await _plain(send, 401, message, ("WWW-Authenticate", "Bearer"))
             return
-        target = quote(scope["path"]) if scope["method"] in _SAFE else "/"
-        await _plain(send, 303, "log in first", ("Location", f"/login?then={target}"))
+        query = scope.get("query_string", b"").decode("latin-1")
+        target = quote(scope["path"] + (f"?{query}" if query else "")) if scope["method"] in _SAFE else "/"
+        await _plain(send, 303, "log in first", ("Location", f"{LOGIN}?then={target}"))
 
 
 def session_cookie(key: str, *, encrypted: bool) -> str:
@@ -181,6 +185,16 @@ def _cookie(header: str) -> str | None:
 
 def _is_public(path: str) -> bool:
     return any(path == public or (public.endswith("/") and path.startswith(public)) for public in PUBLIC)
+
+
+def _is_form(scope: Scope, headers: Mapping[str, str]) -> bool:
+    """Whether a page of ours sent what people filled in."""
+    kind = headers.get("content-type", "").partition(";")[0].strip().lower()
+    return (
+        scope["method"] == "POST"
+        and not scope["path"].startswith("/api/")
+        and kind in ("application/x-www-form-urlencoded", "multipart/form-data")
+    )
 
 
 def _limit(path: str) -> int:

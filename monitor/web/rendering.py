@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import secrets
 from functools import cache
 from typing import Any
-from urllib.parse import urlencode
+from urllib.parse import urlencode, urlsplit
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
@@ -17,6 +18,7 @@ from monitor.reporting.plain_names import plain_name
 from monitor.reporting.resources import report_text
 from monitor.web import words
 from monitor.web.faults import Refusal
+from monitor.web.forms import Typed, own_address
 from monitor.web.sessions import Sessions
 
 
@@ -29,6 +31,7 @@ def page(request: Request, template: str, *, status: int = 200, **context: Any) 
         path=request.url.path,
         here=f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path,
         proof=sessions.proof(session) if session else "",
+        once=secrets.token_urlsafe(12),
         logs_in=sessions.users is not None,
         reads_only=request.app.state.settings.reading_only,
         **context,
@@ -39,6 +42,14 @@ def page(request: Request, template: str, *, status: int = 200, **context: Any) 
 def refusal_page(request: Request, refusal: Refusal) -> HTMLResponse:
     """Return the page that says what was wrong."""
     return page(request, "refusal.html", status=refusal.status, refusal=refusal)
+
+
+def again_page(request: Request, typed: Typed, why: str, status: int = 200) -> HTMLResponse:
+    """Return the page that shows what a form held that was not taken, and sends it where that is wanted."""
+    source = urlsplit(request.headers.get("referer", ""))
+    path = source.path if source.path not in ("", "/login") else "/"
+    back = f"{path}?{source.query}" if source.query else path
+    return page(request, "again.html", status=status, typed=typed, why=why, back=own_address(back))
 
 
 def prepare() -> None:

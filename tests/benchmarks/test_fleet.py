@@ -1,5 +1,6 @@
 """The fleet table against one bare GROUP BY over the same rows, in time and memory; the data are made by SQL.
 
+``python tests/benchmarks/test_fleet.py MACHINES climate`` compares fleets without and with a recorded temperature.
 ``python tests/benchmarks/test_fleet.py MACHINES`` makes a file of so many machines (15 parameters, weekly campaigns of
 4 runs over 5 years; 10 000 machines are 156 million values and 1.7 GB) and prints the times; a second argument
 names the file, which is then kept, and used as it is where it exists. As a test a small copy is checked for its
@@ -54,7 +55,14 @@ KEPT = f"CREATE OR REPLACE TEMP TABLE bare AS {BARE}"
 ADDED = f"SELECT sum(n), sum(m), sum(v) FROM ({BARE})"
 
 
-def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
+#: The temperature of a run, as a map of its conditions: a yearly wave of 4 K, and half a degree from run to run.
+CLIMATE = (
+    "MAP {'ambient_degC': 20.0 + 4.0 * sin(6.2831853 * (i // 4 // $m) / 52.18) + 0.5 * (hash(i + 4242) % 1000003 / "
+    "1000003.0 - 0.5)}"
+)
+
+
+def generate(db: Database, machines: int, weeks: int = WEEKS, conditions: str = "MAP {}") -> None:
     """Machines with noise by campaign and by run, in the order in which they would be imported."""
     n = {"m": machines, "n": machines * weeks}
     name = "'M' || lpad(CAST(i % $m AS VARCHAR), 5, '0')"
@@ -70,8 +78,8 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
     )
     db.execute(
         "INSERT INTO run SELECT 1 + i // 4, 1 + i % 4, 1 + i % 4, TIMESTAMP '2021-01-04 08:00:00' "
-        "+ to_days(CAST((i // 4) // $m * 7 AS INTEGER)) + to_hours(i % 4), 0, 1, false, MAP {} "
-        "FROM range($n * 4) AS r(i)",
+        "+ to_days(CAST((i // 4) // $m * 7 AS INTEGER)) + to_hours(i % 4), 0, 1, false, "
+        f"{conditions} FROM range($n * 4) AS r(i)",
         n,
     )
     db.execute(
@@ -140,6 +148,30 @@ def _kept(db: Database) -> None:
     db.execute("DROP TABLE bare")
 
 
+def climate(machines: int) -> None:
+    """Print the time of the fleet table of machines without and with a recorded temperature, in turns."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = {"without": "MAP {}", "with": CLIMATE}
+        for name, conditions in files.items():
+            with Database(Path(folder) / f"{name}.duckdb") as db:
+                generate(db, machines, conditions=conditions)
+        least = {name: [np.inf, np.inf] for name in files}
+        for _ in range(4):
+            for name in files:
+                with Database(Path(folder) / f"{name}.duckdb") as db:
+                    db.execute("SET memory_limit = '3GB'")
+                    _fleet_table(db)
+                    least[name] = [
+                        min(pair) for pair in zip(least[name], _cost(_fleet_table, db), strict=True)
+                    ]
+        for name, (wall, own) in least.items():
+            print(
+                f"{machines} machines, {name} a temperature: {wall:.2f} s, processor {own:.2f} s", flush=True
+            )
+        wall, own = (least["with"][part] / least["without"][part] for part in (0, 1))
+        print(f"ratio {wall:.2f}, processor {own:.2f}")
+
+
 def main(machines: int, path: Path) -> None:
     """Print the times of the fleet table, the bare query and one machine's trends, and the memory.
 
@@ -178,7 +210,9 @@ def _print(costs: Mapping[str, Sequence[float]]) -> None:
 
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    if len(sys.argv) > 2:
+    if sys.argv[2:] == ["climate"]:
+        climate(number)
+    elif len(sys.argv) > 2:
         main(number, Path(sys.argv[2]))
     else:
         with tempfile.TemporaryDirectory() as folder:

@@ -13,6 +13,8 @@ import scipy
 from by_path import load
 
 from monitor.discovery import explain, fit
+from monitor.discovery.machine.compare import lack_of_fit
+from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
 from monitor.discovery.machine.noise.correlation import Correlation, Rows, Whitening
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
@@ -114,3 +116,22 @@ def test_a_finding_stands_at_the_end_too(virtual_campaigns, trial):
         campaign, _ = virtual_campaigns.virtual(seed, noise=trial.autoregressive(0.6), days=2)
         answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))
         assert all(finding.q_value <= 0.01 for finding in answer.missing)
+
+
+def test_lack_of_fit_is_held_against_runs_with_the_noise_of_neighbours_taken_out(
+    virtual_campaigns, trial, simulator
+):
+    """White noise: the plain F test. Neighbours of 0.9: what the plain test calls certain is no longer so; an effect
+    stays beyond doubt. One run has nothing to compare."""
+    white = fit(problem_of(virtual_campaigns.virtual(3, days=2, runs_per_day=2)[0]))
+    assert white.correlation() is None
+    assert beyond_neighbours(white) == pytest.approx(lack_of_fit(white)[0].p_value, rel=1e-6)
+    assert beyond_neighbours(fit(problem_of(virtual_campaigns.virtual(3, days=1, runs_per_day=1)[0]))) is None
+    correlated = {"noise": trial.autoregressive(0.9), "days": 1, "runs_per_day": 2}
+    # Of sixty right models with this noise the one with the third smallest plain p-value.
+    right = fit(problem_of(virtual_campaigns.virtual(25, **correlated)[0]))
+    assert lack_of_fit(right)[0].p_value < 1e-5
+    assert beyond_neighbours(right) > 0.05
+    hidden = [simulator.Effect("EXX:reversal", peak_um=5.0)]
+    wrong = fit(problem_of(virtual_campaigns.virtual(25, hidden, **correlated)[0]))
+    assert beyond_neighbours(wrong) < 1e-6

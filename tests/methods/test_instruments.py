@@ -607,7 +607,7 @@ def test_the_reader_and_the_method_know_the_same_kinds_of_readings() -> None:
     assert set(readings()) == set(FORMATS)
     for name, kind in readings().items():
         assert (kind.columns, kind.angular, set(kind.holdable)) == (
-            FORMATS[name].columns, FORMATS[name].angular, set(FORMATS[name].known)
+            FORMATS[name].columns, FORMATS[name].angular, set(FORMATS[name].holdable)
         )  # fmt: skip
 
 

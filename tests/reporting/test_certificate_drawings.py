@@ -154,7 +154,8 @@ def test_the_middle_slices_are_taken_whatever_the_order_of_the_points() -> None:
     again = slices_of(GRID[shuffled], VECTORS[shuffled], UNCERTAINTY, ("X", "Y", "Z"))
     drawn = [map_drawing(one, title="T", scale_words="length").svg() for one in (slices, again)]
     assert drawn[0] == drawn[1]
-    assert drawn[0].count("±1.5") == 9 + 6 + 6
+    # Of 9 + 6 + 6 numbers six would stand on others in the narrow slices.
+    assert drawn[0].count("±1.5") == 15
 
 
 def test_a_map_without_errors_can_be_drawn() -> None:

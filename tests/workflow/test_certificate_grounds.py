@@ -20,7 +20,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
-from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
+from monitor.reporting.certificate.grounds import Ground, GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, StoredModel, import_campaign, load_certificate
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
@@ -30,6 +30,7 @@ from monitor.workflow.certificate.request import CertificateRequest, RemakeReque
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES, _units
+from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stored import stored_uncertainty
 
@@ -129,11 +130,61 @@ def test_lack_of_fit_by_a_hidden_reversal_is_a_ground_or_within_what_is_certifie
         return json.loads(capsys.readouterr().out)["guf"]
 
     right, certified, bare = stated("--model", "right"), stated(), stated("--no-model-uncertainty")
+    # What lacks decides parameters: a ground, whose size is what the line adds to u over the rest of the budget.
+    evaluate = ["uncertainty", "hidden-reversal-x", "--run", "20", "--method", "guf"]
+    assert main([*asked, *evaluate, "--json"]) == 0
+    (ground,) = json.loads(capsys.readouterr().out)["grounds"]
+    times = {
+        name: float(np.sqrt((certified["u"][name] / bare["u"][name]) ** 2 - 1.0)) for name in certified["u"]
+    }
+    assert ground["kind"] == "lack-of-fit"
+    assert ground["subject"] == max(times, key=times.__getitem__)
+    assert ground["size"] == pytest.approx(times[ground["subject"]], rel=1e-6)
+    assert ground["size"] > 10.0
+    issue_it = ["certificate", "issue", "hidden-reversal-x", "--run", "20"]
+    issue_it += ["--laboratory", str(EXAMPLES / "laboratory.toml"), "--out", str(tmp_path)]
+    assert main([*asked, *issue_it]) == 2
+    refusal = capsys.readouterr().err
+    assert (
+        "lack-of-fit: run 20: the readings refute the model, and what it lacks may move EC0Y by 12" in refusal
+    )
+    assert "--accept lack-of-fit=REASON" in refusal
+    # The model that has the effect is certified.
+    assert main([*asked, *evaluate, "--model", "right", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["grounds"] == []
     away = {name: abs(certified["estimate"][name] - right["estimate"][name]) for name in right["estimate"]}
     away = {name: distance for name, distance in away.items() if name in certified["estimate"]}
     assert len(away) == 13
     assert max(away[name] / certified["expanded"][name] for name in away) < 1.0
     assert max(away[name] / bare["expanded"][name] for name in away) > 3.0
+
+
+@pytest.mark.parametrize(
+    ("example", "refused"), [("hidden-b-indexing", True), ("hidden-spindle-growth", False)]
+)
+def test_a_refuted_model_is_refused_where_what_it_lacks_is_most_of_a_budget(
+    example: str, refused: bool
+) -> None:
+    """F is 22 and 2.3, both beyond any doubt; the growing spindle pulls no parameter by more than a tenth of its u."""
+    campaign = read_campaign(EXAMPLES / example)
+    with Database(":memory:") as db:
+        import_campaign(db, campaign)
+        answer = uncertainty(db, UncertaintyRequest(example, 20, method="guf"))
+    assert answer.residuals.something_is_missing
+    shares = answer.guf.budget["lack of fit of the model"]
+    assert (max(shares.values()) > 0.5) is refused
+    assert [ground.kind for ground in answer.grounds] == [GroundKind.LACK_OF_FIT] * refused
+    # A campaign whose readings do not refute the model beyond noise of neighbours has the line, and no ground.
+    noisy = replace(answer, residuals=replace(answer.residuals, lack_of_fit_p=0.002))
+    assert lack_in_budget(noisy) == ()
+
+
+def test_lack_of_fit_in_a_budget_in_both_languages() -> None:
+    ground = Ground(GroundKind.LACK_OF_FIT, 20, "EC0Y", 12.19, 1.0)
+    assert "may move EC0Y by 12.19 times what everything else in its budget does" in ground_sentence(
+        ground, texts_of()
+    )
+    assert "kann EC0Y um das 12,19-Fache" in ground_sentence(ground, texts_of("de"))
 
 
 def test_a_gross_reading_of_any_run(five_days: Campaign) -> None:

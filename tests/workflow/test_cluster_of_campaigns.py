@@ -130,5 +130,6 @@ def test_processes_and_a_cluster_at_once_or_for_one_campaign_are_refused(
             request(workers=2, cluster="tcp://127.0.0.1:1")
         with pytest.raises(InputError, match="--workers 0: at least one worker is needed"):
             request(workers=0)
+    Database(tmp_path / "x.duckdb").close()
     assert main(["--db", str(tmp_path / "x.duckdb"), "identify", "any", "--workers", "2"]) == 2
     assert "leave the campaign out to identify all" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import pytest
 from monitor.exceptions import DataError, InputError
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.store import Database, import_campaign
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
@@ -65,10 +66,16 @@ def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path
 def test_a_certificate_says_how_the_model_fits(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as db:
         import_campaign(db, first_runs("hidden-reversal-x", 1))
-        found = issue(db, CertificateRequest("hidden-reversal-x", 1, laboratory=LABORATORY, out=tmp_path))
+        why = {GroundKind.LACK_OF_FIT: "play of X known to the customer"}
+        request = CertificateRequest("hidden-reversal-x", 1, laboratory=LABORATORY, out=tmp_path, accept=why)
+        found = issue(db, request)
     text = "".join((page.extract_text() or "") for page in _pages(Path(found.file)))
     assert "the model leaves 1.57" in " ".join(text.split())
-    assert "part of u" in " ".join(text.split())
+    # The sentence goes on over the end of the page.
+    assert "refuted at 5 %, and what its lack of fit may do to the parameters is part of u" in " ".join(
+        text.split()
+    )
+    assert "Accepted by the laboratory: play of X known to the customer" in " ".join(text.split())
 
 
 def _pages(path: Path) -> list[object]:

@@ -10,16 +10,19 @@ import csv
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from monitor.cli import main
+from monitor.documents import from_document
 from monitor.readers import read_campaign
 from monitor.store import Database
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.selections.request import SideBySideAnswer
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 #: An example of every topology.
@@ -172,6 +175,120 @@ def test_the_weekly_report_says_it_in_every_row(
         ends = "in the axis&#39;s own frame" if said.endswith("itself") else said
         assert words.strip().replace("'", "&#39;").endswith(ends), (symbol, words)
     assert len(cells) == 13
+
+
+def table_rows(text: str, heading: str) -> dict[str, str]:
+    """What stands under "relative to" in the table whose first heading is ``heading``, by the first word of a row."""
+    lines = text.splitlines()
+    (number,) = [index for index, line in enumerate(lines) if line.strip().startswith(heading)]
+    left = lines[number].index("relative to")
+    rows = {}
+    for line in lines[number + 1 :]:
+        if not line.strip() or "relative to" in line:
+            break
+        if re.fullmatch(r"E[XYZABC][^\s:]*(:[a-z]\S*)?", line.split()[0]):
+            rows[line.split()[0]] = re.split(r"\s{2,}", line[left:])[0].strip()
+    return rows
+
+
+def test_contributions_of_instruments_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--db", str(tmp_path / "m.duckdb")]
+    assert main([*asked, "import", str(EXAMPLES / "four-instruments")]) == 0
+    topology = read_campaign(EXAMPLES / "four-instruments").machine.topology
+    capsys.readouterr()
+    assert main([*asked, "contributions", "four-instruments"]) == 0
+    printed = capsys.readouterr().out
+    assert main([*asked, "contributions", "four-instruments", "--json"]) == 0
+    rows = {
+        row["parameter"]: row.get("refers_to") for row in json.loads(capsys.readouterr().out)["parameters"]
+    }
+    said = {symbol: expected(symbol, topology) for symbol in rows}
+    assert rows == said
+    assert len([frame for frame in said.values() if frame]) >= 10
+    assert table_rows(printed, "parameter") == {symbol: frame for symbol, frame in said.items() if frame}
+    assert set(table_rows(printed, "alone").items()) <= set(said.items())
+
+
+def test_selections_side_by_side_say_it(
+    identified_examples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "m.duckdb"
+    shutil.copy(identified_examples, path)
+    asked = ["--db", str(path)]
+    assert main([*asked, "select", "five-days", "--name", "first", "--where", "day <= 3"]) == 0
+    capsys.readouterr()
+    compared = ["select", "--compare", "first,five-days"]
+    assert main([*asked, *compared]) == 0
+    printed = table_rows(capsys.readouterr().out, "parameter")
+    assert main([*asked, *compared, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    for scatter in document["selections"].values():
+        said = {symbol: expected(symbol, topology) for symbol in scatter["units"]}
+        assert scatter["refers_to"] == {symbol: frame for symbol, frame in said.items() if frame}
+    assert printed == document["selections"]["first"]["refers_to"]
+    assert len(printed) >= 10
+    # Machines whose chains differ may stand side by side, too.
+    answer = from_document(SideBySideAnswer, document)
+    other = replace(answer.selections["first"], refers_to={"EB0C": "axis A"})
+    both = replace(answer, selections={**answer.selections, "first": other})
+    assert both.refers_to["EB0C"] == "axis A or axis B"
+
+
+def test_models_and_their_history_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--db", str(tmp_path / "m.duckdb")]
+    assert main([*asked, "import", str(EXAMPLES / "five-days")]) == 0
+    for effect, name in (("EXX:reversal", "more"), ("EBC:harmonic2", "still-more")):
+        parent = "samba" if name == "more" else "more"
+        added = ["model", "add", effect, "--to", parent, "--as", name, "--campaign", "five-days"]
+        assert main([*asked, *added]) == 0
+    capsys.readouterr()
+    assert main([*asked, "model", "show", "still-more", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    said = {symbol: expected(symbol, topology) for symbol in (*shown["base"]["HU40-T"], *shown["effects"])}
+    assert shown["refers_to"] == {"HU40-T": {name: frame for name, frame in said.items() if frame}}
+    assert main([*asked, "model", "show", "still-more"]) == 0
+    printed = capsys.readouterr().out
+    assert "relative to axis B: EX0C EA0C EB0C" in printed
+    assert printed.rstrip().endswith("relative to: axis C itself")
+    assert main([*asked, "model", "history", "still-more", "--campaign", "five-days", "--json"]) == 0
+    steps = json.loads(capsys.readouterr().out)
+    added = [{}, {"EXX:reversal": "axis X itself"}, {"EBC:harmonic2": "axis C itself"}]
+    assert [step["refers_to"] for step in steps] == added
+    assert main([*asked, "model", "history", "still-more", "--campaign", "five-days"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (head,) = [line for line in lines if "relative to" in line]
+    (row,) = [line for line in lines if "EXX:reversal" in line]
+    assert row[head.index("relative to") :].startswith("axis X itself ")
+
+
+def test_a_comparison_says_whose_axes_its_residuals_are_along(
+    identified_examples: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Of the ball's centre: the frame of the last axis of the workpiece; of one number along a normal: none.
+    for name, axis in (("five-days", "C"), ("tilting-table", None), ("l-shape", None)):
+        assert main(["--db", str(identified_examples), "compare", name, "--json"]) == 0
+        said = json.loads(capsys.readouterr().out).get("refers_to")
+        topology = read_campaign(EXAMPLES / name).machine.topology
+        assert said == (axis and dict.fromkeys("xyz", f"axis {branches(topology)[0][-1]} itself"))
+    assert main(["--db", str(identified_examples), "compare", "five-days"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (number,) = [index for index, line in enumerate(lines) if "by axis" in line]
+    left = lines[number].index("relative to")
+    rows = [
+        line[left:] for line in lines[number + 1 : number + 5] if line.split()[:1] in (["x"], ["y"], ["z"])
+    ]
+    assert len(rows) == 3
+    assert all(row.startswith("axis C itself ") for row in rows)
+
+
+def test_a_missing_effect_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--db", str(tmp_path / "m.duckdb")]
+    assert main([*asked, "import", str(EXAMPLES / "hidden-reversal-x")]) == 0
+    capsys.readouterr()
+    assert main([*asked, "explain", "hidden-reversal-x"]) == 0
+    assert "\n   relative to: axis X itself\n" in capsys.readouterr().out
 
 
 def test_limits_say_it(tmp_path: Path) -> None:

@@ -10,7 +10,12 @@ from monitor.cli import output, residual_output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.workflow.explain.compare import compare
-from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachinePart
+from monitor.workflow.explain.compare_answer import (
+    CompareAnswer,
+    CurveComparison,
+    MachineComparison,
+    MachinePart,
+)
 from monitor.workflow.explain.request import CompareRequest
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
@@ -55,10 +60,12 @@ def _breakdown(answer: CompareAnswer) -> None:
         return
     for kind in SHOWN:
         if comparison.by.get(kind):
-            _machine_parts(kind, comparison.by[kind], answer.target_word)
+            _machine_parts(kind, comparison, answer.target_word)
 
 
-def _machine_parts(kind: str, parts: Mapping[str, MachinePart], target_word: str | None) -> None:
+def _machine_parts(kind: str, comparison: MachineComparison, target_word: str | None) -> None:
+    parts: Mapping[str, MachinePart] = comparison.by[kind]
+    frames = (comparison.refers_to or {}) if kind == "axis" else {}
     names = list(parts)
     cut = kind in CUT and len(names) > MOST_PARTS
     if cut:
@@ -66,10 +73,17 @@ def _machine_parts(kind: str, parts: Mapping[str, MachinePart], target_word: str
         names = [name for name in names if name in worst]
     readings = "touches" if target_word == "ball" else "readings"
     rows = [
-        [name, _checked(parts[name].rms_um), _checked(parts[name].largest_um), str(parts[name].n)]
+        [
+            name,
+            *([frames[name]] if frames else []),
+            _checked(parts[name].rms_um),
+            _checked(parts[name].largest_um),
+            str(parts[name].n),
+        ]
         for name in names
     ]
-    output.table("", [f"by {kind}", "RMS / µm", "largest / µm", readings], rows)
+    head = [f"by {kind}", *(["relative to"] if frames else []), "RMS / µm", "largest / µm", readings]
+    output.table("", head, rows, text_columns=len(head) - 3)
     if cut:
         output.say(f"the worst {MOST_PARTS} of {len(parts)}; --json has all")
 

@@ -54,6 +54,7 @@ def _say(answer: InstrumentsAnswer) -> None:
         [
             shares.parameter,
             shares.unit,
+            shares.refers_to or "",
             output.rounded(shares.value, shares.u),
             output.two_digits(shares.u),
             *(_part(shares.parts[name], shares.u) for name in numbers),
@@ -61,11 +62,14 @@ def _say(answer: InstrumentsAnswer) -> None:
         ]
         for shares in answer.parameters
     ]
-    output.table("", ["parameter", "unit", "value", "u", *numbers.values(), "(0)"], rows)
+    output.table(
+        "", ["parameter", "unit", "relative to", "value", "u", *numbers.values(), "(0)"], rows, text_columns=3
+    )
     alone = [
         [
             shares.parameter,
             shares.unit,
+            shares.refers_to or "",
             numbers[value.instrument],
             output.rounded(value.value, value.u),
             output.two_digits(value.u),
@@ -74,7 +78,7 @@ def _say(answer: InstrumentsAnswer) -> None:
         for value in shares.alone
     ]
     if alone:
-        output.table("", ["alone", "unit", "by", "value", "u"], alone)
+        output.table("", ["alone", "unit", "relative to", "by", "value", "u"], alone, text_columns=4)
     _say_agreement(answer)
     if answer.not_determined:
         output.say(

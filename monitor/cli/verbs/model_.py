@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from monitor.cli import output
@@ -108,10 +108,25 @@ def _show(options: Namespace) -> int:
     output.say(version.model + (f", from {version.parent}" if version.parent else ""))
     for machine, effects in answer.base.items():
         subject = "base of" if "~" in effects[0] else "free in every run of"
+        frames = answer.refers_to.get(machine, {})
         output.say(f"  {subject} {machine}: {' '.join(effects)}")
+        for line in _by_frame(effects, frames):
+            output.say(f"    {line}")
     for effect in version.effects:
         output.say(f"  shared by all runs: {effect}: {answer.meaning.get(effect, 'no machine here has it')}")
+        frames_of_effect = {frames[effect] for frames in answer.refers_to.values() if effect in frames}
+        if frames_of_effect:
+            output.say(f"    relative to: {' or '.join(sorted(frames_of_effect))}")
     return 0
+
+
+def _by_frame(effects: Sequence[str], frames: Mapping[str, str]) -> list[str]:
+    """Lines that say which effects refer to what."""
+    grouped: dict[str, list[str]] = {}
+    for effect in effects:
+        if effect in frames:
+            grouped.setdefault(frames[effect], []).append(effect)
+    return [f"relative to {frame}: {' '.join(names)}" for frame, names in grouped.items()]
 
 
 def _add(options: Namespace) -> int:
@@ -211,6 +226,7 @@ def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
     columns = [
         "model",
         "added",
+        *([] if curve else ["relative to"]),
         f"RMS / {unit}",
         f"held-out / {unit}",
         f"repeatability / {unit}",
@@ -220,7 +236,7 @@ def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
         f"on campaign {steps[0].campaign}",
         [*columns, "BIC"] if curve else columns,
         [_step(step) for step in steps],
-        text_columns=2,
+        text_columns=2 if curve else 3,
     )
 
 
@@ -230,6 +246,7 @@ def _step(step: MachineVersion | CurveVersion) -> list[str]:
     return [
         step.model,
         step.added or (f"without {step.removed}" if step.removed else "base"),
+        *([", ".join(step.refers_to.values())] if isinstance(step, MachineVersion) else []),
         number(step.rms),
         number(step.heldout_rms),
         number(step.repeatability),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from monitor.cli import output
@@ -96,7 +97,7 @@ def _tables(answer: BallPlanAnswer) -> None:
         f"indexation ({time.source})"
     )
     if proposed is not None:
-        _indexations(proposed)
+        _indexations(proposed.poses, answer.new_balls)
     blind = answer.blind_spots if proposed is None else proposed.blind_spots or ()
     output.say(
         f"blind spots: {len(blind)} effects leave nothing to see ({', '.join(blind[:6])}, ...); --json lists them"
@@ -143,14 +144,13 @@ def _proposed_cells(parameter: PlannedParameter) -> list[str]:
     ]
 
 
-def _indexations(plan: BallPlan) -> None:
+def _indexations(poses: Sequence[Pose], new_balls: Mapping[str, Sequence[float]]) -> None:
     """Where the proposed plan probes, and where its new balls stand."""
     output.say("indexations (check on the machine that the stylus can reach them):")
-    for pose in plan.poses:
+    for pose in poses:
         output.say(f"   {_pose(pose)}")
-    for name, position in plan.ball_places_mm.items():
-        if name.startswith("new "):
-            output.say(f"   ball {name} at {', '.join(f'{value:.0f}' for value in position)} mm")
+    for name, position in new_balls.items():
+        output.say(f"   ball {name} at {', '.join(f'{value:.0f}' for value in position)} mm")
 
 
 def _size(plan: BallPlan) -> str:

@@ -90,6 +90,7 @@ def _comparison(answer: SideBySideAnswer) -> None:
         [
             name,
             unit,
+            answer.refers_to.get(name, ""),
             *(
                 output.two_digits(scatter.expanded[name]) if name in scatter.expanded else "-"
                 for scatter in scatters.values()
@@ -99,9 +100,14 @@ def _comparison(answer: SideBySideAnswer) -> None:
     ]
     output.table(
         f"expanded uncertainty U = k_q u of a calibration, all parameters together with p = {answer.p:g}",
-        ["parameter", "unit", *(f"{name} ({scatter.runs} runs)" for name, scatter in scatters.items())],
+        [
+            "parameter",
+            "unit",
+            "relative to",
+            *(f"{name} ({scatter.runs} runs)" for name, scatter in scatters.items()),
+        ],
         rows,
-        text_columns=2,
+        text_columns=3,
     )
     for file in answer.figures or ():
         output.say(file)

@@ -1,4 +1,4 @@
-"""What ISO 230-2, ISO 230-4 and ISO 230-6 report of the tests of a campaign, with uncertainties."""
+"""What ISO 230-2, ISO 230-4, ISO 230-6 and ISO 230-7 report of the tests of a campaign, with uncertainties."""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 A ``displacement`` along one linear axis is a test of positioning (ISO 230-2), along several at once a diagonal
 (ISO 230-6); an ``angle`` about a rotary axis that moves alone is a test of positioning too. A ``distance`` swung by two
-linear axes about a centre is a circular test (ISO 230-4). All other setups have no standard's figures here.
+linear axes about a centre is a circular test (ISO 230-4); tests of axes of rotation are in ``rotation_tests``
+(ISO 230-7). All other setups have no standard's figures here.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from monitor.methods.instruments.reading import LEVER, direction_of
 from monitor.methods.instruments.readings.angle import Angle
 from monitor.methods.instruments.readings.displacement import Displacement
 from monitor.methods.instruments.readings.distance import DistanceReading
-from monitor.methods.method import AxisTest, CircleTest
+from monitor.methods.instruments.rotation_tests import rotation_tests
+from monitor.methods.method import AxisTest, CircleTest, RotationTest
 from monitor.records import Array
 
 #: An axis that moves by less than this part of the one that moves most stands still.
@@ -29,10 +31,11 @@ STILL = 1e-3
 ALONG = 1e-2
 
 
-def standard_tests(problem: ChainProblem) -> tuple[AxisTest | CircleTest, ...]:
+def standard_tests(problem: ChainProblem) -> tuple[AxisTest | CircleTest | RotationTest, ...]:
     """The tests of every setup and run that a standard evaluates."""
     assert isinstance(problem, InstrumentProblem)
-    return tuple(test for part in problem.parts for test in _tests_of(problem, part))
+    of_setups = (test for part in problem.parts for test in _tests_of(problem, part))
+    return (*of_setups, *rotation_tests(problem))
 
 
 def _tests_of(problem: InstrumentProblem, part: Part) -> Iterator[AxisTest | CircleTest]:

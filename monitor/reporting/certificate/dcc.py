@@ -102,7 +102,7 @@ def _administrative(parent: ET.Element, record: CertificateRecord, texts: Texts)
     assert record.performed_on is not None
     software = add(add(parent, "dccSoftware"), "software")
     name, _, release = str(record.method.software).rpartition(" ")
-    say(software, "name", name, "en")
+    say(software, "name", name, language if version_of(record).by_vocabulary else "en")
     add(software, "release", release)
     if version_of(record).by_vocabulary:
         define_vocabulary(parent, texts)

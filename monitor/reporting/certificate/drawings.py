@@ -13,7 +13,16 @@ import numpy as np
 from monitor.records import Array
 from monitor.reporting.certificate.results import ResidualSummary, ResultSet
 from monitor.reporting.palette import BLUE, FAINT, INK, MID, PALE
-from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, nice_ticks, shortened, tick_words
+from monitor.reporting.svg.plot import (
+    LETTER,
+    SCALE,
+    WIDE,
+    Drawing,
+    nice_ticks,
+    shortened,
+    tick_room,
+    tick_words,
+)
 from monitor.reporting.texts import Texts
 
 #: A figure alone on its page, below a heading and above its caption: an A4 page has 259 mm between its margins.
@@ -136,9 +145,10 @@ def residual_drawing(
     """Bars of the RMS residuals, µm, the probe's uncertainty dashed; bars above twice of it are striped."""
     on = Drawing(width_mm, height_mm, title)
     level = residuals.probe_um
-    left_edge, right_edge, top = 100.0, width_mm * SCALE - 8.0, 14.0
-    bottom = height_mm * SCALE - 30.0 - 2.4 * LETTER
     most = max([*residuals.rms_um, level or 0.0]) * 1.15 or 1.0
+    left_edge = max(100.0, tick_room((0.0, most), 6) + 12.0 + LETTER)
+    right_edge, top = width_mm * SCALE - 8.0, 14.0
+    bottom = height_mm * SCALE - 30.0 - 2.4 * LETTER
 
     def y(value: float) -> float:
         return bottom - (bottom - top) * value / most

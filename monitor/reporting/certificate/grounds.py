@@ -30,7 +30,7 @@ class Ground:
     """One ground: of a ``run`` and a ``subject`` (a parameter, a reading, a bar), a ``size`` beyond its ``limit``.
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
-    them.
+    them. Lack of fit has a parameter as its subject where it is about its budget.
     """
 
     kind: GroundKind
@@ -55,6 +55,8 @@ def ground_sentence(ground: Ground, texts: Texts) -> str:
     key = ground.kind.value.replace("-", "_")
     if ground.kind is GroundKind.TEMPERATURE and ground.size is not None:
         key = "impossible_temperature"
+    if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:
+        key = "lack_in_budget"
     return texts(
         f"grounds.{key}",
         run=ground.run,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import shorten
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,8 @@ PANEL_MM = 30.0
 HEAD_MM = 22.0
 #: Of more panels than these the first ones and the last are drawn.
 MOST_PANELS = 5
+#: Letters of a panel's title that have room in one line.
+_MOST_LETTERS = 92
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def residuals_figure(curve: MeasuredCurve, residuals: Sequence[Residuals], *, ti
                 markerfacecolor="none",
                 color=ORANGE,
             )
-            panel.set_title(residual.title)
+            panel.set_title(shorten(residual.title, _MOST_LETTERS, placeholder=" …"))
             panel.set_ylabel("residual")
         axes[-1].set_xlabel(curve.x_name)
     return figure

@@ -17,8 +17,6 @@ from monitor.reporting.svg.map_slices import Slice, slices_of
 
 #: From paper to blue: the darker, the larger, in grey too.
 _LENGTHS = LinearSegmentedColormap.from_list("lengths", ["#ffffff", "#8fb0cf", BLUE])
-#: Numbers are written at so many nodes of a slice, the corners and the middle of a grid of three.
-_NUMBERS = 3
 
 
 def volumetric_slices(
@@ -68,15 +66,20 @@ def _slice(axes: Axes, part: Slice, scale: Normalize) -> None:
         x, y, np.array(part.first_um) * length, np.array(part.second_um) * length, angles="xy", scale_units="xy",
         scale=1.0, color=INK, width=0.006, zorder=4,
     )  # fmt: skip
-    picks = [np.unique(np.linspace(0, len(level) - 1, _NUMBERS).astype(int)) for level in (first, second)]
+    # Numbers stand at the corners and the middle of a grid of three, below their nodes: some 5 mm of 45 mm.
+    longer = float(max(np.ptp(first), np.ptp(second)))
+    picks = [
+        np.unique(np.linspace(0, len(level) - 1, 3 if np.ptp(level) > 0.25 * longer else 2).astype(int))
+        for level in (first, second)
+    ]
     for i in picks[0]:
         for j in picks[1]:
             axes.annotate(
-                f"±{part.expanded_um[i][j]:.1f}", (first[i], second[j]), xytext=(0, -7),
-                textcoords="offset points", ha="center", va="top", fontsize=5.5, color=INK, zorder=5,
+                f"±{part.expanded_um[i][j]:.1f}", (first[i], second[j]),
+                xytext=(0, -7), textcoords="offset points", ha="center", va="top", fontsize=5.5, color=INK, zorder=5,
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
             )  # fmt: skip
-    room = [0.18 * float(np.ptp(level)) for level in (first, second)]
+    room = [0.18 * float(np.ptp(first)), max(0.18 * float(np.ptp(second)), 0.11 * longer)]
     axes.set_xlim(float(first[0]) - room[0], float(first[-1]) + room[0])
     axes.set_ylim(float(second[0]) - room[1], float(second[-1]) + room[1])
     axes.set_aspect("equal", adjustable="box")
@@ -104,8 +107,10 @@ def expected_uncertainties(
     ):
         raise DataError(f"{len(names)} parameters need as many units and uncertainties")
     at = np.arange(len(names), dtype=np.float64)
+    # Letters of 6 pt: some 115 stand side by side.
+    upright = len(names) * (max(map(len, names)) + 1) > 115
     with style():
-        figure = new_figure(PAGE_WIDTH_MM, 70.0, title)
+        figure = new_figure(PAGE_WIDTH_MM, 96.0 if upright else 70.0, title)
         axes = figure.subplots()
         axes.plot(
             at - (0.12 if after is not None else 0.0),
@@ -122,8 +127,12 @@ def expected_uncertainties(
             )  # fmt: skip
             axes.vlines(at, 0.0, np.nanmax([before, after]), color=MID, linewidth=0.2, zorder=0)
             axes.legend(loc="upper left", ncols=2, fontsize=7)
+        between = " / " if upright else "\n"
         axes.set_xticks(
-            at, [f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)], rotation=0, fontsize=6
+            at,
+            [f"{name}{between}{unit}" for name, unit in zip(names, units, strict=True)],
+            rotation=90 if upright else 0,
+            fontsize=6,
         )
         axes.set_ylim(
             0.0, 1.2 * float(np.nanmax(np.concatenate([before, [] if after is None else after, [1e-9]])))

@@ -224,9 +224,14 @@ def to_do(health: MachineHealth) -> str:
     when = (
         "now"
         if health.state in ALARMS and health.state is not State.NOT_EVALUATED
-        else f"(next check {health.next_check})"
+        else f"(next check: {_after_colon(str(health.next_check))})"
     )
     return _sentence(f"{action} {when}")
+
+
+def _after_colon(check: str) -> str:
+    """When to check next, as it stands behind a colon: its own becomes a comma."""
+    return check.replace(": ", ", ", 1)
 
 
 def _worst(fleet: Fleet) -> str:

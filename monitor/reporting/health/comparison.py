@@ -18,7 +18,8 @@ class ReversalValue:
 
 @dataclass(frozen=True)
 class MissingEffect:
-    """An effect that the model lacks, its cause and what to do; of a play its ``reversal`` value."""
+    """An effect that the model lacks, its cause and what to do; of a play its ``reversal`` value; ``refers_to`` says
+    in words what it is stated relative to."""
 
     effect: str
     meaning: str
@@ -29,6 +30,7 @@ class MissingEffect:
     rms_after_um: float | None
     not_ruled_out: tuple[str, ...]
     reversal: ReversalValue | None = field(default=None, metadata=OMITTED)
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,16 @@ from monitor.reporting.health.comparison import ErrorStep, ModelHealth, Residual
 from monitor.reporting.health.records import VolumetricMap
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PALE
 from monitor.reporting.svg.map_slices import map_drawing
-from monitor.reporting.svg.plot import LETTER, SCALE, Drawing, Panel, arrow_head, shortened
+from monitor.reporting.svg.plot import (
+    LETTER,
+    SCALE,
+    Drawing,
+    Panel,
+    arrow_head,
+    shortened,
+    text_width,
+    tick_room,
+)
 
 #: The whole text width of the page, and the two parts that stand side by side.
 WIDTH_MM, LEFT_MM, RIGHT_MM = 176.0, 104.0, 66.0
@@ -67,15 +76,16 @@ def where_it_fails(residual_map: ResidualMap) -> str:
     position, residual = np.array(residual_map.place_mm), np.array(residual_map.residual_um)
     view = view_of(position, residual)
     on = Drawing(WIDTH_MM, 63.0, "Mean residual vectors over the workspace, seen along Z, Y and X")
-    side, gap = 465.0, 112.0
+    ranges = [(middle - view.reach, middle + view.reach) for middle in view.middle]
+    room = max(88.0, *(tick_room(ranges[up], 5) + 8.0 + LETTER for up in (1, 2)))
+    gap = room + 24.0
+    side = min(465.0, (WIDTH_MM * SCALE - room - 2.0 * gap - 36.0) / 3.0)
     for index, (across, up) in enumerate(((0, 1), (0, 2), (1, 2))):
         panel = Panel(
-            88.0 + index * (side + gap), 34.0, side, side,
-            (view.middle[across] - view.reach, view.middle[across] + view.reach),
-            (view.middle[up] - view.reach, view.middle[up] + view.reach),
+            room + index * (side + gap), 34.0, side, side, ranges[across], ranges[up],
         )  # fmt: skip
         panel.frame(on, f"{'XYZ'[across]} / mm", f"{'XYZ'[up]} / mm", ticks=4)
-        on.text(panel.left, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
+        on.text(panel.x0, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
         for large, colour, width in ((False, BLUE, 2.6), (True, ORANGE, 5.0)):
             shafts, heads = [], []
             for at, vector in zip(position[view.large == large], residual[view.large == large], strict=True):
@@ -87,7 +97,7 @@ def where_it_fails(residual_map: ResidualMap) -> str:
             on.path("".join(heads), fill=colour)
         if index == 0:
             length = side * view.key * 1e-3 * view.magnify / (2.0 * view.reach)
-            x, y = panel.left + 14.0, panel.top + side - 16.0
+            x, y = panel.x0 + 14.0, panel.top + side - 16.0
             on.line(x, y, x + length, y, INK, 7)
             on.text(x, y - 9, f"{view.key:g} µm", bold=True)
     on.text(
@@ -113,11 +123,13 @@ def against_driver(residual: ResidualAgainst) -> str:
     """The residual against what drives it: means of groups before (circles) and after (squares), points in grey."""
     on = Drawing(LEFT_MM, 58.0, f"Residual along {residual.along} against {residual.driver}")
     drivers = [*residual.at, *(group.at for group in residual.groups)]
-    panel = Panel(
-        88.0, 40.0, LEFT_MM * SCALE - 100.0, 430.0,
-        _with_margin(drivers, 0.05), _with_margin(_means_and_bars(residual), 0.08),
-    )  # fmt: skip
     directions = {-1.0: "towards \N{MINUS SIGN}", 1.0: "towards +"} if set(drivers) == {-1.0, 1.0} else None
+    right_room = 12.0 if directions is None else 52.0
+    sizes = _with_margin(_means_and_bars(residual), 0.08)
+    left_edge = max(88.0, tick_room(sizes, 6) + 12.0 + LETTER)
+    panel = Panel(
+        left_edge, 40.0, LEFT_MM * SCALE - left_edge - right_room, 430.0, _with_margin(drivers, 0.05), sizes
+    )
     panel.frame(on, residual.driver, "residual / µm", named=directions)
     low, high = panel.up
     points = [
@@ -128,7 +140,7 @@ def against_driver(residual: ResidualAgainst) -> str:
     for means in series:
         _draw_means(on, panel, means)
     for index, means in enumerate(series):
-        x = panel.left + 6 + 330 * index
+        x = panel.x0 + 6 + 330 * index
         on.path(means.sign(x, 16, _SIGN), fill=means.colour)
         on.text(x + 16, 24, means.name, bold=True, colour=means.colour)
     return on.svg()
@@ -189,31 +201,38 @@ def error_steps(model: ModelHealth) -> str:
     for index, step in enumerate(steps):
         top = panel.top + index * row
         on.text(
-            panel.left, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
+            panel.x0, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
         )
         y = top + 36
         end = panel.x(step.rms_um)
         on.path(
-            f"M{panel.left:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.left:g}Z",
+            f"M{panel.x0:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.x0:g}Z",
             fill="white" if step.proposed else BLUE, stroke=BLUE, width=3,
         )  # fmt: skip
-        held, values = end, f"{step.rms_um:.2f}"
+        held, values = end, _micrometres(step.rms_um)
         if step.heldout_um is not None:
             held = panel.x(step.heldout_um)
             on.path(_circle(held, y + 17, _SIGN), fill="white", stroke=ORANGE, width=4)
-            values += f" ({step.heldout_um:.2f})"
-        on.text(max(end, held, panel.x(model.stated_um)) + 14, y + 26, values)
+            values += f" ({_micrometres(step.heldout_um)})"
+        beside = max(end, held, panel.x(model.stated_um)) + 14.0
+        on.text(min(beside, RIGHT_MM * SCALE - text_width(values)), y + 26, values)
     bottom = panel.top + panel.height
     at = panel.x(model.stated_um)
     on.line(at, panel.top - 6, at, bottom + 6, INK, 3, "10 6")
-    on.text(min(at, 400.0), panel.top - 14, f"probe's statement {model.stated_um:.2g} µm", anchor="middle")
-    on.path(f"M{panel.left:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
-    on.text(panel.left + 30, bottom + 32, "fitted runs, µm")
-    on.path(_circle(panel.left + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
-    on.text(panel.left + 268, bottom + 32, "(held-out runs)")
+    stated = f"probe's statement {model.stated_um:.2g} µm"
+    half = text_width(stated) / 2.0
+    on.text(min(max(at, half), RIGHT_MM * SCALE - half), panel.top - 14, stated, anchor="middle")
+    on.path(f"M{panel.x0:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
+    on.text(panel.x0 + 30, bottom + 32, "fitted runs, µm")
+    on.path(_circle(panel.x0 + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
+    on.text(panel.x0 + 268, bottom + 32, "(held-out runs)")
     if any(step.proposed for step in steps):
-        on.text(panel.left, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
+        on.text(panel.x0, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
     return on.svg()
+
+
+def _micrometres(value: float) -> str:
+    return f"{value:.2f}" if value < 1e3 else f"{value:.3g}"
 
 
 def _shown(steps: tuple[ErrorStep, ...]) -> tuple[ErrorStep, ...]:

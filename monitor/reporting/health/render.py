@@ -35,13 +35,13 @@ def health_html(fleet: Fleet, machines: Iterable[MachineHealth]) -> Iterator[str
 def health_pdf(fleet: Fleet, machines: Sequence[MachineHealth], part: int = 1, parts: int = 1) -> bytes:
     """A part of the report as PDF, the first with the fleet table: the same bytes for the same records.
 
-    Of few machines it is set closer, or the last two pages alike, where the last would else be more than half empty.
+    Of few machines it is set closer where that saves a last page that would be more than half empty.
     """
     context = {**fleet_context(fleet), "pages": list(machine_pages(machines)), "part": part, "parts": parts}
-    settings = ("close", "balanced") if len(machines) <= _LAID_OUT_AGAIN else ()
+    closer = {**context, "setting": "close"} if len(machines) <= _LAID_OUT_AGAIN else None
     return pdf_of(
         html_of(TEMPLATE, {**context, "setting": ""}),
         identifier=f"health {fleet.week} {fleet.made_at.isoformat()} {part}",
         moment=fleet.made_at.replace(tzinfo=UTC),
-        others=[html_of(TEMPLATE, {**context, "setting": setting}) for setting in settings],
+        closer=None if closer is None else html_of(TEMPLATE, closer),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from monitor.reporting.health.records import Drift, ParameterHealth
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE
 from monitor.reporting.plain_names import plain_name
-from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, tick_words
+from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, text_width, tick_room, tick_words
 from monitor.reporting.svg.sparkline import value_range
 from monitor.units import DAYS_PER_YEAR
 
@@ -38,9 +38,12 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
     low, high = value_range(
         np.array(history.values), half, parameter.tolerance, always=parameter.reaches_soon
     )
+    left_edge = max(_LEFT, tick_room((low, high), 5) + 6.0)
+    limits = () if parameter.tolerance is None else (parameter.tolerance, -parameter.tolerance)
+    right_room = max(_RIGHT, *(text_width(_limit_words(limit), bold=True) + 14.0 for limit in (0.0, *limits)))
     on = Drawing(WIDTH_MM, HEIGHT_MM, f"{machine}: {plain_name(parameter.name)} over dates")
     panel = Panel(
-        _LEFT, _TOP, WIDTH_MM * SCALE - _LEFT - _RIGHT, HEIGHT_MM * SCALE - _TOP - _BOTTOM,
+        left_edge, _TOP, WIDTH_MM * SCALE - left_edge - right_room, HEIGHT_MM * SCALE - _TOP - _BOTTOM,
         (_days(first - margin), _days(last + margin)), (low, high),
     )  # fmt: skip
     _words(on, machine, parameter)
@@ -99,13 +102,27 @@ def _shortened(text: str, most: int) -> str:
 
 def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
     """Draw the limits that lie in the panel, dashed, with their values at the right."""
-    right = panel.left + panel.width
+    right = panel.x0 + panel.width
+    low, high = panel.up
+    if (
+        tolerance is not None
+        and low <= -tolerance
+        and tolerance <= high
+        and panel.y(-tolerance) - panel.y(tolerance) < LETTER
+    ):
+        # Next to each other where the scatter is that much larger: one number for both.
+        on.line(panel.x0, panel.y(0.0), right, panel.y(0.0), INK, 3.0, "14 8")
+        on.text(right + 8, panel.y(0.0) + 0.36 * LETTER, f"±{tick_words(tolerance)}", bold=True)
+        return
     for limit in () if tolerance is None else (-tolerance, tolerance):
         if panel.up[0] <= limit <= panel.up[1]:
             y = panel.y(limit)
-            on.line(panel.left, y, right, y, INK, 3.0, "14 8")
-            label = ("+" if limit > 0 else "") + tick_words(limit)
-            on.text(right + 8, y + 0.36 * LETTER, label, bold=True)
+            on.line(panel.x0, y, right, y, INK, 3.0, "14 8")
+            on.text(right + 8, y + 0.36 * LETTER, _limit_words(limit), bold=True)
+
+
+def _limit_words(limit: float) -> str:
+    return ("+" if limit > 0 else "") + tick_words(limit)
 
 
 def _drift(on: Drawing, panel: Panel, drift: Drift, last: datetime, end: datetime) -> None:

@@ -10,7 +10,7 @@ import os
 import threading
 import unicodedata
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
@@ -26,6 +26,7 @@ from monitor.reporting.certificate.data import Attached, certificate_files
 from monitor.reporting.certificate.page import certificate_context
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.tables import LETTERS_PT
+from monitor.reporting.pdf.last_page import ends_early, filling_breaks, with_breaks_before
 from monitor.reporting.pdf.layout_engine import (
     HTML,
     Attachment,
@@ -37,6 +38,7 @@ from monitor.reporting.pdf.layout_engine import (
 )
 from monitor.reporting.resources import FONT_FILES, font_bytes, report_text
 from monitor.reporting.svg.letter_widths import in_mm
+from monitor.reporting.texts import with_subscripts
 
 PDF_VARIANT = "pdf/a-3u"
 _FONT_SCHEME = "font:"
@@ -67,12 +69,13 @@ def pdf_of(
     moment: datetime,
     extra_fonts: Sequence[Path] = (),
     attached: Sequence[Attached] = (),
-    others: Sequence[str] = (),
+    closer: str | None = None,
 ) -> bytes:
     """Make the PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
 
     ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each. Where the last page would be
-    less than half full, the first of ``others``, the same page set otherwise, is taken that saves it or fills it.
+    less than half full, ``closer``, the same page in less room, is taken if it saves that page, else the page before
+    ends earlier (``last_page``).
 
     Raises InputError where the page asks for anything but our fonts and inline pictures.
     """
@@ -96,11 +99,7 @@ def pdf_of(
 
     try:
         with _reproducible(moment):
-            document = laid_out(html)
-            if others and _ends_early(document):
-                count = len(document.pages)
-                settings = (laid_out(other) for other in others)
-                document = next((it for it in settings if _is_better(it, count)), document)
+            document = _filled(html, closer, laid_out)
             return bytes(
                 document.write_pdf(finisher=_each_once, pdf_identifier=identifier.encode("utf-8"), **options)
             )
@@ -108,14 +107,21 @@ def pdf_of(
         raise InputError(str(error)) from error
 
 
-def _ends_early(document: Document) -> bool:
-    """Whether the last of several pages is less than half full: what has the id ``end`` is in its upper half."""
-    last = document.pages[-1]
-    return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < 0.5 * last.height
-
-
-def _is_better(document: Document, count: int) -> bool:
-    return len(document.pages) < count or (len(document.pages) == count and not _ends_early(document))
+def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) -> Document:
+    """A document without a last page that is more than half empty, where a closer setting or another break helps."""
+    document = laid_out(html)
+    if not ends_early(document):
+        return document
+    count = len(document.pages)
+    if closer is not None:
+        tight = laid_out(closer)
+        if len(tight.pages) < count and not ends_early(tight):
+            return tight
+    names = filling_breaks(document)
+    if not names:
+        return document
+    filled = laid_out(with_breaks_before(html, names))
+    return filled if len(filled.pages) <= count and not ends_early(filled) else document
 
 
 def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()) -> str:
@@ -186,6 +192,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.tests["wider_than"] = lambda text, mm: in_mm(text, LETTERS_PT) > mm
+    environment.filters["subscripts"] = with_subscripts
     environment.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     return environment
 

@@ -111,7 +111,7 @@ def map_drawing(slices: Sequence[Slice], *, title: str, scale_words: str, sign: 
 class _Frame:
     """The frame of a slice in tenths of a millimetre; ``unit`` of these a mm of the machine, cells in mm."""
 
-    left: float
+    x0: float
     wide: float
     high: float
     unit: float
@@ -134,7 +134,7 @@ def _grey(step: int, steps: int) -> str:
 
 def _slice(on: Drawing, part: Slice, frame: _Frame, longest: float, edges: list[float], sign: str) -> None:
     first, second = np.array(part.first_mm), np.array(part.second_mm)
-    x0, wide, high, unit, cell = frame.left, frame.wide, frame.high, frame.unit, frame.cell
+    x0, wide, high, unit, cell = frame.x0, frame.wide, frame.high, frame.unit, frame.cell
     top = _TOP
 
     def x(value: float) -> float:
@@ -166,6 +166,7 @@ def _slice(on: Drawing, part: Slice, frame: _Frame, longest: float, edges: list[
     on.dots("".join(shaft.split("L")[0] + "h0" for shaft in shafts), INK, 6.0)
     on.path("".join(shafts), stroke=INK, width=2.8)
     on.path("".join(heads), fill=INK)
+    written: list[tuple[float, float, float]] = []
     for i in np.unique(np.linspace(0, len(first) - 1, _NUMBERS).astype(int)):
         for j in np.unique(np.linspace(0, len(second) - 1, _NUMBERS).astype(int)):
             label = f"±{part.expanded_um[i][j]:.1f}".replace(".", sign)
@@ -174,16 +175,23 @@ def _slice(on: Drawing, part: Slice, frame: _Frame, longest: float, edges: list[
             at_x, at_y = x(first[i]), y(second[j]) + (10.0 + LETTER if below else -13.0)
             at_y = max(min(at_y, top + high - 5.0), top + LETTER)
             room = 0.58 * LETTER * len(label)
+            # A narrow slice has no room for all of them.
+            if any(
+                abs(at_x - other_x) < (room + other_room) / 2 and abs(at_y - other_y) < 0.9 * LETTER
+                for other_x, other_y, other_room in written
+            ):
+                continue
+            written.append((at_x, at_y, room))
             on.path(
                 f"M{at_x - room / 2:.1f} {at_y + 3:.1f}h{room:.1f}v{-0.95 * LETTER:.1f}h{-room:.1f}z",
                 fill="white",
             )
             on.text(at_x, at_y, label, anchor="middle")
     on.text(x0, top - 10.0, f"{part.across} = {tick_words(round(part.at_mm), sign)} mm", bold=True)
-    for value in nice_ticks(float(first[0]), float(first[-1]), 4):
+    for value in nice_ticks(float(first[0]), float(first[-1]), max(1, min(4, int(wide / 90.0)))):
         on.line(x(value), top + high, x(value), top + high + 8.0, MID, 2.0)
         on.text(x(value), top + high + 12.0 + LETTER, tick_words(value, sign), anchor="middle")
-    for value in nice_ticks(float(second[0]), float(second[-1]), 4):
+    for value in nice_ticks(float(second[0]), float(second[-1]), max(1, min(4, int(high / (2.0 * LETTER))))):
         on.line(x0 - 8.0, y(value), x0, y(value), MID, 2.0)
         on.text(x0 - 12.0, y(value) + 0.36 * LETTER, tick_words(value, sign), anchor="end")
     on.text(x0 + wide / 2, top + high + 16.0 + 2.1 * LETTER, f"{part.along[0]} / mm", anchor="middle")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from html import escape
 
 from monitor.reporting.palette import INK, MID, PALE
+from monitor.reporting.svg.letter_widths import BOLD, in_units, units_an_em
 
 #: Units a millimetre.
 SCALE = 10.0
@@ -72,9 +73,9 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Panel:
-    """A rectangle of a drawing with its two scales: left, top, width and height, and the ranges that they show."""
+    """A rectangle of a drawing with its two scales: left end ``x0``, top, width, height, and their ranges."""
 
-    left: float
+    x0: float
     top: float
     width: float
     height: float
@@ -83,7 +84,7 @@ class Panel:
 
     def x(self, value: float) -> float:
         """Return the position of a value from left to right."""
-        return self.left + self.width * (value - self.across[0]) / (self.across[1] - self.across[0])
+        return self.x0 + self.width * (value - self.across[0]) / (self.across[1] - self.across[0])
 
     def y(self, value: float) -> float:
         """Return the position of a value from top to bottom."""
@@ -101,17 +102,18 @@ class Panel:
             on.text(at, bottom + 12 + LETTER, label, anchor="middle")
         for value in nice_ticks(*self.up, ticks + 1):
             at = self.y(value)
-            on.line(self.left, at, self.left + self.width, at, PALE, 1.5)
-            on.line(self.left - 8, at, self.left, at, MID, 2)
-            on.text(self.left - 13, at + 0.36 * LETTER, tick_words(value), anchor="end")
+            on.line(self.x0, at, self.x0 + self.width, at, PALE, 1.5)
+            on.line(self.x0 - 8, at, self.x0, at, MID, 2)
+            on.text(self.x0 - 13, at + 0.36 * LETTER, tick_words(value), anchor="end")
         if self.up[0] < 0.0 < self.up[1]:
-            on.line(self.left, self.y(0.0), self.left + self.width, self.y(0.0), MID, 2.4)
+            on.line(self.x0, self.y(0.0), self.x0 + self.width, self.y(0.0), MID, 2.4)
         on.path(
-            f"M{self.left:g} {self.top:g}L{self.left:g} {bottom:g}L{self.left + self.width:g} {bottom:g}",
+            f"M{self.x0:g} {self.top:g}L{self.x0:g} {bottom:g}L{self.x0 + self.width:g} {bottom:g}",
             stroke=MID, width=2.4,
         )  # fmt: skip
-        on.text(self.left + self.width / 2, bottom + 18 + 2.1 * LETTER, across, anchor="middle")
-        on.text(self.left - 66, self.top + self.height / 2, up, anchor="middle", turned=True)
+        on.text(self.x0 + self.width / 2, bottom + 18 + 2.1 * LETTER, across, anchor="middle")
+        beside = max(66.0, tick_room(self.up, ticks + 1) + 8.0)
+        on.text(self.x0 - beside, self.top + self.height / 2, up, anchor="middle", turned=True)
 
 
 def nice_ticks(low: float, high: float, most: int) -> list[float]:
@@ -123,6 +125,16 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     step = next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9))
     first = math.ceil(low / step - 1e-9)
     return [index * step for index in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def text_width(text: str, *, bold: bool = False) -> float:
+    """Return the width of a text in units of a drawing."""
+    return in_units(text) / units_an_em() * LETTER * (BOLD if bold else 1.0)
+
+
+def tick_room(shown: tuple[float, float], most: int) -> float:
+    """Return how far the widest number beside an axis reaches from it."""
+    return 13.0 + max((text_width(tick_words(tick)) for tick in nice_ticks(*shown, most)), default=0.0)
 
 
 def shortened(text: str, room: float) -> str:

@@ -13,7 +13,7 @@ from starlette.responses import RedirectResponse, Response
 from monitor.exceptions import InputError, MonitorError
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
-from monitor.web.forms import Form, read_form
+from monitor.web.forms import Form, asked_once, read_form
 from monitor.web.rendering import page
 from monitor.web.users import User
 
@@ -60,7 +60,7 @@ def routes() -> APIRouter:
         """Mark a certificate as withdrawn."""
         async with read_form(request) as form:
             document = {"number": form.text("number"), "reason": form.text("reason")}
-        await run_in_threadpool(request.app.state.asker, request.state.user, "withdraw certificate", document)
+        await asked_once(request, form, "withdraw certificate", document)
         return RedirectResponse("/certificates", status_code=303)
 
     return router

@@ -61,13 +61,11 @@ def routes() -> APIRouter:
             button = filled.texts.get("button", "")
             texts = dict(filled.texts)
             if button == "fill":
-                texts |= _from_file(filled)
-                return await run_in_threadpool(_shown, request, texts, _Outcome())
+                texts, outcome = _with_file(texts, filled)
+                return await run_in_threadpool(_shown, request, texts, outcome)
             if button == "keep":
                 return attachment(FILE_NAME, laboratory_file(texts).encode("utf-8"))
-            outcome = await run_in_threadpool(
-                _pressed, request.app.state.asker, request.state.user, texts, request.app.state.working_folder
-            )
+            outcome = await run_in_threadpool(_pressed_once, request, filled, texts)
         if outcome.preview:
             request.app.state.previews.hold(request.state.user.name, outcome.preview)
         return await run_in_threadpool(_shown, request, texts, outcome)
@@ -91,6 +89,25 @@ def _from_file(form: Form) -> dict[str, str]:
     if len(content) > FILE_BYTES:
         raise InputError("this file is too large to be a laboratory's")
     return texts_of_file(content)
+
+
+def _with_file(texts: dict[str, str], form: Form) -> tuple[dict[str, str], _Outcome]:
+    """The boxes with what the file has; as they were, with the refusal, where it is none."""
+    try:
+        return texts | _from_file(form), _Outcome()
+    except InputError as error:
+        return texts, _Outcome(refusal=refusal_of(error))
+
+
+def _pressed_once(request: Request, form: Form, texts: Mapping[str, str]) -> _Outcome:
+    """What a button led to; a form that is sent twice issues one certificate."""
+    state = request.app.state
+    outcome: _Outcome = state.presses.once(
+        form.press,
+        lambda: _pressed(state.asker, request.state.user, texts, state.working_folder),
+        lambda outcome: bool(outcome.number),
+    )
+    return outcome
 
 
 def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Response:

@@ -9,14 +9,13 @@ from datetime import date, timedelta
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.desk import Ticket
-from monitor.web.forms import read_form
+from monitor.web.forms import asked_once, read_form
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 
@@ -81,7 +80,7 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             machine = form.text("machine")
             document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
-        await run_in_threadpool(request.app.state.asker, request.state.user, "event", document)
+        await asked_once(request, form, "event", document)
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router

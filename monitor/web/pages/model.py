@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
@@ -22,8 +21,9 @@ from monitor.web.charts.residuals import (
     scene_vectors,
 )
 from monitor.web.desk import Ticket
-from monitor.web.forms import read_form
+from monitor.web.forms import Form, asked_once, read_form
 from monitor.web.rendering import link, page
+from monitor.web.words import listed
 
 if TYPE_CHECKING:
     from monitor.workflow.model.answer import ChangeModelAnswer
@@ -38,8 +38,9 @@ def routes() -> APIRouter:
 
     @router.get("/model")
     def model(
-        request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", note: str = ""
-    ) -> Response:
+        request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", note: str = "",
+        overtaken: str = "",
+    ) -> Response:  # fmt: skip
         """Compare a model with a campaign; with an effect tried beside it."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.explain.explain_answer import MachineExplanation
@@ -58,8 +59,8 @@ def routes() -> APIRouter:
             request, "model.html",
             row=row, campaign=campaign, compare=compare, explanation=explanation,
             missing=() if explanation is None else explanation.missing, refusals=answers.refusals,
-            model=label,
-            effect=effect, note=note, effects=[candidate.effect for candidate in missing],
+            model=label, asked=model,
+            effect=effect, note=note, overtaken=overtaken, effects=[candidate.effect for candidate in missing],
             scene=None if residuals is None else scene_chart(residuals),
             vectors=None if residuals is None else scene_vectors(residuals),
             residuals=residuals, magnifications=MAGNIFICATIONS,
@@ -69,13 +70,14 @@ def routes() -> APIRouter:
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if len(missing) > 1 else None,
             falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
-            versions=versions, current=_version(versions, label), waiting=answers.waiting,
+            versions=versions, current=_version(versions, label), latest=_latest(versions, label), pinned=pinned,
+            waiting=answers.waiting,
         )  # fmt: skip
 
     @router.get("/model/explained")
-    def explained(request: Request, campaign: str, model: str, effect: str) -> Response:
+    def explained(request: Request, campaign: str, effect: str, model: str = "") -> Response:
         """Send what an effect explains of every residual, for the script; 202 while it is being computed."""
-        document = {"campaign": campaign, "model": model, "effect": effect}
+        document = {"campaign": campaign, **({"model": model} if model else {}), "effect": effect}
         residuals = request.app.state.desk.ask(request.state.user, "residuals", document).answer(FETCH_S)
         return JSONResponse(None, 202) if residuals is None else JSONResponse(explained_vectors(residuals))
 
@@ -86,7 +88,10 @@ def routes() -> APIRouter:
             campaign, effect = form.text("campaign"), form.text("effect")
             document = {"effect": effect, "campaign": campaign, "to": form.text("to")}
             document |= form.filled("new_name", "note")
-        answer = await _asked(request, "add effect", document)
+        overtaken = None if form.filled("new_name") else _overtaken(request, form)
+        if overtaken is not None:
+            return overtaken
+        answer = await asked_once(request, form, "add effect", document)
         return _back(campaign, answer, f"{effect} was added")
 
     @router.post("/model/undo")
@@ -95,7 +100,10 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             campaign, effect = form.text("campaign"), form.text("effect")
             document = {"effect": effect, "model": form.text("model")}
-        answer = await _asked(request, "remove effect", document)
+        overtaken = _overtaken(request, form)
+        if overtaken is not None:
+            return overtaken
+        answer = await asked_once(request, form, "remove effect", document)
         return _back(campaign, answer, f"{effect} was taken out")
 
     return router
@@ -143,14 +151,39 @@ def _expected(compare: Any) -> float | None:
     return None if compare is None else compare.comparison.expected_rms_um
 
 
-async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:
-    return await run_in_threadpool(request.app.state.asker, request.state.user, question, document)
+def pinned(label: str) -> str:
+    """Return the name of a version that stays its name when there are more: ``samba@1`` for ``samba``."""
+    return label if "@" in label or not label else f"{label}@1"
+
+
+def _overtaken(request: Request, form: Form) -> Response | None:
+    """The way to the newer version that somebody, or another window, made since the page of the form was."""
+    shown = form.texts.get("latest", "")
+    if not shown or request.app.state.presses.is_known(form.press):
+        return None
+    latest = _latest(request.app.state.asker(request.state.user, "models").models, shown)
+    if latest is None or pinned(latest.model) == shown:
+        return None
+    changes = listed([*(f"+ {name}" for name in latest.added), *(f"− {name}" for name in latest.removed)], 3)
+    overtaken = (
+        f"Nothing was changed: since this page was opened, somebody or another window has made {latest.model} "
+        f"({changes}). It is shown now; see whether the change is still wanted here."
+    )
+    address = link("/model", campaign=form.text("campaign"), model=pinned(latest.model), overtaken=overtaken)
+    return RedirectResponse(address, status_code=303)
 
 
 def _back(campaign: str, answer: ChangeModelAnswer, what: str) -> Response:
     name = answer.model.version.model
     note = f"{what}: the model is now {name}"
     return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
+
+
+def _latest(versions: Any, label: str) -> Any:
+    """The latest version of the model of a label; None for a model that was never stored."""
+    name = label.partition("@")[0]
+    of_model = [version for version in versions if version.name == name]
+    return max(of_model, key=lambda version: version.version, default=None)
 
 
 def _version(versions: Any, name: str) -> Any:

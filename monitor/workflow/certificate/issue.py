@@ -47,6 +47,7 @@ from monitor.workflow.certificate.results import results_of
 from monitor.workflow.certificate.states import state_of
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve_for
+from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
 from monitor.workflow.uncertainty.stored import stored_uncertainty
 
 
@@ -72,8 +73,10 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     keep_issued(db, path_of(request.out, request.number or next_number(db, day.year)))
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     stored = {run.run: stored_uncertainty(db, campaign, run.run, model, request.asked) for run in measured}
-    accepted = accepted_grounds(grounds_against(campaign, model, stored), request.accept)
+    grounds = grounds_against(campaign, model, stored)
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
+    lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
+    accepted = accepted_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
     inputs = inputs_of(runs, request.asked, request.fonts)
 
     signer = None if request.key is None else signer_of(request.key)

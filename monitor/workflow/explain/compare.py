@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from monitor.discovery import Fit
-from monitor.discovery import compare as compare_fit
+from monitor.discovery import Fit, compare as compare_fit
 from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
 from monitor.methods.curve.fit import CurveFit
@@ -54,7 +53,7 @@ def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer
 
         return comparison_figures(comparison, fit, folder)
 
-    return CompareAnswer(machine_comparison(comparison), fit.problem.target_word), draw
+    return CompareAnswer(machine_comparison(comparison, fit.problem), fit.problem.target_word), draw
 
 
 def _compare_curve(fit: CurveFit, model: str) -> tuple[CompareAnswer, Draw]:

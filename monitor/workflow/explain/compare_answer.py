@@ -80,7 +80,8 @@ class MachineComparison(InMicrometres):
 
     ``expected_rms_um`` is what the stated standard uncertainty would leave, ``repeatability_um`` the standard deviation
     of a coordinate over the runs (None with one run or plans that differ), ``residual_deviation_um`` the RMS per degree
-    of freedom. ``by`` breaks the residual down by target, axis, run, part of the run and indexation.
+    of freedom. ``by`` breaks the residual down by target, axis, run, part of the run and indexation; ``refers_to`` says
+    in words whose frame x, y and z of the residual are those of, where these are what is read.
     """
 
     campaign: str
@@ -95,6 +96,7 @@ class MachineComparison(InMicrometres):
     excess_over_statement_p: float
     verdict: Verdict
     by: Mapping[str, Mapping[str, MachinePart]]
+    refers_to: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
 
     @property
     def expected_rms(self) -> float:

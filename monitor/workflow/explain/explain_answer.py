@@ -61,7 +61,8 @@ class MachineMissing:
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
     ``travelled_periods`` of a harmonic is the part of its period that the axis turned, where that is no whole one: over
     a part of a turn an offset, a tilt or flexure looks alike. ``within_its_shape`` are effects that stand out beside it
-    but not beside its error in any shape: they cannot be separated from it.
+    but not beside its error in any shape: they cannot be separated from it. ``refers_to`` says in words what its
+    coefficients are stated relative to, where it is an error of the chain.
     """
 
     rank: int
@@ -95,6 +96,7 @@ class MachineMissing:
     travelled_periods: float | None = field(default=None, metadata=OMITTED)
     within_its_shape: tuple[str, ...] = ()
     ties: tuple[Tie, ...] = ()
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ class ChangedTarget:
 
 @dataclass(frozen=True)
 class ChangedParameter:
-    """A parameter that stepped at a run."""
+    """A parameter that stepped at a run; ``refers_to`` says what it is stated relative to."""
 
     parameter: str
     run: int
@@ -193,6 +195,7 @@ class ChangedParameter:
     u: float
     unit: str
     p_value: float
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,10 @@ from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistak
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.suspects.steps import Step
 from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
-from monitor.records import Verdict
+from monitor.machine import Chain
+from monitor.methods.chain.problem import ChainProblem
+from monitor.records import FrameKind, FrameOfReference, Verdict
+from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
     MachineFinding,
@@ -45,9 +48,12 @@ from monitor.workflow.explain.shared_answer import (
 )
 from monitor.workflow.explain.ties import ties_of
 from monitor.workflow.identify.answer import Estimate, reversal_value
+from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.
 HOPELESS_TIMES = 100.0
+#: The numbers of a residual that is a vector.
+COORDINATES = ("x", "y", "z")
 
 
 def micrometres(length: float | None) -> float | None:
@@ -55,8 +61,19 @@ def micrometres(length: float | None) -> float | None:
     return None if length is None else MICROMETRE.to_display(length)
 
 
-def machine_comparison(comparison: ChainComparison) -> MachineComparison:
-    """The comparison of a machine in micrometres."""
+def residual_frames(problem: ChainProblem) -> dict[str, str]:
+    """What x, y and z of a residual are stated in, in words; empty where readings are no vectors."""
+    if problem.components != COORDINATES:
+        return {}
+    work = problem.context.chain.work
+    frame = (
+        FrameOfReference(FrameKind.OWN_AXIS, work[-1].name) if work else FrameOfReference(FrameKind.MACHINE)
+    )
+    return dict.fromkeys(COORDINATES, frame_words(frame))
+
+
+def machine_comparison(comparison: ChainComparison, problem: ChainProblem) -> MachineComparison:
+    """The comparison of a machine, measured by ``problem``, in micrometres."""
     um = MICROMETRE.to_display
     return MachineComparison(
         campaign=comparison.campaign,
@@ -76,6 +93,7 @@ def machine_comparison(comparison: ChainComparison) -> MachineComparison:
             }
             for kind, parts in comparison.by.items()
         },
+        refers_to=residual_frames(problem) or None,
     )
 
 
@@ -92,7 +110,7 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
     )
 
 
-def _machine_missing(effect: ChainMissing, *, is_touched: bool) -> MachineMissing:
+def _machine_missing(effect: ChainMissing, chain: Chain, *, is_touched: bool) -> MachineMissing:
     unit, um = effect.unit or effect.units[0], MICROMETRE.to_display
     return MachineMissing(
         rank=effect.rank,
@@ -131,18 +149,20 @@ def _machine_missing(effect: ChainMissing, *, is_touched: bool) -> MachineMissin
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
         ties=ties_of(effect, rivals(effect), is_touched=is_touched),
+        refers_to=refers_to((effect.effect,), chain).get(effect.effect),
     )
 
 
-def _step(step: Step, units: Mapping[str, Unit]) -> ChangedTarget | ChangedParameter:
+def _step(step: Step, units: Mapping[str, Unit], chain: Chain) -> ChangedTarget | ChangedParameter:
     if step.parameter is None:
         assert step.target is not None
         um = MICROMETRE.to_display
         return ChangedTarget(step.target, step.run, um(step.size), um(step.u), MICROMETRE.name, step.p_value)
     unit = units[step.parameter]
     return ChangedParameter(
-        step.parameter, step.run, unit.to_display(step.size), unit.to_display(step.u), unit.name, step.p_value
-    )
+        step.parameter, step.run, unit.to_display(step.size), unit.to_display(step.u), unit.name, step.p_value,
+        refers_to((step.parameter,), chain).get(step.parameter),
+    )  # fmt: skip
 
 
 def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]:
@@ -156,7 +176,7 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
         )
         for move in explanation.moves
     )  # fmt: skip
-    return (*moved, *(_step(step, units) for step in explanation.steps))
+    return (*moved, *(_step(step, units, problem.context.chain) for step in explanation.steps))
 
 
 def _remaining(final: Fit) -> Remaining:
@@ -207,8 +227,11 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
     is_touched = problem.touches_centres or problem.touch_normals is not None
-    missing = tuple(_machine_missing(effect, is_touched=is_touched) for effect in explanation.missing)
-    comparison = machine_comparison(explanation.comparison)
+    missing = tuple(
+        _machine_missing(effect, problem.context.chain, is_touched=is_touched)
+        for effect in explanation.missing
+    )
+    comparison = machine_comparison(explanation.comparison, problem)
     suspect_data = tuple(
         BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
         for point in explanation.suspect

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
@@ -11,7 +12,10 @@ from monitor.workflow.explain.compare_answer import InMicrometres
 
 @dataclass(frozen=True)
 class MachineVersion(InMicrometres):
-    """The error of a version on a machine's campaign in µm: on all runs, and on runs that took no part in the fit."""
+    """The error of a version on a machine's campaign in µm: on all runs, and on runs that took no part in the fit.
+
+    ``refers_to`` says in words what the effects that it added or removed are stated relative to.
+    """
 
     model: str
     campaign: str
@@ -23,6 +27,7 @@ class MachineVersion(InMicrometres):
     stated_uncertainty_um: float
     lack_of_fit_p: float | None
     no_number: tuple[RefusedParameters, ...]
+    refers_to: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def heldout_rms(self) -> float | None:

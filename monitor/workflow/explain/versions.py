@@ -21,6 +21,7 @@ from monitor.workflow.identify.curve import in_micrometres, response_unit
 from monitor.workflow.identify.fitting import fit_of
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve
+from monitor.workflow.uncertainty.machine_frame import refers_to
 
 
 def history(db: Database, request: HistoryRequest) -> HistoryAnswer:
@@ -83,6 +84,7 @@ def _machine_step(fit: Fit, campaign: str, version: StoredModel) -> MachineVersi
         stated_uncertainty_um=MICROMETRE.to_display(error.stated_uncertainty),
         lack_of_fit_p=error.lack_of_fit_p,
         no_number=tuple(map(refused_parameters, shared_parameters(fit.problem, fit.solution).refused)),
+        refers_to=refers_to((*version.added, *version.removed), fit.problem.context.chain),
     )
 
 

@@ -49,6 +49,7 @@ def model_health(
                 _finite(effect.rms_after_um),
                 effect.indistinguishable_from,
                 _reversal(effect.reversal_value),
+                effect.refers_to,
             )
             for effect in explanation.missing
         ),

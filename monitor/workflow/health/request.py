@@ -9,8 +9,8 @@ from pathlib import Path
 from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
+from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.engines import check_workers
-from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
 from monitor.workflow.uncertainty.grounds import grounds_of
+from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -119,7 +120,10 @@ class _Fitted:
         request = UncertaintyRequest(task.past.name, task.run, method=METHOD)
         answer = answer_of(evaluate_fit(task.past, task.model, self.fit, request))
         # What was measured later may speak against a certificate, too.
-        return replace(answer, grounds=grounds_of(task.past, self.robust, task.run)) if task.whole else answer
+        if not task.whole:
+            return answer
+        grounds = grounds_of(task.past, self.robust, task.run)
+        return replace(answer, grounds=(*grounds, *lack_in_budget(answer)))
 
     @property
     def evaluated(self) -> StatedUncertainty:

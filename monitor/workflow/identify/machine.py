@@ -10,14 +10,13 @@ from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.methods.model import chain_of
 from monitor.records import Array, Campaign, Machine
 from monitor.refusal import Reason, ReasonKind, Refusal
-from monitor.reporting.frames import frame_words
 from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun, reversal_value
 from monitor.workflow.identify.notes import note
 from monitor.workflow.models import as_model
-from monitor.workflow.uncertainty.machine_frame import frames_of
+from monitor.workflow.uncertainty.machine_frame import frames_of, refers_to
 
 
 def identified(
@@ -112,7 +111,6 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
                 residuals=run.residuals,
             )
         )
-    frames = frames_of((*identification.parameters, *followed.names), chain_of(campaign.machine))
     return StoredIdentification(
         campaign=identification.campaign,
         model=model.name,
@@ -121,5 +119,5 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
         parameters=(*identification.parameters, *followed.names),
         units=(*identification.units, *followed.units),
         runs=tuple(runs),
-        refers_to={name: frame_words(frame) for name, frame in frames.items()},
+        refers_to=refers_to((*identification.parameters, *followed.names), chain_of(campaign.machine)),
     )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from monitor.documents import OMITTED
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,10 @@ class Agreement:
 @dataclass(frozen=True)
 class ParameterShares:
     """A parameter of the joint fit: ``parts`` are what each instrument adds to u as a standard uncertainty (u² is the
-    sum of their squares); ``known_beforehand`` is the part of lengths and beams that the setups state."""
+    sum of their squares); ``known_beforehand`` is the part of lengths and beams that the setups state.
+
+    ``refers_to`` says in words what an error of the chain is stated relative to.
+    """
 
     parameter: str
     unit: str
@@ -49,6 +54,7 @@ class ParameterShares:
     known_beforehand: float
     alone: tuple[AloneValue, ...]
     agreement: tuple[Agreement, ...]
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -23,6 +24,7 @@ from monitor.workflow.instruments.answer import (
 from monitor.workflow.instruments.request import InstrumentsRequest
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve_for, subject_of
+from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: Coverage factor of E_n.
 K = 2.0
@@ -46,6 +48,7 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
     solution = solve_problem(problem)
     index = int(np.searchsorted(problem.runs, run))
     of_all, beforehand = ability.shares(problem, solution, run)
+    frames = refers_to(problem.base_names, problem.context.chain)
     parameters, open_ones = [], []
     for number, name in enumerate(problem.base_names):
         if not solution.local_free[index, number]:
@@ -53,7 +56,8 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
             continue
         value = float(solution.local[index, number])
         unit = problem.base_units[name]
-        parameters.append(_parameter(name, unit, value, number, of_all, float(beforehand[number])))
+        shares = _parameter(name, unit, value, number, of_all, float(beforehand[number]))
+        parameters.append(replace(shares, refers_to=frames.get(name)))
     return InstrumentsAnswer(
         campaign=campaign.name,
         run=run,

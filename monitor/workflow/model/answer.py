@@ -36,11 +36,16 @@ class ModelsAnswer:
 
 @dataclass(frozen=True)
 class ShowModelAnswer:
-    """A version, its base effects by machine or curve, and what its added effects mean."""
+    """A version, its base effects by machine or curve, and what its added effects mean.
+
+    ``refers_to`` says in words, by machine, what each of its effects, base and added, is stated relative to; a curve
+    has none.
+    """
 
     version: ModelVersion = field(metadata=INLINED)
     base: Mapping[str, tuple[str, ...]]
     meaning: Mapping[str, str]
+    refers_to: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

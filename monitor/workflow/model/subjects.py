@@ -16,6 +16,7 @@ from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.model import SHARED_BASE, SHARED_BASE_MEANING, Model, chain_of
 from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
+from monitor.workflow.uncertainty.machine_frame import refers_to
 
 Subject = TypeVar("Subject")
 
@@ -28,6 +29,9 @@ class Subjects(Protocol):
 
     def meaning(self, effects: Sequence[str]) -> dict[str, str]:
         """Return the meaning of effects on the first subject that has them; effects that none has are left out."""
+
+    def refers_to(self, effects: Sequence[str]) -> dict[str, dict[str, str]]:
+        """Return what base effects and ``effects`` are stated relative to on each of them that has a chain."""
 
     def canonical(self, effect: str, campaign: str | None) -> str:
         """Return the text of an effect in its own words.
@@ -58,6 +62,9 @@ class Machines:
                 except InputError:
                     continue
         return meaning
+
+    def refers_to(self, effects: Sequence[str]) -> dict[str, dict[str, str]]:
+        return {machine: refers_to((*base, *effects), chain) for machine, chain, base in self._calibrated()}
 
     def canonical(self, effect: str, campaign: str | None) -> str:
         chains = tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(self.db)))
@@ -111,6 +118,9 @@ class Curves:
                 unit, clock = curve.units.get(effect.column, ""), effect.column == curve.time
                 meaning.setdefault(text, describe_curve(effect, curve.response, unit, clock=clock).meaning)
         return meaning
+
+    def refers_to(self, effects: Sequence[str]) -> dict[str, dict[str, str]]:
+        return {}
 
     def canonical(self, effect: str, campaign: str | None) -> str:
         """Return the text as the protocol says; only the curve ``campaign`` counts where it is named."""

@@ -99,6 +99,12 @@ class BallPlanAnswer:
     separate: SeparationAnswer | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
+    @property
+    def new_balls(self) -> dict[str, tuple[float, ...]]:
+        """Return where the proposed balls stand that the campaign does not have, in mm."""
+        places = {} if self.proposed is None else self.proposed.ball_places_mm
+        return {name: position for name, position in places.items() if name not in self.present.balls}
+
 
 @dataclass(frozen=True)
 class ShapeUncertainty:

@@ -65,7 +65,8 @@ class SideBySideRequest:
 class SelectionScatter:
     """Scatter of the ``runs`` of a selection, and the uncertainty of a calibration whose readings scatter so.
 
-    ``condition`` is None for a whole campaign. Numbers by parameter, in its display unit.
+    ``condition`` is None for a whole campaign. Numbers by parameter, in its display unit; ``refers_to`` says in words
+    what a parameter is stated relative to.
     """
 
     campaign: str
@@ -80,6 +81,7 @@ class SelectionScatter:
     u_all: Mapping[str, float]
     u: Mapping[str, float]
     expanded: Mapping[str, float]
+    refers_to: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -94,3 +96,12 @@ class SideBySideAnswer:
     def units(self) -> dict[str, str]:
         """The display unit of every parameter of any selection."""
         return {name: unit for scatter in self.selections.values() for name, unit in scatter.units.items()}
+
+    @property
+    def refers_to(self) -> dict[str, str]:
+        """What every parameter refers to; of selections of machines whose chains differ all that occur."""
+        said: dict[str, set[str]] = {}
+        for scatter in self.selections.values():
+            for name, frame in scatter.refers_to.items():
+                said.setdefault(name, set()).add(frame)
+        return {name: " or ".join(sorted(frames)) for name, frames in said.items()}

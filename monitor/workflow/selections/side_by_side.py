@@ -56,6 +56,7 @@ def _scatter(db: Database, name: str, request: SideBySideRequest) -> SelectionSc
         u_all={parameter: statistics.u_all for parameter, statistics in scatter.parameters.items()},
         u=framework.u,
         expanded=framework.expanded,
+        refers_to=scatter.refers_to,
     )
 
 

@@ -36,7 +36,8 @@ class TargetFigures:
 
 @dataclass(frozen=True)
 class StandardTest:
-    """A test in one ``setup`` and ``run``: ``test`` says which (positioning, diagonal, circle) and ``of`` the axes.
+    """A test in one ``setup`` and ``run``: ``test`` says which (positioning, diagonal, circle,
+    rotation) and ``of`` the axes; two setups, with a comma between, make one of tilt.
 
     ``targets`` are those of a test of positioning, positions in mm or degrees, all else in ``unit``; ``notes`` say what
     the standard asks for and the plan lacks.

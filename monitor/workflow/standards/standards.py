@@ -1,4 +1,4 @@
-"""What ISO 230-2, ISO 230-4 and ISO 230-6 report of the rows of a campaign, with uncertainties."""
+"""What ISO 230-2, ISO 230-4, ISO 230-6 and ISO 230-7 report of the rows of a campaign, with uncertainties."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ import numpy as np
 from monitor.documents import Said
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.methods import campaign_method
-from monitor.methods.method import AxisTest, CircleTest, StandardTests
+from monitor.methods.method import AxisTest, CircleTest, RotationTest, StandardTests
 from monitor.reporting.standard_tests import (
     AXIS_FIGURES,
     FewRunsEachWay,
     LengthWithoutUncertainty,
+    OneRevolution,
     OneSenseOfRotation,
     OneSideApproached,
     circle_figure,
+    rotation_figure,
 )
 from monitor.statistics.standards.circles import Circles, circles
 from monitor.statistics.standards.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
+from monitor.statistics.standards.rotation import error_motion
 from monitor.store import Database
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import make_folder, save_figure
@@ -51,11 +54,12 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
     method = campaign_method(campaign)
     problem = method.problem_of(campaign, method.own_model)
     wanted = [name for name in names if request.setup in (None, name)]
-    of_wanted = [test for test in ability.tests(problem) if test.setup in wanted]
+    of_wanted = [test for test in ability.tests(problem) if set(test.setup.split(", ")) <= set(wanted)]
     if not of_wanted:
         raise DataError(
-            f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4 or -6: a displacement along a travel, an "
-            "angle about the one axis that turns, or a distance swung by two linear axes"
+            f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4, -6 or -7: a displacement along a travel, an "
+            "angle about the one axis that turns, a distance swung by two linear axes, or sensors that stand still "
+            "around the one axis that turns"
         )
     folder = None if request.figures is None else make_folder(request.figures)
     tests: list[StandardTest] = []
@@ -69,15 +73,17 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
         files += drawn
     if request.csv is not None:
         files.append(_written(request.csv, tests))
-    evaluated_setups = {test.setup for test in tests}
+    evaluated_setups = {name for test in tests for name in test.setup.split(", ")}
     left_out = tuple(name for name in wanted if name not in evaluated_setups)
     return StandardsAnswer(campaign.name, request.seed, tuple(tests), left_out, tuple(files))
 
 
 def _evaluated(
-    test: AxisTest | CircleTest, rng: np.random.Generator, folder: Path | None
+    test: AxisTest | CircleTest | RotationTest, rng: np.random.Generator, folder: Path | None
 ) -> tuple[StandardTest, list[str]]:
-    """The figures of a test, and the files of its plot."""
+    """The figures of a test, and the files of its plot; an error motion has none yet."""
+    if isinstance(test, RotationTest):
+        return _rotation_answer(test, rng), []
     if isinstance(test, AxisTest):
         axis = _positioning(test, rng)
         answer = _axis_answer(test, axis)
@@ -177,6 +183,28 @@ def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:
     return StandardTest(
         test.setup, test.run, "circle", plane, MICROMETRE.name, tuple(figures), (), tuple(notes)
     )
+
+
+def _rotation_answer(test: RotationTest, rng: np.random.Generator) -> StandardTest:
+    unit = MICRORADIAN if test.angular else MICROMETRE
+    show = unit.to_display
+    evaluated = error_motion(
+        test.angle, test.deviation, about_circle=test.about_circle, tolerance=ONE_TARGET_RAD,
+        u_reading=test.u_reading, rng=rng,
+    )  # fmt: skip
+    kind = "tilt" if test.angular else "radial" if test.about_circle else "axial"
+    figures = tuple(
+        StandardFigure(
+            *rotation_figure(name, test.error, kind),
+            "ISO 230-7:2015, clause 3",
+            show(getattr(evaluated, name)),
+            show(evaluated.u[name]),
+            unit.name,
+        )
+        for name in ("total", "synchronous", "asynchronous")
+    )
+    notes: tuple[Said, ...] = () if evaluated.revolutions > 1 else (OneRevolution(),)
+    return StandardTest(test.setup, test.run, "rotation", test.axis, unit.name, figures, (), notes)
 
 
 def _axis_figure(test: AxisTest, evaluated: Positioning, answer: StandardTest, folder: Path) -> list[str]:

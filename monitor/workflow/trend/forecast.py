@@ -69,7 +69,7 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, Lack | None]:
     except DataError as error:
         return None, refused(Part.BACKTEST, error)
     return ForecastTest(
-        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
+        forecasts=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias=test.bias, rms=test.rms, unit=piece.unit,
         method=ForecastMethod.DAYS_BY_DAYS_BEFORE,
     ), None  # fmt: skip

@@ -27,12 +27,15 @@ class RunResiduals:
     """RMS in µm of what the model leaves over of the whole campaign, what is expected of it, and of the run by target.
 
     A target that was touched once a run (the bar's) is followed exactly by its own coordinates, and left out.
+    ``lack_of_fit_p`` is that of the test that allows for noise of neighbours; it is made where lack of fit is more of
+    the variance of a parameter than all else, and runs follow one plan.
     """
 
     rms_um: float
     expected_rms_um: float
     something_is_missing: bool
     by_target_um: Mapping[str, float]
+    lack_of_fit_p: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,7 @@ from monitor.workflow.uncertainty.inputs import (
     reading_inputs,
     with_linear_axes,
 )
+from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import Behind, RunUncertainty
 from monitor.workflow.uncertainty.spreading import trials_of
@@ -269,16 +270,20 @@ def uncertainty(db: Database, request: UncertaintyRequest) -> UncertaintyAnswer:
     With ``request.before`` it is stored as ``partial uncertainty``: it is not the result of the whole campaign.
     """
     result = evaluate(db, request)
-    answer = replace(answer_of(result), grounds=_grounds(result, request))
+    answer = answer_of(result)
+    answer = replace(answer, grounds=_grounds(result, answer, request))
     save_uncertainty(db, answer, result.model, request.method, request.before)
     return answer
 
 
-def _grounds(result: RunUncertainty, request: UncertaintyRequest) -> tuple[Ground, ...] | None:
+def _grounds(
+    result: RunUncertainty, answer: UncertaintyAnswer, request: UncertaintyRequest
+) -> tuple[Ground, ...] | None:
     """Determine what speaks against a certificate; None where runs took no part, or no robust fit stands."""
     if request.before is not None:
         return None
     try:
-        return grounds_of(result.campaign, robust_fit(result.fit.problem), result.run)
+        grounds = grounds_of(result.campaign, robust_fit(result.fit.problem), result.run)
     except DataError:
         return None
+    return (*grounds, *lack_in_budget(answer))

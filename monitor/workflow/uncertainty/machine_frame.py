@@ -10,6 +10,7 @@ import numpy as np
 from monitor.documents import OMITTED
 from monitor.machine import Chain, frame_of, machine_frame
 from monitor.records import Array, FrameOfReference
+from monitor.reporting.frames import frame_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,11 @@ def frames_of(parameters: Sequence[str], chain: Chain) -> dict[str, FrameOfRefer
     """What each parameter of the chain is stated relative to; others (of the artefact, of a shape) are left out."""
     frames = {name: frame_of(name, chain) for name in parameters}
     return {name: frame for name, frame in frames.items() if frame is not None}
+
+
+def refers_to(parameters: Sequence[str], chain: Chain) -> dict[str, str]:
+    """What each parameter, or effect, of the chain is stated relative to, in the words of a table."""
+    return {name: frame_words(frame) for name, frame in frames_of(parameters, chain).items()}
 
 
 def in_machine_frame(

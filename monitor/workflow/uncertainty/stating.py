@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.discovery import compare
+from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
 from monitor.machine import Chain
 from monitor.methods.model import chain_of
 from monitor.records import Array, Verdict
@@ -28,6 +29,7 @@ from monitor.workflow.uncertainty.answer import (
     UncertaintyAnswer,
     ValidationAnswer,
 )
+from monitor.workflow.uncertainty.lack_in_budget import decides
 from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer, frames_of, in_machine_frame
 from monitor.workflow.uncertainty.result import RunUncertainty
 
@@ -45,6 +47,7 @@ def answer_of(result: RunUncertainty) -> UncertaintyAnswer:
 def statement(result: RunUncertainty) -> UncertaintyAnswer:
     """As ``answer_of``, without what k = 2 each covers: half a second of sampling that no certificate states."""
     chain = chain_of(result.campaign.machine)
+    framework = _framework(result)
     causes = tuple(LackOfFitCause(effect, probability) for effect, probability in result.causes[:MOST_CAUSES])
     return UncertaintyAnswer(
         campaign=result.campaign.name,
@@ -58,8 +61,8 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         input_covariance=covariance_sentence(result.covariance_source),
         input_covariance_source=result.covariance_source,
         refused=tuple(map(refused_parameters, result.refused)),
-        residuals=_residuals(result),
-        guf=_framework(result),
+        residuals=_residuals(result, framework),
+        guf=framework,
         frames=frames_of(result.framework.names, chain),
         machine_frame=_in_machine_frame(result, chain),
         lack_of_fit_causes=causes or None,
@@ -175,7 +178,7 @@ def _rms(vectors: Array) -> float:
     return MICROMETRE.to_display(float(np.sqrt(np.mean(vectors**2))))
 
 
-def _residuals(result: RunUncertainty) -> RunResiduals:
+def _residuals(result: RunUncertainty, framework: FrameworkAnswer) -> RunResiduals:
     compared = compare(result.fit, result.campaign.name, result.model.name)
     context, vectors = result.fit.problem.context, result.fit.vectors
     of_run = context.run == result.run
@@ -185,4 +188,5 @@ def _residuals(result: RunUncertainty) -> RunResiduals:
         expected_rms_um=MICROMETRE.to_display(compared.expected_rms),
         something_is_missing=compared.verdict is Verdict.SOMETHING_IS_MISSING,
         by_target_um={name: _rms(vectors[rows]) for name, rows in touched.items() if int(np.sum(rows)) > 1},
+        lack_of_fit_p=beyond_neighbours(result.fit) if decides(framework) else None,
     )

@@ -7,11 +7,10 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.machine import Chain
 from monitor.records import Array
-from monitor.reporting.frames import frame_words
 from monitor.reporting.svg.map_slices import Slice, slices_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import label
-from monitor.workflow.uncertainty.machine_frame import frames_of
+from monitor.workflow.uncertainty.machine_frame import refers_to
 from monitor.workflow.volumetric.answer import (
     LeftOutOfMap,
     MapLength,
@@ -59,10 +58,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         least_certain=_point(mapped, error.least_certain, k),
         by_pose=tuple(_pose(mapped, number) for number in range(len(mapped.poses))),
         slices=_slices(mapped, k),
-        refers_to={
-            name: frame_words(frame)
-            for name, frame in frames_of((*error.names, *mapped.left_out), chain).items()
-        },
+        refers_to=refers_to((*error.names, *mapped.left_out), chain),
         vectors_refer_to=VECTORS,
     )
 

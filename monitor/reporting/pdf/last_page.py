@@ -1,0 +1,69 @@
+"""Keeps the last page of a document from being more than half empty, by breaks that leave each page half full.
+
+A template marks what may begin a page by ids that start with ``break-`` (or ``machine-``), and its end by the id
+``end``. WeasyPrint tells where these stand; the document is then laid out once more with one or two breaks set by hand.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+from monitor.reporting.pdf.layout_engine import Document
+
+#: What may begin a page.
+_MAY_BEGIN = ("break-", "machine-")
+#: Margins at head and foot as a part of a page's height (17 to 19 mm of 297 mm), and what they leave.
+_MARGIN = 0.062
+_ROOM = 1.0 - 2.0 * _MARGIN
+#: A page is half full where its text reaches the middle of the sheet.
+_HALF = 0.5
+
+
+def ends_early(document: Document) -> bool:
+    """Return whether the last of several pages is less than half full."""
+    last = document.pages[-1]
+    return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < _HALF * last.height
+
+
+def filling_breaks(document: Document) -> tuple[str, ...]:
+    """Return the ids that should begin the last page, or the last two, so that the emptiest is as full as can be.
+
+    Empty where no breaks leave all of them half full, as far as can be told from where things stand now.
+    """
+    for count in (1, 2):
+        if len(document.pages) > count:
+            best = _breaks(document, count)
+            if best:
+                return best
+    return ()
+
+
+def with_breaks_before(html: str, names: tuple[str, ...]) -> str:
+    """Return a page in which each of what has these ids begins a page."""
+    rules = "".join(f"#{name} {{ break-before: page; margin-top: 0; }}" for name in names)
+    return html.replace("</style>", f"{rules}</style>", 1)
+
+
+def _breaks(document: Document, count: int) -> tuple[str, ...]:
+    """The best ``count`` breaks before the last page: each begins a page of the last ``count``."""
+    begins, end = _strip(document, count + 1)
+    best: tuple[float, tuple[str, ...]] = (0.0, ())
+    for names in combinations(begins, count):
+        heights = [
+            after - before for before, after in pairwise([0.0, *(begins[name] for name in names), end])
+        ]
+        if max(heights) <= _ROOM:
+            best = max(best, (min(heights), names))
+    return best[1] if best[0] + _MARGIN >= _HALF else ()
+
+
+def _strip(document: Document, count: int) -> tuple[dict[str, float], float]:
+    """Where the breaks and the end stand on a strip of the last ``count`` pages without margins, in pages."""
+    begins: dict[str, float] = {}
+    for at, page in enumerate(document.pages[-count:]):
+        for name, corners in page.anchors.items():
+            if name.startswith(_MAY_BEGIN):
+                begins[name] = at * _ROOM + corners[1] / page.height - _MARGIN
+    last = document.pages[-1]
+    end = (count - 1) * _ROOM + last.anchors["end"][1] / last.height - _MARGIN
+    return dict(sorted(begins.items(), key=lambda begin: begin[1])), end
