@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from monitor.cli.configuration import configuration
+from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError, NotFoundError
 
 if TYPE_CHECKING:
@@ -72,6 +73,8 @@ def _server(options: Namespace, tolerances: Any) -> Server | None:
 
         file = options.server_token or os.environ.get("MONITOR_SERVER_TOKEN_FILE")
         token = os.environ.get("MONITOR_SERVER_TOKEN") if not file else token_in(Path(file))
+        if file:
+            warn_of_readers(Path(file))
         return Server(address_of_server(options.server), token, tolerances=tolerances)
     note = served_by(options.db)
     if note is None:

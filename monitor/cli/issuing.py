@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from datetime import date
 from pathlib import Path
@@ -14,6 +13,7 @@ from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.configuration import configuration
 from monitor.cli.parser import add_model
+from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.grounds import GroundKind
@@ -212,20 +212,11 @@ def _key(options: Namespace) -> Key | None:
     )
 
 
-def _warn_of_readers(file: Path) -> None:
-    """Say where others than its owner may read a secret."""
-    if os.stat(file).st_mode & 0o077:
-        print(
-            f"monitor: {file} holds a secret and may be read by others than its owner; `chmod 600` keeps them out",
-            file=sys.stderr,
-        )
-
-
 def _passphrase(file: Path | None) -> str | None:
     if file is None:
         return None
     try:
-        _warn_of_readers(file)
+        warn_of_readers(file)
         return (read_bounded(file, LARGEST_SETTINGS).decode("utf-8").splitlines() or [""])[0]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"the passphrase file {file} cannot be read: {error}") from error

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
@@ -21,6 +23,7 @@ BLOCK_SIZE = 65536
 _UNFINISHED = ".new"
 #: A new database is its owner's alone; whoever wants a group to use it changes the mode, and log and lock follow it.
 _MODE = 0o600
+_MASK = threading.Lock()
 
 
 def connect(
@@ -104,7 +107,8 @@ def is_missing(path: str) -> bool:
 def _make(path: str, partial: str) -> None:
     _remove(partial)
     try:
-        connection = connect(partial, False, None)
+        with private_files():
+            connection = connect(partial, False, None)
         try:
             os.chmod(partial, _MODE)
             migrations.migrate(connection, migrations.available())
@@ -119,6 +123,21 @@ def _make(path: str, partial: str) -> None:
         ) from fault
     finally:
         _remove(partial)
+
+
+@contextlib.contextmanager
+def private_files() -> Iterator[None]:
+    """Let files that are made in this block be their owner's alone from their first moment.
+
+    DuckDB attaches no empty file, so it makes its own, with the mode that the process gives all its files: who opened
+    one before its mode is changed could read on. The mask is of the whole process: one block at a time, for a moment.
+    """
+    with _MASK:
+        before = os.umask(0o077)
+        try:
+            yield
+        finally:
+            os.umask(before)
 
 
 def make_log(path: str) -> None:

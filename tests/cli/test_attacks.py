@@ -253,3 +253,23 @@ def test_a_passphrase_that_all_may_read_is_warned_of(typed: Any, db: Path, tmp_p
         said = typed(*words, "--passphrase-file", secret, db=db)
         assert said.status == 2
         assert ("may be read by others than its owner" in said.err) is warned
+
+
+def test_a_password_or_token_that_all_may_read_is_warned_of(typed: Any, db: Path, tmp_path: Path) -> None:
+    secret, mail = tmp_path / "password", tmp_path / "mail.toml"
+    secret.write_text("hunter2\n")
+    mail.write_text(
+        '[mail]\nserver = "127.0.0.1"\nport = 1\nsecurity = "tls"\nuser = "x"\npassword_file = "password"\n'
+        'from = "a@example.org"\nto = ["b@example.org"]\n'
+    )
+    asked = (
+        (("report", "--week", "2026-W60", "--out", tmp_path / "out", "--mail", mail), db),
+        (("campaigns", "--server", "http://127.0.0.1:1", "--server-token", secret), None),
+    )
+    for words, database in asked:
+        for mode, warned in ((0o644, True), (0o600, False)):
+            secret.chmod(mode)
+            said = typed(*words, db=database)
+            assert said.status == 2
+            assert (f"{secret} holds a secret and may be read by others" in said.err) is warned, said.err
+            assert "hunter2" not in said.err + said.out

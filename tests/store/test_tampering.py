@@ -3,10 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from monitor.store import Database, verify_audit
+from monitor.readers import read_campaign
+from monitor.records import Campaign, CurveCampaign
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    clear_refusals,
+    import_campaign,
+    import_curve,
+    record_refusal,
+    save_analysis,
+    save_identification,
+    save_machine_model,
+    save_selection,
+    verify_audit,
+    withdraw_campaign,
+)
 
 #: Nothing that is reported depends on when a schema came or a machine was first seen.
 NOT_SEEN = {
@@ -35,7 +52,35 @@ _OTHER = {
     "TIMESTAMP[]": "list_append({0}, TIMESTAMP '2020-01-01')",
     "BOOLEAN[]": "list_append({0}, true)",
     "MAP(VARCHAR, DOUBLE)": "MAP {{'x': 1.0}}",
+    "MAP(VARCHAR, VARCHAR)": "MAP {{'x': 'y'}}",
 }
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+@pytest.fixture
+def all_tables(
+    something_of_everything: Database,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Database:
+    """A database with a row in every table."""
+    db = something_of_everything
+    three = make_campaign("three")
+    import_campaign(db, three, ("looks like inches",))
+    identification = replace(make_identification(three), refers_to={"EA0B": "the axis C"})
+    save_identification(db, identification)
+    save_analysis(db, "trend", {"a": 1}, method="guf", machine=three.machine.id)
+    withdraw_campaign(db, "two", "wrong balls")
+    curve = read_campaign(EXAMPLES / "load-cell")
+    assert isinstance(curve, CurveCampaign)
+    import_curve(db, curve)
+    record_refusal(db, "folder", ["no runs.csv"], campaign="four", machine=three.machine.id)
+    clear_refusals(db, "folder", "four")
+    save_selection(db, "three", "first", "run = 1", [1])
+    save_machine_model(db, three.machine.id, "samba", ("samba", 1), "it has no B")
+    return db
 
 
 def _columns(db: Database) -> list[tuple[str, str, str]]:
@@ -46,11 +91,13 @@ def _columns(db: Database) -> list[tuple[str, str, str]]:
 
 
 def test_every_column_of_every_table_is_verified(
-    something_of_everything: Database, seeds: Callable[[int, int], range]
+    all_tables: Database, seeds: Callable[[int, int], range]
 ) -> None:
     """A cell of each column is altered, alone; `make test` takes every eighth column, `make trials` all."""
-    db = something_of_everything
+    db = all_tables
     assert verify_audit(db).faults == ()
+    names = {table: db.rows(f'SELECT count(*) FROM "{table}"') for table, _, _ in _columns(db)}
+    assert [table for table, count in names.items() if count == [(0,)]] == [], "fill them above"
     unseen, empty = set(), set()
     step = 16 // len(seeds(16, 2))
     for table, column, kind in _columns(db)[5::step] if step > 1 else _columns(db):
@@ -74,7 +121,7 @@ def test_every_column_of_every_table_is_verified(
             db.execute("ROLLBACK")
     assert unseen <= NOT_SEEN | SEEN_AT_OPENING
     # What no row of this database has cannot be tried; it is little.
-    assert len(empty) <= 30, sorted(empty)
+    assert len(empty) <= 12, sorted(empty)
 
 
 @pytest.mark.parametrize(

@@ -29,13 +29,26 @@ def options(parser: ArgumentParser) -> None:
         action="store_true",
         help="for l-shape: one run step by step as well, beside the fit of all at once, and why they differ",
     )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="without a campaign: processes that identify (default: this one)",
+    )
+    parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="without a campaign: a Dask cluster, such as tcp://host:8786"
+    )
 
 
 def run(options: Namespace) -> int:
+    if options.campaign is None and not options.stepwise:
+        return _all(options)
+    if options.workers is not None or options.cluster is not None:
+        raise InputError(
+            "--workers and --cluster spread many campaigns: leave the campaign out to identify all"
+        )
     if options.stepwise:
         return _stepwise(options)
-    if options.campaign is None:
-        return _all(options)
     with opened(options) as db, output.working("identifying"):
         answer = ask(db, identify, IdentifyRequest(options.campaign, options.model, options.number))
     if options.json:
@@ -49,10 +62,11 @@ def _all(options: Namespace) -> int:
     """Identify every campaign; exit status 2 where one could not be."""
     if options.number is not None:
         raise InputError(f"--run {options.number} is a run of one campaign: name it")
+    request = IdentifyAllRequest(options.model, options.workers, options.cluster)
     with opened(options) as db:
         total = len(ask(db, campaigns).campaigns)
         with output.stepping("identifying", total) as progress:
-            answer = ask(db, identify_all, IdentifyAllRequest(options.model), progress=progress)
+            answer = ask(db, identify_all, request, progress=progress)
     if options.json:
         output.document(answer)
     else:

@@ -13,6 +13,7 @@ from monitor.cli import output
 from monitor.cli.configuration import configuration
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
+from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
 from monitor.workflow.health.mail import mail_report, read_mail_settings
 from monitor.workflow.health.report import report
@@ -45,6 +46,9 @@ def options(parser: ArgumentParser) -> None:
         "for few machines)",
     )  # fmt: skip
     parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786"
+    )
+    parser.add_argument(
         "--fail-on-alarm",
         action="store_true",
         help="exit status 1 where a machine is, or may be, out of tolerance",
@@ -67,13 +71,18 @@ def run(options: Namespace) -> int:
                 "--mail FILE: name a file, or write one as mail into the configuration (monitor.toml)"
             )
     if options.mail is not None:
-        read_mail_settings(options.mail)  # what is wrong with it is said before the work, not after
+        settings = read_mail_settings(
+            options.mail
+        )  # what is wrong with it is said before the work, not after
+        if settings.password_file is not None and settings.password_file.exists():
+            warn_of_readers(settings.password_file)
     request = ReportRequest(
         options.week,
         options.machine,
         options.out,
         ReportOptions(options.model, tuple(options.campaign), options.risk),
         options.workers,
+        cluster=options.cluster,
     )
     with opened(options, threads=1, judging=True) as db:
         total = 1 if options.machine else len(ask(db, machines).rows)

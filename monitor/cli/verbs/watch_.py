@@ -17,6 +17,7 @@ from monitor.cli import output
 from monitor.cli.configuration import configuration
 from monitor.cli.database import opened_file, refuse_server
 from monitor.cli.parser import common
+from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -67,7 +68,9 @@ def run(options: Namespace) -> int:
         if options.mail is None:
             raise InputError("--mail FILE: name a file, or write one as mail into the configuration")
     if options.mail is not None:
-        read_mail_settings(options.mail)
+        settings = read_mail_settings(options.mail)
+        if settings.password_file is not None and settings.password_file.exists():
+            warn_of_readers(settings.password_file)
     request = WatchRequest(options.folder, options.rest, options.out, options.mail)
     if options.once:
         return _look(options, request)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -69,9 +70,12 @@ def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -
         span,
     )
     path = manifest_of(partial)
-    path.write_text(json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    for file in (partial, path):
-        sync(file)
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
+        file.write(json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n")
+    # Who may read the backup may read what it has to be compared with.
+    os.chmod(path, stat.S_IMODE(os.stat(partial).st_mode))
+    for written in (partial, path):
+        sync(written)
     return backup
 
 

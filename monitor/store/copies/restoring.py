@@ -133,8 +133,9 @@ def _put_together(folder: Path, chain: tuple[Backup, ...], partial: Path) -> Non
     for name, backup in zip(names, chain, strict=True):
         if file_sha256(folder / name) != backup.sha256:
             raise _differs(folder / name, "its SHA-256 differs")
+    # Its owner's alone before anything is in it.
+    os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     shutil.copyfile(folder / names[0], partial)
-    os.chmod(partial, 0o600)
     if file_sha256(partial) != chain[0].sha256:
         raise _differs(folder / names[0], "its SHA-256 differs")
     # Neither brought to the present schema nor to another file format: the next verb that may write does that.

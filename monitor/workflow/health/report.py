@@ -10,7 +10,7 @@ import json
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from datetime import UTC, date, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -41,9 +41,9 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.store.catalogue import check_machine
-from monitor.uncertainty.workers.engine import Engine, Here, in_order
-from monitor.uncertainty.workers.processes import processes
+from monitor.uncertainty.workers.engine import Engine, in_order
 from monitor.workflow.certificate.files import why_not
+from monitor.workflow.engines import engine_of
 from monitor.workflow.health.machine import MachineName, MachineWeek, machine_health, read_week
 from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
@@ -84,7 +84,7 @@ def report(
             f"the report cannot be written to {request.out}: {why_not(request.out, error)}"
         ) from error
     moment = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
-    with _engine(request.workers, len(machines)) as engine:
+    with _engine(request, len(machines)) as engine:
         rows = _reported(db, machines, week, request, engine, progress)
         # Once all runs of the week are identified.
         looks = weekly_notices(db, week).of_machines({row.machine for row, _ in rows}, week.name)
@@ -130,13 +130,15 @@ def _selected(db: Database, every: list[MachineName], request: ReportRequest) ->
     return [name for name in every if machine in (None, name.machine) and name.machine in measured]
 
 
-def _engine(workers: int | None, machines: int) -> AbstractContextManager[Engine]:
+def _engine(request: ReportRequest, machines: int) -> AbstractContextManager[Engine]:
     """Where to compute: no more processes than machines, and none beside this one where it would be the only one."""
+    if request.cluster is not None:
+        return engine_of(None, request.cluster)
+    workers = request.workers
     if workers is None:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         workers = min(cores, MOST_WORKERS, machines // MACHINES_A_WORKER)
-    count = min(workers, machines)
-    return nullcontext(Here()) if count <= 1 else processes(count)
+    return engine_of(max(1, min(workers, machines)), None)
 
 
 def _reported(

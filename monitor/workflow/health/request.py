@@ -10,6 +10,7 @@ from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.reporting.weekly_notice import WeeklyNotices
+from monitor.workflow.engines import check_workers
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class ReportRequest:
 
     ``week`` like ``2026-W10``, by default the last that has ended at ``made_at`` (by default now). Files go to ``out``
     (made where there is none). ``workers`` processes compute, by default as many as there are cores and the fleet
-    occupies; the results do not depend on it.
+    occupies, or the workers of the Dask cluster at ``cluster``; the results do not depend on it.
     """
 
     week: str | None = None
@@ -40,10 +41,10 @@ class ReportRequest:
     options: ReportOptions = field(default_factory=ReportOptions)
     workers: int | None = None
     made_at: datetime | None = None
+    cluster: str | None = None
 
     def __post_init__(self) -> None:
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}: at least one worker is needed")
+        check_workers(self.workers, self.cluster)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
 from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
-from monitor.records import CurveCampaign
-from monitor.store import Database, save_analysis, save_identification
+from monitor.records import Campaign, CurveCampaign
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    StoredModel,
+    save_analysis,
+    save_identification,
+)
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
@@ -17,30 +27,55 @@ from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve, resolve_for
 
 
+@dataclass(frozen=True)
+class Identified:
+    """What was identified: the answer, and of a machine what is stored of it."""
+
+    answer: IdentifyAnswer
+    stored: StoredIdentification | None
+
+
 def identify(db: Database, request: IdentifyRequest) -> IdentifyAnswer:
     """Identify a campaign, or one of its runs, under a model, and store the result.
 
     Raises NotFoundError, DataError where the readings do not suffice, EffectError for a model that the machine
     does not have.
     """
+    measured, model = read(db, request)
+    return store(db, measured, model, compute(measured, model))
+
+
+def read(db: Database, request: IdentifyRequest) -> tuple[Campaign | CurveCampaign, StoredModel]:
+    """What is to be identified, and the model. Raises NotFoundError, and DataError for a run that there is not."""
     measured = load_measured(db, request.campaign)
     if isinstance(measured, CurveCampaign):
-        return _identify_curve(db, measured, request)
+        if request.run not in (None, 1):
+            raise DataError(f"campaign {measured.name} is a curve with one run, number 1, not {request.run}")
+        return measured, resolve(db, request.model, measured.method)
     campaign = measured if request.run is None else only_run(measured, request.run)
-    identification, stored = identified(
-        campaign, resolve_for(db, request.model, campaign.method, campaign.machine.id)
-    )
-    save_identification(db, stored)
-    return machine_answer(campaign.machine, identification)
+    return campaign, resolve_for(db, request.model, campaign.method, campaign.machine.id)
 
 
-def _identify_curve(db: Database, curve: CurveCampaign, request: IdentifyRequest) -> IdentifyAnswer:
-    if request.run not in (None, 1):
-        raise DataError(f"campaign {curve.name} is a curve with one run, number 1, not {request.run}")
-    model = resolve(db, request.model, curve.method)
-    answer = curve_answer(campaign_method(curve).fit(curve_problem(curve, model)), label(model))
-    save_analysis(
-        db, "identification", to_document(answer), method=curve.method, campaign=curve.name,
-        model=model.name, model_version=model.version,
-    )  # fmt: skip
-    return answer
+def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identified:
+    """Identify without the database, so that any process can. Raises DataError and EffectError as ``identify``."""
+    # One thread wherever it is computed: with several the linear algebra may round otherwise.
+    with threadpool_limits(1, "blas"):
+        if isinstance(measured, CurveCampaign):
+            fit = campaign_method(measured).fit(curve_problem(measured, model))
+            return Identified(curve_answer(fit, label(model)), None)
+        identification, stored = identified(measured, model)
+        return Identified(machine_answer(measured.machine, identification), stored)
+
+
+def store(
+    db: Database, measured: Campaign | CurveCampaign, model: StoredModel, result: Identified
+) -> IdentifyAnswer:
+    """Store what was identified; the answer."""
+    if result.stored is not None:
+        save_identification(db, result.stored)
+    else:
+        save_analysis(
+            db, "identification", to_document(result.answer), method=measured.method, campaign=measured.name,
+            model=model.name, model_version=model.version,
+        )  # fmt: skip
+    return result.answer
