@@ -25,6 +25,7 @@ Branch = Literal["work", "tool"]
 
 #: ISO 841: X, Y, Z and U, V, W, parallel to them, are linear axes; A, B, C turn.
 LINEAR_LETTERS = "XYZUVW"
+VOLUMETRIC = "volumetric"  #: Among the tolerances, the limit of the longest error vector over the strokes.
 
 
 class ValidationVerdict(StrEnum):
@@ -94,8 +95,7 @@ def topology_of(axes: Sequence[ChainAxis]) -> str:
     return " ".join(["w", *reversed(work), "b", *tool, "t"])
 
 
-#: ISO 10791-6 puts H or V (the spindle is horizontal or vertical) and brackets around the structural code, a prime
-#: behind axes on the work side, and S for the spindle.
+#: ISO 10791-6: H or V (horizontal or vertical spindle), then the code in brackets, a prime behind work axes, S.
 _STRUCTURAL_CODE = re.compile(r"\s*(?P<spindle>[HV])?\s*\[(?P<chain>[^\[\]]*)\]\s*")
 _SPINDLE = re.compile(r"\(?S\d*\)?(?=\s*t)")
 

@@ -30,6 +30,7 @@ GROUND = {
     "sources",
     "bounded",
     "stopping",
+    "on_demand",
     "group_sums",
 }
 

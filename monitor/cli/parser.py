@@ -172,6 +172,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="the file that holds your token of that server (else $MONITOR_SERVER_TOKEN_FILE, else the token itself in "
         "$MONITOR_SERVER_TOKEN)",
     )  # fmt: skip
+    # People write these before the verb as well as behind it.
+    first.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
+    first.add_argument("--quiet", action="store_true", help=argparse.SUPPRESS)
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
     first.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
@@ -194,6 +197,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options = parser.parse_args(head.rest, database)
     if not hasattr(options, "run"):
         options.run = run
+    options.json, options.quiet = options.json or head.json, options.quiet or head.quiet
     options.wait = seconds_to_wait(options.wait)
     _choose_server(head.verb, options)
     if options.server is not None:

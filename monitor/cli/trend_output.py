@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.reporting.lacks import Undecided
-from monitor.reporting.weekly_notice import weekly_sentence
-from monitor.workflow.history.weekly_looks import WeeklyNotices
+from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,

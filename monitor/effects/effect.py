@@ -18,13 +18,11 @@ from monitor.effects.change import Change
 from monitor.effects.context import Context
 from monitor.effects.driver import Driver
 from monitor.effects.drivers import Always, SettlingDriver, parse_driver
-from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS
-from monitor.effects.instrument import InstrumentChange, parse_instrument
+from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS, InstrumentChange, parse_instrument
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape, Shape
 from monitor.effects.shapes import Compliance, Const, Nodes, Poly, parse_shape
-from monitor.effects.turns import HEADS as TURN_HEADS
-from monitor.effects.turns import Turn, parse_turn, unknown_turn
+from monitor.effects.turns import HEADS as TURN_HEADS, Turn, parse_turn, unknown_turn
 from monitor.effects.weight import weight_driver
 from monitor.exceptions import EffectError
 from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term

@@ -35,6 +35,9 @@ def methods() -> Mapping[str, ChainMethod | CurveMethod]:
 
 def method_named(name: str) -> ChainMethod | CurveMethod:
     """The method of that name; DataError lists those that are known."""
+    built_in = _built_in_named(name)
+    if built_in is not None:
+        return built_in
     if name not in methods():
         raise DataError(f"method '{name}' cannot be identified yet; these can: {', '.join(methods())}")
     return methods()[name]
@@ -59,6 +62,17 @@ def require(ability: Able | Unable, campaign: Campaign | CurveCampaign, verb: st
         raise DataError(
             f"{verb} has no answer for campaign {campaign.name}, which was measured by {campaign.method}: {ability.why}"
         )
+
+
+def _built_in_named(name: str) -> ChainMethod | CurveMethod | None:
+    """The built-in method in the folder of its name, without loading the others; None where there is none."""
+    folder = name.replace("-", "_")
+    module = f"monitor.methods.{folder}"
+    spec = find_spec(module) if folder.isidentifier() else None
+    if spec is None or not spec.submodule_search_locations or find_spec(f"{module}.method") is None:
+        return None
+    method = _checked(importlib.import_module(f"{module}.method").METHOD, module)
+    return method if method.name == name else None
 
 
 def _built_in() -> Iterator[ChainMethod | CurveMethod]:

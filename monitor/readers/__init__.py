@@ -8,8 +8,7 @@ plug-ins come through the entry points of the group ``monitor.readers``.
 
 from monitor.readers.doubts import doubts
 from monitor.readers.folder_names import names_in
-from monitor.readers.formats.export_1 import files_in
-from monitor.readers.formats.export_1 import recognises as is_export_folder
+from monitor.readers.formats.export_1 import files_in, recognises as is_export_folder
 from monitor.readers.linear_axes import read_linear_axes
 from monitor.readers.mapping.mapping_file import FILE as MAPPING
 from monitor.readers.mapping.reading import Exports, read_exports

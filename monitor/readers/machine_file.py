@@ -10,7 +10,7 @@ from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
 from monitor.readers.chain_tables import read_chain, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.toml_table import Table
-from monitor.records import AxisSettings, ChainAxis, Machine, plain_topology, topology_of
+from monitor.records import VOLUMETRIC, AxisSettings, ChainAxis, Machine, plain_topology, topology_of
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
 TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
@@ -150,10 +150,6 @@ def _stroke(table: Table, axis: Axis) -> tuple[float, float] | None:
         table.fault(key, f"{low:g} is not below {high:g}; write {key} = [lowest, highest]")
         return None
     return low, high
-
-
-#: The limit of the volumetric error, the longest error vector over the strokes, beside those of the terms.
-VOLUMETRIC = "volumetric"
 
 
 def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from monitor.documents import OMITTED
@@ -31,6 +32,29 @@ class WeeklyNotice:
     since: str
     size: float | None = field(default=None, metadata=OMITTED)
     unit: str | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class WeeklyNotices:
+    """Every notice up to a week, in the order of time.
+
+    ``expected_false`` of them are false at most, on average, which is kept below ``false_discovery_rate`` of all (or of
+    one, before the first). ``weeks`` with runs were looked at, ``series`` (parameters and vectors) in the last of them.
+    """
+
+    false_discovery_rate: float
+    weeks: int
+    machines: int
+    series: int
+    expected_false: float
+    notices: tuple[WeeklyNotice, ...]
+
+    def of_machines(self, machines: Collection[str], week: str | None = None) -> WeeklyNotices:
+        """The same with the notices of some machines only, of one week or of all."""
+        part = (
+            notice for notice in self.notices if notice.machine in machines and week in (None, notice.week)
+        )
+        return replace(self, notices=tuple(part))
 
 
 def weekly_sentence(notice: WeeklyNotice) -> str:

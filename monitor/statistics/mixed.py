@@ -121,7 +121,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         """Triangle (q, q), coefficients, chi-square and its slope for t² = ``variance`` in units of s²."""
         rows = outer / np.sqrt(1.0 + variance * total)[:, np.newaxis]
         triangle = _triangle(np.vstack([inner, rows]))
-        coefficients = scipy.linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
+        coefficients: Array = np.asarray(np.linalg.solve(triangle[:q, :q], triangle[:q, q]))
         between_days = (rows[:, q] - rows[:, :q] @ coefficients) ** 2
         within_days = ((inner[:, q] - inner[:, :q] @ coefficients) ** 2).sum()
         slope = (between_days * total / (1.0 + variance * total)).sum()
@@ -141,7 +141,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
             triangle, coefficients, chi_square, slope = solve(variance)
             if chi_square - goal <= 1e-13 * goal or step <= 1e-14 * variance or variance == most:
                 break
-    inverse = scipy.linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
+    inverse = np.linalg.solve(triangle, np.eye(q))
     unscaled = inverse @ inverse.T
     factor = chi_square / (n - q)
     within_part = ((inner[:, :q] @ unscaled) ** 2).sum(axis=0) / np.diag(unscaled)

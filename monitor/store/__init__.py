@@ -5,228 +5,229 @@ argument. People who query with SQL start from the views ``v_*``; every table an
 its unit. Only this room imports duckdb.
 """
 
-from monitor.store.analyses import (
-    StoredAnalysis,
-    analysis_text,
-    check_analysis,
-    latest_documents,
-    latest_maps,
-    load_analysis,
-    save_analysis,
-    stored_analyses,
-)
-from monitor.store.archiving import Archived, archive_faults, archive_files, archived_count
-from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_anchor, last_entries
-from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
-from monitor.store.catalogue import (
-    CampaignRow,
-    RunRow,
-    WithdrawnCampaign,
-    check_machine,
-    described_machines,
-    list_campaigns,
-    list_runs,
-    list_withdrawn,
-)
-from monitor.store.certificates import (
-    StoredCertificate,
-    certificate_numbers,
-    find_certificate,
-    list_certificates,
-    load_certificate,
-    mark_certificate,
-    save_certificate,
-)
-from monitor.store.connection import Database
-from monitor.store.copies.backup import take_backup
-from monitor.store.copies.compaction import Compaction, compact
-from monitor.store.copies.export import export_tables
-from monitor.store.copies.increment import take_increment
-from monitor.store.copies.manifest import Backup, list_backups
-from monitor.store.copies.restoring import Restored, restore
-from monitor.store.copies.workbook import export_workbook
-from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.database_name import check_database_name
-from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
-from monitor.store.identifications import (
-    identification_by_number,
-    identification_numbers,
-    last_identification,
-    load_identification,
-    save_identification,
-)
-from monitor.store.import_notes import campaign_notes, run_fingerprints
-from monitor.store.machine_models import (
-    MachineModel,
-    followed_by,
-    machine_model,
-    machine_models,
-    machines_of_method,
-    not_identified,
-    save_machine_model,
-)
-from monitor.store.models import (
-    StoredModel,
-    last_used_campaign,
-    list_models,
-    load_model,
-    model_history,
-    next_version,
-    save_model,
-)
-from monitor.store.past.fleet import BlockCut, FleetSums, fleet_sums
-from monitor.store.past.history import MachineHistory, latest_tolerances, machine_history, tolerance_types
-from monitor.store.past.machine_runs import (
-    MachineDescription,
-    RecordedRun,
-    campaign_machines,
-    campaign_tolerances,
-    check_campaigns,
-    identified_runs,
-    latest_frames,
-    machine_descriptions,
-    machine_runs,
-    parameter_frames,
-    probing_counts,
-)
-from monitor.store.recalling import Recalled
-from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
-from monitor.store.results import StoredIdentification, StoredRun
-from monitor.store.selections import (
-    SelectionRow,
-    StoredSelection,
-    find_selection,
-    list_selections,
-    save_selection,
-)
-from monitor.store.sharing import SharedDatabase, one_at_a_time
-from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
-from monitor.store.turns import Holder, Patience
-from monitor.store.type_tolerances import type_in_use
-from monitor.store.verification import Verification, verify_audit
-from monitor.store.withdrawals import Withdrawal, withdraw_campaign
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "NOTE",
-    "Archived",
-    "AuditEntry",
-    "Backup",
-    "BlockCut",
-    "CampaignRow",
-    "Compaction",
-    "Database",
-    "FleetSums",
-    "Holder",
-    "Imported",
-    "MachineDescription",
-    "MachineEvent",
-    "MachineHistory",
-    "MachineModel",
-    "Patience",
-    "QueryResult",
-    "Recalled",
-    "RecordedRun",
-    "Restored",
-    "RunRow",
-    "SelectionRow",
-    "SharedDatabase",
-    "StoredAnalysis",
-    "StoredCertificate",
-    "StoredEvent",
-    "StoredIdentification",
-    "StoredModel",
-    "StoredRefusal",
-    "StoredRun",
-    "StoredSelection",
-    "Verification",
-    "Withdrawal",
-    "WithdrawnCampaign",
-    "analysis_text",
-    "anchored_entry",
-    "archive_faults",
-    "archive_files",
-    "archived_count",
-    "campaign_machines",
-    "campaign_notes",
-    "campaign_readings",
-    "campaign_tolerances",
-    "certificate_numbers",
-    "chain_faults",
-    "check_analysis",
-    "check_campaigns",
-    "check_database_name",
-    "check_machine",
-    "clear_refusals",
-    "column_comments",
-    "compact",
-    "curve_names",
-    "described_machines",
-    "export_tables",
-    "export_workbook",
-    "find_certificate",
-    "find_selection",
-    "fleet_sums",
-    "followed_by",
-    "identification_by_number",
-    "identification_numbers",
-    "identified_runs",
-    "import_campaign",
-    "import_curve",
-    "is_curve",
-    "last_anchor",
-    "last_entries",
-    "last_identification",
-    "last_used_campaign",
-    "latest_documents",
-    "latest_frames",
-    "latest_maps",
-    "latest_tolerances",
-    "list_backups",
-    "list_campaigns",
-    "list_certificates",
-    "list_events",
-    "list_machines",
-    "list_models",
-    "list_runs",
-    "list_selections",
-    "list_withdrawn",
-    "load_analysis",
-    "load_campaign",
-    "load_certificate",
-    "load_curve",
-    "load_identification",
-    "load_model",
-    "machine_descriptions",
-    "machine_events",
-    "machine_history",
-    "machine_model",
-    "machine_models",
-    "machine_runs",
-    "machines_of_method",
-    "mark_certificate",
-    "model_history",
-    "next_version",
-    "not_identified",
-    "one_at_a_time",
-    "parameter_frames",
-    "probing_counts",
-    "record_event",
-    "record_refusal",
-    "refusals",
-    "restore",
-    "run_fingerprints",
-    "run_query",
-    "save_analysis",
-    "save_certificate",
-    "save_identification",
-    "save_machine_model",
-    "save_model",
-    "save_selection",
-    "stored_analyses",
-    "take_backup",
-    "take_increment",
-    "tolerance_types",
-    "type_in_use",
-    "verify_audit",
-    "withdraw_campaign",
-]
+from monitor.on_demand import on_demand
+from monitor.store.machine_models import (
+    MachineModel as MachineModel,
+    followed_by as followed_by,
+    machine_model as machine_model,
+    machine_models as machine_models,
+    machines_of_method as machines_of_method,
+    not_identified as not_identified,
+    save_machine_model as save_machine_model,
+)
+from monitor.store.refusals import (
+    StoredRefusal as StoredRefusal,
+    clear_refusals as clear_refusals,
+    record_refusal as record_refusal,
+    refusals as refusals,
+)
+
+if TYPE_CHECKING:
+    from monitor.store.analyses import (
+        StoredAnalysis as StoredAnalysis,
+        analysis_text as analysis_text,
+        check_analysis as check_analysis,
+        latest_documents as latest_documents,
+        latest_maps as latest_maps,
+        load_analysis as load_analysis,
+        save_analysis as save_analysis,
+        stored_analyses as stored_analyses,
+    )
+    from monitor.store.archiving import (
+        Archived as Archived,
+        archive_faults as archive_faults,
+        archive_files as archive_files,
+        archived_count as archived_count,
+    )
+    from monitor.store.audit import (
+        AuditEntry as AuditEntry,
+        anchored_entry as anchored_entry,
+        chain_faults as chain_faults,
+        last_anchor as last_anchor,
+        last_entries as last_entries,
+    )
+    from monitor.store.campaigns import (
+        Imported as Imported,
+        import_campaign as import_campaign,
+        import_curve as import_curve,
+        load_campaign as load_campaign,
+    )
+    from monitor.store.catalogue import (
+        CampaignRow as CampaignRow,
+        RunRow as RunRow,
+        WithdrawnCampaign as WithdrawnCampaign,
+        check_machine as check_machine,
+        described_machines as described_machines,
+        list_campaigns as list_campaigns,
+        list_runs as list_runs,
+        list_withdrawn as list_withdrawn,
+    )
+    from monitor.store.certificates import (
+        StoredCertificate as StoredCertificate,
+        certificate_numbers as certificate_numbers,
+        find_certificate as find_certificate,
+        list_certificates as list_certificates,
+        load_certificate as load_certificate,
+        mark_certificate as mark_certificate,
+        save_certificate as save_certificate,
+    )
+    from monitor.store.connection import Database as Database
+    from monitor.store.copies.backup import (
+        take_backup as take_backup,
+    )
+    from monitor.store.copies.compaction import (
+        Compaction as Compaction,
+        compact as compact,
+    )
+    from monitor.store.copies.export import export_tables as export_tables
+    from monitor.store.copies.increment import take_increment as take_increment
+    from monitor.store.copies.manifest import (
+        Backup as Backup,
+        list_backups as list_backups,
+    )
+    from monitor.store.copies.restoring import (
+        Restored as Restored,
+        restore as restore,
+    )
+    from monitor.store.copies.workbook import export_workbook as export_workbook
+    from monitor.store.curves import (
+        curve_names as curve_names,
+        is_curve as is_curve,
+        load_curve as load_curve,
+    )
+    from monitor.store.database_name import check_database_name as check_database_name
+    from monitor.store.events import (
+        NOTE as NOTE,
+        MachineEvent as MachineEvent,
+        StoredEvent as StoredEvent,
+        list_events as list_events,
+        machine_events as machine_events,
+        record_event as record_event,
+    )
+    from monitor.store.identifications import (
+        identification_by_number as identification_by_number,
+        identification_numbers as identification_numbers,
+        last_identification as last_identification,
+        load_identification as load_identification,
+        save_identification as save_identification,
+    )
+    from monitor.store.import_notes import (
+        campaign_notes as campaign_notes,
+        run_fingerprints as run_fingerprints,
+    )
+    from monitor.store.models import (
+        StoredModel as StoredModel,
+        last_used_campaign as last_used_campaign,
+        list_models as list_models,
+        load_model as load_model,
+        model_history as model_history,
+        next_version as next_version,
+        save_model as save_model,
+    )
+    from monitor.store.past.fleet import (
+        BlockCut as BlockCut,
+        FleetSums as FleetSums,
+        fleet_sums as fleet_sums,
+    )
+    from monitor.store.past.history import (
+        MachineHistory as MachineHistory,
+        latest_tolerances as latest_tolerances,
+        machine_history as machine_history,
+        tolerance_types as tolerance_types,
+    )
+    from monitor.store.past.machine_runs import (
+        MachineDescription as MachineDescription,
+        RecordedRun as RecordedRun,
+        campaign_machines as campaign_machines,
+        campaign_tolerances as campaign_tolerances,
+        check_campaigns as check_campaigns,
+        identified_runs as identified_runs,
+        latest_frames as latest_frames,
+        machine_descriptions as machine_descriptions,
+        machine_runs as machine_runs,
+        parameter_frames as parameter_frames,
+        probing_counts as probing_counts,
+    )
+    from monitor.store.recalling import Recalled as Recalled
+    from monitor.store.results import (
+        StoredIdentification as StoredIdentification,
+        StoredRun as StoredRun,
+    )
+    from monitor.store.selections import (
+        SelectionRow as SelectionRow,
+        StoredSelection as StoredSelection,
+        find_selection as find_selection,
+        list_selections as list_selections,
+        save_selection as save_selection,
+    )
+    from monitor.store.sharing import (
+        SharedDatabase as SharedDatabase,
+        one_at_a_time as one_at_a_time,
+    )
+    from monitor.store.sql import (
+        QueryResult as QueryResult,
+        campaign_readings as campaign_readings,
+        column_comments as column_comments,
+        list_machines as list_machines,
+        run_query as run_query,
+    )
+    from monitor.store.turns import (
+        Holder as Holder,
+        Patience as Patience,
+    )
+    from monitor.store.type_tolerances import type_in_use as type_in_use
+    from monitor.store.verification import (
+        Verification as Verification,
+        verify_audit as verify_audit,
+    )
+    from monitor.store.withdrawals import (
+        Withdrawal as Withdrawal,
+        withdraw_campaign as withdraw_campaign,
+    )
+else:
+    __getattr__, __dir__ = on_demand(
+        __name__,
+        {
+            "analyses": "StoredAnalysis analysis_text check_analysis latest_documents latest_maps "
+            "load_analysis save_analysis stored_analyses",
+            "archiving": "Archived archive_faults archive_files archived_count",
+            "audit": "AuditEntry anchored_entry chain_faults last_anchor last_entries",
+            "campaigns": "Imported import_campaign import_curve load_campaign",
+            "catalogue": "CampaignRow RunRow WithdrawnCampaign check_machine described_machines list_campaigns "
+            "list_runs list_withdrawn",
+            "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
+            "load_certificate mark_certificate save_certificate",
+            "connection": "Database",
+            "copies.backup": "take_backup",
+            "copies.compaction": "Compaction compact",
+            "copies.export": "export_tables",
+            "copies.increment": "take_increment",
+            "copies.manifest": "Backup list_backups",
+            "copies.restoring": "Restored restore",
+            "copies.workbook": "export_workbook",
+            "curves": "curve_names is_curve load_curve",
+            "database_name": "check_database_name",
+            "events": "NOTE MachineEvent StoredEvent list_events machine_events record_event",
+            "identifications": "identification_by_number identification_numbers last_identification "
+            "load_identification save_identification",
+            "import_notes": "campaign_notes run_fingerprints",
+            "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
+            "save_model",
+            "past.fleet": "BlockCut FleetSums fleet_sums",
+            "past.history": "MachineHistory latest_tolerances machine_history tolerance_types",
+            "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
+            "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
+            "probing_counts",
+            "recalling": "Recalled",
+            "results": "StoredIdentification StoredRun",
+            "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",
+            "sharing": "SharedDatabase one_at_a_time",
+            "sql": "QueryResult campaign_readings column_comments list_machines run_query",
+            "turns": "Holder Patience",
+            "type_tolerances": "type_in_use",
+            "verification": "Verification verify_audit",
+            "withdrawals": "Withdrawal withdraw_campaign",
+        },
+    )

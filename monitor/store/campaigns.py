@@ -18,8 +18,14 @@ from monitor.store.archiving import source_files
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
-from monitor.store.curves import METHOD as CURVE
-from monitor.store.curves import curve_by_number, curve_content, insert_curve, is_curve, is_curve_number
+from monitor.store.curves import (
+    METHOD as CURVE,
+    curve_by_number,
+    curve_content,
+    insert_curve,
+    is_curve,
+    is_curve_number,
+)
 from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
 from monitor.store.past import campaign_runs
 

@@ -20,6 +20,7 @@ import duckdb
 
 from monitor import __version__
 from monitor.exceptions import StoreError
+from monitor.store import bound_values
 from monitor.store.past import gathering
 from monitor.store.resources import migration_folder
 
@@ -150,7 +151,8 @@ def _apply(
                 connection.execute(statement)
             else:
                 gathering.gather(connection, replacement)
-        connection.execute(
+        bound_values.execute(
+            connection,
             "INSERT INTO schema_migration VALUES (?, ?, ?, ?, ?)",
             [
                 migration.number,

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from monitor import __version__
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.store import audit
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.connection import Database, utc_now
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -145,13 +141,8 @@ def last_used_campaign(db: Database, model: StoredModel) -> str | None:
     return next((str(campaign) for campaign, name, version in rows if (name, version) in line), None)
 
 
-def list_models(db: Database) -> pd.DataFrame:
-    """All models and versions: the table ``model``."""
-    return db.frame("SELECT * FROM model ORDER BY model, version")
-
-
-def all_models(db: Database) -> list[StoredModel]:
-    """All versions of all models."""
+def list_models(db: Database) -> list[StoredModel]:
+    """All versions of all models, in the order of names."""
     return _select(db, "true ORDER BY model, version", [])
 
 

@@ -25,7 +25,7 @@ from monitor.store.identifications import stored_identification_content
 from monitor.store.import_notes import notes_content
 from monitor.store.indexes import index_faults
 from monitor.store.machine_models import machine_model_content
-from monitor.store.models import all_models, model_content, model_key
+from monitor.store.models import list_models, model_content, model_key
 from monitor.store.past.campaign_runs import run_list_faults
 from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.schema import schema_faults
@@ -123,7 +123,7 @@ def _contents(db: Database) -> Iterator[_Content]:
             # What can no longer be read was altered, too; the empty hash agrees with nothing.
             content = ""
         yield _Content("campaign", _of_several(name, imports[name]), content, number)
-    for model in all_models(db):
+    for model in list_models(db):
         key = model_key(model.name, model.version)
         yield _Content("model", key, model_content(model), key)
     for (number,) in db.rows("SELECT identification_id FROM identification ORDER BY ALL"):

@@ -20,20 +20,20 @@ from monitor.web.forms import StaleFormError
 from monitor.web.gate import Gate
 from monitor.web.interface import interface
 from monitor.web.opening import host_user_name
-from monitor.web.pages import campaign as campaign_page
 from monitor.web.pages import (
+    campaign as campaign_page,
     certificates,
+    fleet as fleet_page,
     importing,
     issuing,
     keeping,
+    machine as machine_page,
     model,
     plan,
     reports,
     visiting,
     volumetric,
 )
-from monitor.web.pages import fleet as fleet_page
-from monitor.web.pages import machine as machine_page
 from monitor.web.presses import Presses
 from monitor.web.previews import Previews
 from monitor.web.rendering import again_page, refusal_page

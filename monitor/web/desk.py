@@ -9,8 +9,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from concurrent.futures import TimeoutError as StillWorking
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
 from dataclasses import dataclass, field
 from threading import Event, Lock
 from typing import Any

@@ -60,9 +60,12 @@ def posted(database: str | Path, note: Note) -> Iterator[bool]:
         os.write(file, json.dumps(asdict(note)).encode())
         yield True
     finally:
+        if not _LOCKS:
+            os.close(file)  # Windows removes no file that is open
         with contextlib.suppress(OSError):
             path.unlink()
-        os.close(file)
+        if _LOCKS:
+            os.close(file)
 
 
 def read_note(database: str | Path) -> Note | None:

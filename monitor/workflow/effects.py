@@ -19,8 +19,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.curve.catalogue import catalogue as curve_catalogue
 from monitor.methods.curve.fit import fit
-from monitor.methods.curve.problem import CurveProblem, grid
-from monitor.methods.curve.problem import problem_of as curve_problem_of
+from monitor.methods.curve.problem import CurveProblem, grid, problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from monitor.exceptions import InputError
+from monitor.workflow.file_names import file_name
 
 if TYPE_CHECKING:
     from monitor.reporting.figures.style import Figure
@@ -23,8 +24,8 @@ def make_folder(folder: Path) -> Path:
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[str]:
-    """Write a figure under a name with every ending; return the names of the files."""
+    """Write a figure under a name, which may come from people, with every ending; return the names of the files."""
     # Loaded where a figure is drawn: the drawing library takes longer to load than most verbs to answer.
     from monitor.reporting.figures.style import save
 
-    return [str(save(figure, folder / f"{name}{ending}")) for ending in ENDINGS]
+    return [str(save(figure, folder / f"{file_name(name)}{ending}")) for ending in ENDINGS]

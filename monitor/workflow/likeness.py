@@ -25,6 +25,7 @@ from monitor.records import Array, Campaign, CurveCampaign
 from monitor.reporting import messages
 from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
+from monitor.workflow.file_names import file_name
 from monitor.workflow.simulation import PEAK_UM
 
 #: The mean month of the Gregorian calendar, in days.
@@ -73,8 +74,11 @@ class LikeRequest:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        if not self.machines or any(not name.strip() or "/" in name for name in self.machines):
-            raise InputError("--machine: name one machine or more; their campaigns are folders of that name")
+        if not self.machines or any(not name.strip() or file_name(name) != name for name in self.machines):
+            raise InputError(
+                "--machine: name one machine or more; their campaigns are folders of that name, "
+                r'so it has none of \ / : * ? " < > |'
+            )
         if len(set(self.machines)) < len(self.machines):
             raise InputError("--machine: each machine is named once")
         if self.months < 1 or self.months * len(self.machines) > MOST_CAMPAIGNS:

@@ -6,11 +6,14 @@ A model is the complete set of base effects of the method (free in every run) an
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
-from monitor.methods import methods
-from monitor.methods.model import Model
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, list_models, load_model, machine_model, save_model
+
+if TYPE_CHECKING:
+    from monitor.methods.model import Model
 
 
 def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
@@ -21,10 +24,13 @@ def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
     try:
         return load_model(db, model, int(version) if version else None)
     except NotFoundError as error:
+        # Loaded where nothing of that name is stored: a verb that reads needs no method.
+        from monitor.methods import methods
+
         if model in methods() and not version.strip("1"):
             # The method's own model needs nobody to make it.
             return save_model(db, model, (), note="the method's own model")
-        if list_models(db).empty:
+        if not list_models(db):
             if model in methods():
                 raise NotFoundError(f"model '{model}' has no version {version}; it has 1") from error
             hint = did_you_mean(model, methods())
@@ -60,4 +66,6 @@ def label_of(name: str, version: int) -> str:
 
 def as_model(stored: StoredModel) -> Model:
     """The model as the methods take it."""
+    from monitor.methods.model import Model
+
     return Model(label(stored), added=stored.effects)

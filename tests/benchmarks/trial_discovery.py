@@ -31,8 +31,7 @@ from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from by_path import load
-from by_path import simulator as simulator_of
+from by_path import load, simulator as simulator_of
 
 from monitor.discovery import ChainMissing, Explanation, explain, fit
 from monitor.effects.catalogue import catalogue, drivers_of

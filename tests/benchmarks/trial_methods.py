@@ -21,9 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "methods"))
 
 from rotary_campaigns import PAPER, TRUTH, location, touched
-from simulator import free_form as free_forms
-from simulator import l_shape as l_shapes
-from simulator import rotary_probing as touches
+from simulator import free_form as free_forms, l_shape as l_shapes, rotary_probing as touches
 from simulator.chain import read_topology
 
 from monitor.discovery import Explanation, explain

@@ -22,8 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from simulator import measured_robot as measured
-from simulator import robot_campaign as robots
+from simulator import measured_robot as measured, robot_campaign as robots
 from simulator.robot_fit import known_structure_error
 
 from monitor.discovery import explain, fit, robust_fit

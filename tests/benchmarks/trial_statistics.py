@@ -17,10 +17,10 @@ from monitor.statistics import (
     kruskal_wallis,
     levene,
     mann_kendall,
-    trend,
     welch_anova,
 )
 from monitor.statistics.scan import Scanner
+from monitor.statistics.trend import trend
 
 SEED = 20261121
 

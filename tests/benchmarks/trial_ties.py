@@ -19,8 +19,7 @@ from scipy.stats import beta
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from by_path import load
-from by_path import simulator as simulator_of
+from by_path import load, simulator as simulator_of
 
 from monitor.discovery import Explanation, explain
 from monitor.methods.samba.method import problem_of

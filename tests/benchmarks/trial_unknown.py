@@ -22,8 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from by_path import load
-from by_path import simulator as simulator_of
+from by_path import load, simulator as simulator_of
 
 from monitor.discovery import explain
 from monitor.discovery.machine.fit import fit

@@ -108,6 +108,8 @@ WRONG = [
     (["backup", "nope/x"], "the folder of nope/x does not exist"),
     (["backup", "text"], "text exists already; name a new file"),
     (["export", "text"], "text is not an empty folder; name a new one"),
+    (["export", "all.csv"], "all.csv is the name of one file, and an export is a folder of them: name a folder; one"),
+    (["export", "all.xlsx", "--format", "csv"], "all.xlsx is the name of one file, and an export is a folder"),
     (["restore", "nope"], "there is no backup nope"),
     (["import", "nope"], "nope was refused, nothing of it was kept: 1 fault"),
     (["import", "text"], "this is a file; give the folder that holds campaign.toml"),

@@ -54,6 +54,16 @@ def test_help_lists_every_verb_with_a_few_words(typed: Any) -> None:
     assert typed().out == answer.out
 
 
+def test_json_and_quiet_are_taken_before_the_verb_too(typed: Any) -> None:
+    assert typed("--json", "effects", "reversal").out == typed("effects", "reversal", "--json").out != ""
+    assert typed("--quiet", "effects", "reversal").out == ""
+    refused = typed("--json", "effects", "reversal", "--quiet")
+    assert (refused.status, refused.err) == (
+        2,
+        "monitor: --quiet says nothing and --json says all: choose one\n",
+    )
+
+
 def test_version(typed: Any) -> None:
     assert typed("--version").out == f"monitor {__version__}\n"
 

@@ -13,8 +13,7 @@ from scipy import stats
 
 from monitor.machine import parse_topology
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.samba.method import METHOD as samba
-from monitor.methods.samba.method import bar_length
+from monitor.methods.samba.method import METHOD as samba, bar_length
 from monitor.records import Array, Campaign
 
 Distance = Callable[[Array, Array], float]

@@ -28,6 +28,7 @@ from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign
+from monitor.statistics.trend import trend
 from monitor.uncertainty import (
     BlockSampler,
     Inputs,
@@ -138,7 +139,7 @@ def _linear() -> Iterator[Compared]:
     certified = _json("nist-strd/certified_linear.json")
     subject = "NIST StRD, linear regression"
     norris = np.array(_rows("linear/Norris.dat"), dtype=float)
-    line = statistics.trend(norris[:, 0], norris[:, 1], independent=True)
+    line = trend(norris[:, 0], norris[:, 1], independent=True)
     yield _compared(subject, "Norris", "slope", certified["Norris"]["certified"]["estimates"][1], line.slope)
     yield _compared(
         subject, "Norris", "u of the slope", certified["Norris"]["certified"]["sd"][1], line.u_slope

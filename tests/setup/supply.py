@@ -13,8 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from environment import CHECKOUT, HASHES
-from environment import EXTRAS as INSTALLED
+from environment import CHECKOUT, EXTRAS as INSTALLED, HASHES
 from installed_wheel import build, say
 
 #: What users may install; no tools for developers.

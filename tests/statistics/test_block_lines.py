@@ -8,8 +8,9 @@ import statsmodels.api as sm
 from scipy import signal, stats
 
 from monitor.exceptions import DataError
-from monitor.statistics import backtest, predict, trend
+from monitor.statistics import backtest, predict
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.trend import trend
 
 
 def first_order(rng, count, n, r):

@@ -14,10 +14,10 @@ from monitor.statistics import (
     individuals_chart,
     mann_kendall,
     reference_period,
-    trend,
     welch_anova,
 )
 from monitor.statistics.charts.control import Reference
+from monitor.statistics.trend import trend
 
 LINEWIDTHS = Path(__file__).resolve().parents[1] / "references" / "nist-cases" / "nist_LINEWID.DAT"
 

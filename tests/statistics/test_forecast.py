@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics import backtest, forecast, predict, trend
+from monitor.statistics import backtest, forecast, predict
+from monitor.statistics.trend import trend
 
 
 def history(rng, days=12, slope=0.05):

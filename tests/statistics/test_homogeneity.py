@@ -11,12 +11,12 @@ from monitor.statistics import (
     anova,
     bartlett,
     control_false_discoveries,
-    homogeneity,
     kruskal_wallis,
     levene,
     p_value_histogram,
     welch_anova,
 )
+from monitor.statistics.homogeneity import homogeneity
 
 
 def test_homogeneity_holds_what_the_single_tests_say():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.statistics import ErrorVectors, JointSeries, backtest_longest, trend
+from monitor.statistics import ErrorVectors, JointSeries, backtest_longest
+from monitor.statistics.trend import trend
 
 DAYS, RUNS = 24, 2
 DAY = np.repeat(np.arange(DAYS), RUNS)

@@ -14,9 +14,9 @@ from monitor.statistics import (
     forecast,
     forecast_longest,
     residual_correlation,
-    trend,
 )
 from monitor.statistics.forecasts.joint_forecast import _chi_square
+from monitor.statistics.trend import trend
 
 WEEKS = np.arange(30) * 7.0
 

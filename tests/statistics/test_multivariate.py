@@ -6,8 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from statsmodels.multivariate.manova import MANOVA
-from statsmodels.stats.multivariate import test_cov_oneway as statsmodels_box_m
-from statsmodels.stats.multivariate import test_mvmean_2indep as statsmodels_hotelling
+from statsmodels.stats.multivariate import (
+    test_cov_oneway as statsmodels_box_m,
+    test_mvmean_2indep as statsmodels_hotelling,
+)
 
 from monitor.exceptions import DataError
 from monitor.statistics import box_m, manova

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics import normality
+from monitor.statistics.normality import normality
 
 
 @pytest.mark.parametrize(("days", "runs"), [(5, 4), (4, 3), (1, 20)])

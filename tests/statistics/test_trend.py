@@ -10,8 +10,9 @@ import statsmodels.api as sm
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics import mann_kendall, trend
+from monitor.statistics import mann_kendall
 from monitor.statistics.monotone import _ranks
+from monitor.statistics.trend import trend
 
 
 def test_nist_strd_norris(strd, certified, digits):

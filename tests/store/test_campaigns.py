@@ -9,8 +9,7 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from monitor.exceptions import CampaignError, DataError, NotFoundError
 from monitor.records import Campaign, Machine, Probings, Run

@@ -16,8 +16,9 @@ import pytest
 
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
-from monitor.statistics import anova, bartlett, pool, trend
+from monitor.statistics import anova, bartlett, pool
 from monitor.statistics.sufficient import cells_from_sums, drift_from_sums
+from monitor.statistics.trend import trend
 from monitor.store import Database, fleet_sums, machine_history
 from monitor.store.events import record_event
 from monitor.store.past.campaign_runs import gather_runs

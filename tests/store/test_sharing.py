@@ -192,8 +192,9 @@ def test_an_unprivileged_reader_needs_neither_a_writable_file_nor_folder(path: P
         folder.chmod(0o755)
     path.parent.chmod(0o555)
     code = (
-        "import sys; from monitor.exceptions import StoreError; from monitor.store import *\n"
-        "import os\nverify_audit(Database(':memory:')); os.setuid(65534)\n"
+        "import os, sys; from monitor.exceptions import StoreError\n"
+        "from monitor.store import Database, SharedDatabase, verify_audit\n"
+        "verify_audit(Database(':memory:')); os.setuid(65534)\n"
         "with SharedDatabase(sys.argv[1]) as db:\n"
         "    print(verify_audit(db).ok)\n"
         "    try:\n"

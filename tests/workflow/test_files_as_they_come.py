@@ -21,8 +21,7 @@ from monitor.readers import read_campaign
 from monitor.store import Database, campaign_notes
 from monitor.workflow.identify.identify import IdentifyRequest, identify
 from monitor.workflow.intake.importing import ImportRequest, import_folders
-from tests.simulator import exports
-from tests.simulator import four_instruments as shop
+from tests.simulator import exports, four_instruments as shop
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NAMES = ("files-as-they-come", "files-of-a-plate")

@@ -22,9 +22,9 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow
+from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.health.mail import LARGEST_BYTES, mail_report, message_of, read_mail_settings
 from monitor.workflow.health.request import ReportAnswer
-from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

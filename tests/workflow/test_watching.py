@@ -15,8 +15,7 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.store import Database, SharedDatabase
-from monitor.workflow.watching import letter
-from monitor.workflow.watching import watch as watching
+from monitor.workflow.watching import letter, watch as watching
 from monitor.workflow.watching.request import WatchAnswer, WatchRequest
 from monitor.workflow.watching.watch import watch
 

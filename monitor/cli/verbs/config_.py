@@ -60,9 +60,9 @@ def _said(answer: Configuration, as_json: bool) -> int:
         if key == "tolerances" and value is not None:
             for name, limits in value.items():
                 stated = ", ".join(f"{term} {limit:g}" for term, limit in limits.items())
-                output.say(f"{key:<12} {name}: {stated}")
+                output.say(f"{key:<15} {name}: {stated}")
             continue
-        output.say(f"{key:<12} {'-' if value is None else value}")
+        output.say(f"{key:<15} {'-' if value is None else value}")
     return 0
 
 

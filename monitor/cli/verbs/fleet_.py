@@ -12,7 +12,6 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
-from monitor.cli.trend_output import weekly_lines
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
@@ -63,6 +62,8 @@ def run(options: Namespace) -> int:
     for machine, name in (answer.tolerances_of_type or {}).items():
         output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
     if answer.weekly_looks is not None:
+        from monitor.cli.trend_output import weekly_lines
+
         for line in weekly_lines(answer.weekly_looks, machines=True):
             output.say(line)
     if answer.not_identified:

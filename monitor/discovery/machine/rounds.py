@@ -10,8 +10,10 @@ from typing import TypeAlias
 
 from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
-from monitor.discovery.machine.joints.robot_search import MOST_EFFECTS as MOST_BESIDE_CURVES
-from monitor.discovery.machine.joints.robot_search import search_beside_curves
+from monitor.discovery.machine.joints.robot_search import (
+    MOST_EFFECTS as MOST_BESIDE_CURVES,
+    search_beside_curves,
+)
 from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain

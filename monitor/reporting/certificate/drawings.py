@@ -25,8 +25,9 @@ from monitor.reporting.svg.plot import (
 )
 from monitor.reporting.texts import Texts
 
-#: A figure alone on its page, below a heading and above its caption: an A4 page has 259 mm between its margins.
-TALLEST_MM = 228.0
+#: A figure with heading and caption takes less than half of a page (259 mm between the margins): a page before it that
+#: it does not fit on is more than half full.
+TALLEST_MM = 112.0
 #: A row, and what a panel needs besides its rows (scale, unit, distance to the next), in tenths of a millimetre.
 _ROW, _AROUND = 39.0, 96.0
 #: Names of parameters may take this part of the width.

@@ -108,20 +108,28 @@ def pdf_of(
 
 
 def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) -> Document:
-    """A document without a last page that is more than half empty, where a closer setting or another break helps."""
+    """A document without a last page that is more than half empty, where a closer setting or another break helps.
+
+    One document is held at a time: 25 machines need half a gigabyte.
+    """
     document = laid_out(html)
     if not ends_early(document):
         return document
-    count = len(document.pages)
+    count, names = len(document.pages), filling_breaks(document)
     if closer is not None:
-        tight = laid_out(closer)
-        if len(tight.pages) < count and not ends_early(tight):
-            return tight
-    names = filling_breaks(document)
-    if not names:
+        del document
+        document = laid_out(closer)
+        if len(document.pages) < count and not ends_early(document):
+            return document
+    if names:
+        del document
+        document = laid_out(with_breaks_before(html, names))
+        if len(document.pages) <= count and not ends_early(document):
+            return document
+    elif closer is None:
         return document
-    filled = laid_out(with_breaks_before(html, names))
-    return filled if len(filled.pages) <= count and not ends_early(filled) else document
+    del document
+    return laid_out(html)
 
 
 def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()) -> str:

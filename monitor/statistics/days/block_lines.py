@@ -210,11 +210,17 @@ class _Tables(NamedTuple):
     neighbours: Array
 
 
+@lru_cache(maxsize=64)
+def _processes(b: int) -> Array:
+    """The correlation matrices (g, b, b) of first-order processes over ``b`` blocks."""
+    lag = np.abs(np.subtract.outer(np.arange(b), np.arange(b)))
+    return np.asarray(CORRELATIONS[:, np.newaxis, np.newaxis] ** lag)
+
+
 def _tables(basis: Array, count: npt.NDArray[np.int64]) -> _Tables:
     """Moments of first-order processes for m plans, each a ``basis`` (m, b, q) over ``count`` (m,) blocks."""
     _, b, _ = basis.shape
-    lag = np.abs(np.subtract.outer(np.arange(b), np.arange(b)))
-    r = CORRELATIONS[:, np.newaxis, np.newaxis] ** lag
+    r = _processes(b)
     present = np.arange(b) < count[:, np.newaxis]
     turned = np.einsum("gij,mjq->mgiq", r, basis, optimize=True) * present[:, np.newaxis, :, np.newaxis]
     inside = np.einsum("miq,mgip->mgqp", basis, turned, optimize=True)

@@ -25,7 +25,7 @@ from monitor.store.turns import turn_to_write
 
 try:
     import fcntl
-except ImportError:  # Windows refuses to rename over an open file: nobody has it open then
+except ImportError:  # Windows refuses to rename over an open file: no other process has it open then
     _LOCKS = False
 else:
     _LOCKS = True
@@ -77,7 +77,8 @@ def compact(db: Database) -> Compaction:
 @contextmanager
 def _still(path: Path, log: Path, before: os.stat_result) -> Iterator[None]:
     """Keep clients that take no turn out of a file for this block; refuse where one wrote into it meanwhile."""
-    with path.open("r+b") as file:
+    with contextlib.ExitStack() as opened:
+        file = opened.enter_context(path.open("r+b"))
         if _LOCKS:
             fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         present = os.stat(path)
@@ -87,6 +88,8 @@ def _still(path: Path, log: Path, before: os.stat_result) -> Iterator[None]:
             before.st_mtime_ns,
         ) or (log.exists() and log.stat().st_size):
             raise StoreError(f"another process wrote into {path} meanwhile; it stays as it was, ask again")
+        if not _LOCKS:
+            opened.close()  # Windows renames over no file that is open, by this process either
         yield
 
 

@@ -22,6 +22,8 @@ from monitor.store.connection import Database
 
 #: Texts that spreadsheets run as formulas (OWASP, CSV injection).
 _FORMULA = r"^[=+\-@\t\r]"
+#: Ends of names that are those of one file.
+_FILES = (".csv", ".parquet", ".xlsx", ".xls", ".json")
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
 
 
@@ -44,6 +46,11 @@ def export_tables(
     folder = Path(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} is not an empty folder; name a new one")
+    if folder.suffix.lower() in _FILES:
+        raise InputError(
+            f"{folder} is the name of one file, and an export is a folder of them: name a folder; one table alone is "
+            'written by `monitor sql "FROM v_parameters" --csv > FILE`, or into a workbook, a file ending in .xlsx'
+        )
     if machine is not None:
         check_machine(db, machine)
     relations = _chosen(db, tables, machine)
@@ -57,6 +64,8 @@ def export_tables(
         if tables is None and machine is None:
             written += _source_files(db, partial)
         (partial / _MARK).unlink()
+        if folder.exists():
+            folder.rmdir()  # an empty one; Windows puts no folder in the place of another
         partial.replace(folder)
     except (OSError, StoreError, duckdb.IOException) as fault:
         with contextlib.suppress(OSError):

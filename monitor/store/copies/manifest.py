@@ -115,7 +115,8 @@ def refuse_existing(target: Path) -> None:
 
 def sync(path: Path) -> None:
     """Write a file to the disk."""
-    with path.open("rb") as file:
+    # Open for writing: Windows synchronises no file that is open for reading alone.
+    with path.open("r+b") as file:
         os.fsync(file.fileno())
 
 

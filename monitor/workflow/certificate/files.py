@@ -13,6 +13,7 @@ from pathlib import Path
 from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError
 from monitor.store import Database, find_certificate, load_certificate
+from monitor.workflow.file_names import file_name
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class HashedFile:
 
 def path_of(out: Path | None, number: str) -> Path:
     """The file of a certificate: ``out`` itself, or a file in the folder ``out``, or here without."""
-    name = f"certificate-{number}.pdf".replace("/", "-").replace("\\", "-")
+    name = file_name(f"certificate-{number}.pdf")
     if out is None:
         return Path(name)
     if out.suffix and out.suffix.lower() != ".pdf" and not out.is_dir():
@@ -35,7 +36,7 @@ def path_of(out: Path | None, number: str) -> Path:
 
 def dcc_path_of(out: Path, number: str) -> Path:
     """The file of a digital certificate: ``out`` itself, or a file in the folder ``out``."""
-    name = f"certificate-{number}.dcc.xml".replace("/", "-").replace("\\", "-")
+    name = file_name(f"certificate-{number}.dcc.xml")
     return out if out.suffix.lower() == ".xml" else out / name
 
 

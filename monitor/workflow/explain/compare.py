@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from monitor.discovery import Fit
-from monitor.discovery import compare as compare_fit
+from monitor.discovery import Fit, compare as compare_fit
 from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
 from monitor.methods.curve.fit import CurveFit

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from monitor.discovery.curve.compare import CurveComparison as Comparison
-from monitor.discovery.curve.compare import compare_curve
+from monitor.discovery.curve.compare import CurveComparison as Comparison, compare_curve
 from monitor.discovery.curve.explain import CurveExplanation as Explanation
 from monitor.discovery.curve.missing import CurveMissing as Missing
 from monitor.discovery.curve.quality import bic

@@ -12,13 +12,13 @@ import numpy as np
 from monitor.discovery import (
     Explanation,
     RobustFit,
+    compare as compare_fit,
+    explain as search,
     find_mistakes,
     find_other_names,
     is_gross,
     robust_fit,
 )
-from monitor.discovery import compare as compare_fit
-from monitor.discovery import explain as search
 from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
+from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.fleet.attention import Attention
-from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,6 @@ from monitor.workflow.fleet.attention import ATTENTION
 from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, warmth_beside
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
-from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.models import resolve
 
 
@@ -103,6 +102,12 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     measured.sort(
         key=lambda pair: (ATTENTION.index(pair[0].attention), -pair[1], pair[0].machine, pair[0].parameter)
     )
+    noticed = None
+    if request.weekly_looks:
+        # Loaded where it is asked for: the histories of all machines, which the table needs none of.
+        from monitor.workflow.history.weekly_looks import weekly_notices
+
+        noticed = weekly_notices(db)
     return FleetAnswer(
         machines=len(np.unique(sums.machine)),
         rows=len(sums.machine) + len(volumetric),
@@ -114,7 +119,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         },
         not_identified=not_identified(db) if request.model is None else (),
         table=_shown(db, [row for row, _ in measured[:most]]),
-        weekly_looks=weekly_notices(db) if request.weekly_looks else None,
+        weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
     )
 

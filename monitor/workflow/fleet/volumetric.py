@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from monitor.records import VOLUMETRIC
 from monitor.store import Database, latest_maps, latest_tolerances
 from monitor.units import MICROMETRE
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.attention import Attention
-from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 
 def share_of_limit(row: FleetTableRow) -> float:

@@ -8,6 +8,7 @@ from itertools import compress
 
 from monitor.documents import Said
 from monitor.methods import Unable, method_named
+from monitor.records import VOLUMETRIC
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
 from monitor.reporting.health.sentences import (
     CheckKind,
@@ -59,7 +60,6 @@ from monitor.workflow.history.forecast import drift_forecast
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
 from monitor.workflow.models import resolve_for
-from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 
 @dataclass(frozen=True)

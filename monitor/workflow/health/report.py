@@ -30,7 +30,7 @@ from monitor.reporting.health.records import (
 )
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
 from monitor.reporting.health.sentences import MachineNamed, NothingMeasured
-from monitor.reporting.weekly_notice import weekly_sentence
+from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.store import (
     Database,
     analysis_text,
@@ -49,7 +49,7 @@ from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.task import Task, computed
 from monitor.workflow.health.weeks import Week, week_before, week_named
-from monitor.workflow.history.weekly_looks import WeeklyNotices, weekly_notices
+from monitor.workflow.history.weekly_looks import weekly_notices
 
 KIND = "health"
 #: Processes by default: at most so many (each needs up to 0.7 GB while it writes a part of the PDF), and one for so

@@ -9,7 +9,7 @@ from pathlib import Path
 from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
-from monitor.workflow.history.weekly_looks import WeeklyNotices
+from monitor.reporting.weekly_notice import WeeklyNotices
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from datetime import datetime
 import numpy as np
 
 from monitor.documents import Said
-from monitor.records import Verdict
+from monitor.records import VOLUMETRIC, Verdict
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
@@ -34,7 +34,6 @@ from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.forecast import DriftForecast
-from monitor.workflow.trend.volumetric import VOLUMETRIC
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 #: So many sentences of a week are named one by one.

@@ -10,7 +10,8 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
-from monitor.statistics import Trend, trend
+from monitor.statistics import Trend
+from monitor.statistics.trend import trend
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import timedelta
 
+from monitor import statistics
 from monitor.exceptions import DataError
-from monitor.statistics import Forecast, Trend, forecast
-from monitor.statistics.forecasts.forecast import Crossing
+from monitor.statistics import Trend
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift
@@ -34,7 +34,7 @@ class DriftForecast:
     origin: float
     span: float
     offset: timedelta
-    ahead: Forecast | None
+    ahead: statistics.Forecast | None
 
     @property
     def good_for(self) -> float | None:
@@ -53,7 +53,7 @@ def recommended(interval: float, span: float) -> float:
 
 
 def crossing_dates(
-    crossing: Crossing, horizon: float, offset: timedelta
+    crossing: statistics.Crossing, horizon: float, offset: timedelta
 ) -> tuple[str | None, tuple[str | None, str | None] | None]:
     """Return the day of a crossing and the ends of its interval; None where open, that is beyond the horizon."""
     low, high = (date(t, offset) if t < horizon else None for t in crossing.interval)
@@ -76,7 +76,7 @@ def drift_forecast(
         return DriftForecast(line, origin, drift.span, offset, None)
     checks = [] if check is None else [max(check, origin)]
     try:
-        ahead = forecast(
+        ahead = statistics.forecast(
             line, (-limit, limit), origin, checks, reliability=reliability, horizon=horizon_of(origin)
         )
     except DataError:

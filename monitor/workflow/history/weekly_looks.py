@@ -7,15 +7,15 @@ noticed in the past, too.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.reporting.weekly_notice import NoticeKind, WeeklyNotice
+from monitor.reporting.weekly_notice import NoticeKind, WeeklyNotice, WeeklyNotices
 from monitor.statistics.weekly_looks import RATE, Look, WeeklyLooks
 from monitor.store import (
     NOTE,
@@ -32,29 +32,6 @@ from monitor.workflow.history.series import steady_runs
 
 #: A change of the whole vector names so many parameters at most, those that moved most for their scatter first.
 NAMED = 3
-
-
-@dataclass(frozen=True)
-class WeeklyNotices:
-    """Every notice up to a week, in the order of time.
-
-    ``expected_false`` of them are false at most, on average, which is kept below ``false_discovery_rate`` of all (or of
-    one, before the first). ``weeks`` with runs were looked at, ``series`` (parameters and vectors) in the last of them.
-    """
-
-    false_discovery_rate: float
-    weeks: int
-    machines: int
-    series: int
-    expected_false: float
-    notices: tuple[WeeklyNotice, ...]
-
-    def of_machines(self, machines: Collection[str], week: str | None = None) -> WeeklyNotices:
-        """The same with the notices of some machines only, of one week or of all."""
-        part = (
-            notice for notice in self.notices if notice.machine in machines and week in (None, notice.week)
-        )
-        return replace(self, notices=tuple(part))
 
 
 @dataclass(frozen=True, eq=False)

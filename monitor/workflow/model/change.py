@@ -101,7 +101,7 @@ def _planned(db: Database, request: AddEffectRequest) -> StoredModel:
             f"model {label(parent)} has {text} already; add another effect, or take it out first"
         )
     name = request.new_name
-    if name is not None and name != parent.name and name in set(list_models(db)["model"]):
+    if name is not None and name != parent.name and name in {model.name for model in list_models(db)}:
         raise InputError(
             f"there is a model {name} already: add to it with --to {name}, or choose another name"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.methods import CurveMethod, methods
-from monitor.store import Database, StoredModel, curve_names, list_models, load_model
+from monitor.store import Database, StoredModel, curve_names, list_models
 from monitor.workflow.model.answer import ModelsAnswer, ShowModelAnswer, model_version
 from monitor.workflow.model.request import ShowModelRequest
 from monitor.workflow.model.subjects import subjects_of
@@ -16,13 +16,7 @@ def list_all_models(db: Database) -> ModelsAnswer:
     for method in methods().values():
         if curves or not isinstance(method, CurveMethod):
             resolve(db, method.name)
-    frame = list_models(db)
-    return ModelsAnswer(
-        tuple(
-            model_version(load_model(db, str(name), int(version)))
-            for name, version in zip(frame["model"], frame["version"], strict=True)
-        )
-    )
+    return ModelsAnswer(tuple(model_version(model) for model in list_models(db)))
 
 
 def show_model(db: Database, request: ShowModelRequest) -> ShowModelAnswer:

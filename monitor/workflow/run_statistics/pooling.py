@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from monitor.records import Array
-from monitor.statistics import Homogeneity, Pooling, homogeneity, pool
+from monitor.statistics import Homogeneity, Pooling, pool
+from monitor.statistics.homogeneity import homogeneity
 
 
 def pooled_by_group(values: Array, groups: list[str], names: list[str]) -> tuple[Pooling, Homogeneity | None]:

@@ -12,8 +12,9 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Part, refused
-from monitor.statistics import box_m, manova, normality, p_value_histogram, variance_components
+from monitor.statistics import box_m, manova, p_value_histogram, variance_components
 from monitor.statistics.multivariate import VectorTest
+from monitor.statistics.normality import normality
 from monitor.workflow.run_statistics.answer import (
     HistogramAnswer,
     NoVarianceComponents,

@@ -12,9 +12,9 @@ from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, WORDED, named
 from monitor.reporting.lacks import Lack
+from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
-from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW

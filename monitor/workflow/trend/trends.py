@@ -32,7 +32,6 @@ from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import same_hours, selected_campaigns
-from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.trend.answer import (
     ControlCharts,
     ParameterTrend,
@@ -72,6 +71,8 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
             db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED
         )
     if request.weekly_looks:
+        from monitor.workflow.history.weekly_looks import weekly_notices
+
         answer = replace(answer, weekly_looks=weekly_notices(db).of_machines({request.machine}))
     if request.figures is None:
         return answer

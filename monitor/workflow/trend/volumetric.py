@@ -13,23 +13,12 @@ from datetime import timedelta
 import numpy as np
 import numpy.typing as npt
 
+from monitor import statistics
 from monitor.exceptions import DataError
-from monitor.records import Array
+from monitor.records import VOLUMETRIC, Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.reporting.origins import ForecastMethod
-from monitor.statistics import (
-    ErrorVectors,
-    JointLines,
-    JointSeries,
-    LengthQuestion,
-    Trend,
-    backtest_longest,
-    forecast_longest,
-    may_be_longest,
-    predict,
-    residual_correlation,
-    trend,
-)
+from monitor.statistics.trend import Trend, trend
 from monitor.store import Database, MachineHistory, latest_maps, load_campaign
 from monitor.units import DAYS_PER_YEAR, MICROMETRE
 from monitor.workflow.history.calendar import date
@@ -40,8 +29,6 @@ from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
 
 #: Times between the begin of the drifts and now at which the error is compared with its limit, for the day since when.
 SINCE_STEPS = 400
-#: The tolerance of the machine file that is no parameter's.
-VOLUMETRIC = "volumetric"
 
 
 @dataclass(frozen=True)
@@ -156,7 +143,7 @@ def _vectors(
     at_zero = (error.vectors - error.sensitivity @ estimate) / um
     # With axes that run straight only the corners of the strokes are left, of 343 points at each pose 8.
     long = max(float(error.lengths.max()) / um, 1.0)
-    candidates = may_be_longest(sensitivity, at_zero, (len(poses), *[POINTS] * len(ranges)), long)
+    candidates = statistics.may_be_longest(sensitivity, at_zero, (len(poses), *[POINTS] * len(ranges)), long)
     return _Vectors(
         names,
         sensitivity[candidates],
@@ -179,7 +166,7 @@ def _residuals(parameters: _Extrapolated) -> Array:
     residuals = np.full((len(parameters.t), len(parameters.lines)), np.nan)
     for column, (name, line) in enumerate(parameters.lines.items()):
         piece = parameters.drifts[name].piece
-        residuals[parameters.row_of(name), column] = piece.values - predict(line, piece.t)[0]
+        residuals[parameters.row_of(name), column] = piece.values - statistics.predict(line, piece.t)[0]
     return residuals
 
 
@@ -204,8 +191,10 @@ def _backtest(
         )
 
     try:
-        series = JointSeries(values, t, days)
-        test = backtest_longest(series, fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng)
+        series = statistics.JointSeries(values, t, days)
+        test = statistics.backtest_longest(
+            series, fit, statistics.ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng
+        )
     except DataError as error:
         return None, refused(Part.VOLUMETRIC_BACKTEST, error)
     return VolumetricTest(
@@ -223,7 +212,9 @@ def _beyond_since(
     levels = np.column_stack(
         [line.level_at + line.slope * (times - line.at) for line in parameters.lines.values()]
     )
-    inside = np.flatnonzero(ErrorVectors(vectors.sensitivity, vectors.at_zero).longest(levels) <= limit)
+    inside = np.flatnonzero(
+        statistics.ErrorVectors(vectors.sensitivity, vectors.at_zero).longest(levels) <= limit
+    )
     if len(inside) and inside[-1] == len(times) - 1:
         return None
     return date(float(times[0 if not len(inside) else inside[-1] + 1]), offset)
@@ -254,16 +245,16 @@ def volumetric_forecast(
     try:
         lines = {name: drift.stated or _held(drift.piece) for name, drift in drifts.items()}
         origin = max(float(drift.whole.t[-1]) for drift in drifts.values())
-        levels = {name: float(predict(line, origin)[0]) for name, line in lines.items()}
+        levels = {name: float(statistics.predict(line, origin)[0]) for name, line in lines.items()}
         vectors = _vectors(db, history, question.model, levels)
     except DataError as error:
         return replace(none, why=refused(Part.VOLUMETRIC_FORECAST, error))
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
-    correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
-    ahead = forecast_longest(
-        JointLines(list(parameters.lines.values()), correlation),
-        ErrorVectors(vectors.sensitivity, vectors.at_zero),
-        LengthQuestion(
+    correlation, shrunk, _ = statistics.residual_correlation(_residuals(parameters), parameters.days)
+    ahead = statistics.forecast_longest(
+        statistics.JointLines(list(parameters.lines.values()), correlation),
+        statistics.ErrorVectors(vectors.sensitivity, vectors.at_zero),
+        statistics.LengthQuestion(
             limit, origin, [max(question.check, origin)], horizon_of(origin), question.reliability
         ),
         rng=rng,

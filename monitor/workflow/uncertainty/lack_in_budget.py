@@ -14,7 +14,7 @@ from monitor.workflow.uncertainty.answer import FrameworkAnswer, UncertaintyAnsw
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT
 
 #: Lack of fit over the rest of the budget, as standard uncertainties: from one on it is more than all else together.
-#: docs/trials-uncertainty-days.md has the rates of tests/benchmarks/trial_grounds.py.
+#: docs/trials-grounds.md has the rates.
 MOST_OF_THE_REST = 1.0
 #: One right model in a thousand, as `compare` tests it.
 LEVEL = 1e-3
