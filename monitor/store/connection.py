@@ -27,7 +27,7 @@ from monitor.stopping import checkpoint
 from monitor.store import bound_values, migrations
 from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import connect, damaged, is_missing, make, make_log, private_files
+from monitor.store.opening import connect, damaged, is_missing, make, make_empty, make_log
 from monitor.store.recalling import Recalled
 from monitor.store.turns import Patience
 
@@ -231,8 +231,9 @@ class Database:
         """Attach a second database file under a name for this block; no other thread uses the database meanwhile."""
         with self.reading(), self._used() as connection:
             literal = str(path).replace("'", "''")
-            with private_files():
-                connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
+            if not path.exists():
+                make_empty(str(path))
+            connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
             try:
                 yield
             except BaseException:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-import threading
-from collections.abc import Iterator
+import tempfile
 from pathlib import Path
 
 import duckdb
@@ -23,7 +22,6 @@ BLOCK_SIZE = 65536
 _UNFINISHED = ".new"
 #: A new database is its owner's alone; whoever wants a group to use it changes the mode, and log and lock follow it.
 _MODE = 0o600
-_MASK = threading.Lock()
 
 
 def connect(
@@ -107,10 +105,9 @@ def is_missing(path: str) -> bool:
 def _make(path: str, partial: str) -> None:
     _remove(partial)
     try:
-        with private_files():
-            connection = connect(partial, False, None)
+        make_empty(partial)
+        connection = connect(partial, False, None)
         try:
-            os.chmod(partial, _MODE)
             migrations.migrate(connection, migrations.available())
         finally:
             connection.close()
@@ -125,19 +122,19 @@ def _make(path: str, partial: str) -> None:
         _remove(partial)
 
 
-@contextlib.contextmanager
-def private_files() -> Iterator[None]:
-    """Let files that are made in this block be their owner's alone from their first moment.
+def make_empty(path: str) -> None:
+    """Make a database without a table that is its owner's alone from its first byte. Raises OSError, StoreError.
 
-    DuckDB attaches no empty file, so it makes its own, with the mode that the process gives all its files: who opened
-    one before its mode is changed could read on. The mask is of the whole process: one block at a time, for a moment.
+    DuckDB attaches no empty file, and makes its own with the mode that the process gives all its files: who opened one
+    before its mode is changed could read on. So it makes it in a folder that nobody else may enter.
     """
-    with _MASK:
-        before = os.umask(0o077)
-        try:
-            yield
-        finally:
-            os.umask(before)
+    with tempfile.TemporaryDirectory() as folder:
+        source = os.path.join(folder, "empty.duckdb")
+        connect(source, False, None).close()
+        with open(source, "rb") as empty:
+            content = empty.read()
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE), "wb") as file:
+        file.write(content)
 
 
 def make_log(path: str) -> None:

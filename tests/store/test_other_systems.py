@@ -82,6 +82,10 @@ for name in MISSING:
     vars(os).pop(name, None)
 for name in LACKING:
     sys.modules[name] = None
+import shutil, tempfile
+# As Python has both there.
+tempfile.TemporaryFile = tempfile.NamedTemporaryFile
+shutil._use_fd_functions = False
 sys.addaudithook(as_on_windows)
 from monitor.cli import main
 line, status = [], 0

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from monitor.reporting.resources import report_text
+from monitor.web import charts
 from monitor.web.words import channel, with_u
 
-CHARTS = Path(__file__).resolve().parents[2] / "monitor/web/charts"
+CHARTS = Path(charts.__file__).parent
 
 
 def test_every_chart_has_its_height_before_it_is_drawn() -> None:

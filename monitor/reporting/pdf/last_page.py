@@ -25,17 +25,14 @@ def ends_early(document: Document) -> bool:
     return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < _HALF * last.height
 
 
-def filling_breaks(document: Document) -> tuple[str, ...]:
-    """Return the ids that should begin the last page, or the last two, so that the emptiest is as full as can be.
+def filling_breaks(document: Document) -> tuple[tuple[str, ...], ...]:
+    """Return the ids to begin the last page, and those for the last two, so that the emptiest is as full as can be.
 
-    Empty where no breaks leave all of them half full, as far as can be told from where things stand now.
+    Without those that do not leave all of them half full, as far as can be told from where things stand now: what was
+    left white at the foot of a page counts as filled, so the first may fail where the second does not.
     """
-    for count in (1, 2):
-        if len(document.pages) > count:
-            best = _breaks(document, count)
-            if best:
-                return best
-    return ()
+    best = (_breaks(document, count) for count in (1, 2) if len(document.pages) > count)
+    return tuple(names for names in best if names)
 
 
 def with_breaks_before(html: str, names: tuple[str, ...]) -> str:

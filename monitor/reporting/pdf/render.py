@@ -115,18 +115,18 @@ def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) 
     document = laid_out(html)
     if not ends_early(document):
         return document
-    count, names = len(document.pages), filling_breaks(document)
+    count, choices = len(document.pages), filling_breaks(document)
     if closer is not None:
         del document
         document = laid_out(closer)
         if len(document.pages) < count and not ends_early(document):
             return document
-    if names:
+    for names in choices:
         del document
         document = laid_out(with_breaks_before(html, names))
         if len(document.pages) <= count and not ends_early(document):
             return document
-    elif closer is None:
+    if not choices and closer is None:
         return document
     del document
     return laid_out(html)
