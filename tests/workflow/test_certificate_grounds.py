@@ -65,12 +65,35 @@ def with_bar(campaign: Campaign, more_mm: float) -> Campaign:
 
 @pytest.mark.parametrize(
     "example",
-    ["five-days", "nothing-hidden", "cold-cold", "hot-cold", "tilting-table", "free-form-pins", "l-shape",
+    ["five-days", "nothing-hidden", "cold-cold", "hot-cold", "free-form-pins", "l-shape",
      "tracked-robot", "hidden-b-indexing", "hidden-loose-ball", "hidden-reversal-x", "hidden-spindle-growth"],
 )  # fmt: skip
 def test_no_example_is_refused(example: str) -> None:
     campaign = read_campaign(EXAMPLES / example)
     assert grounds(campaign, campaign.runs[-1].run) == ()
+
+
+def test_readings_that_fit_far_better_than_they_are_stated_may_be_in_inches() -> None:
+    exact = read_campaign(EXAMPLES / "tilting-table")
+    rng = np.random.default_rng(5)
+    sigma = 0.0007  # standard_uncertainty_um of its file
+    probings = exact.probings
+    noise = {
+        name: rng.normal(0.0, sigma, len(probings))
+        * (np.abs(probings.channels[f"normal_{name.lower()}"]) > 0.5)
+        for name in ("X", "Y", "Z")
+    }
+    noisy = {name: x + noise.get(name, 0.0) for name, x in probings.readings.items()}
+    inches = {name: x / 25.4 if name in noise else x for name, x in noisy.items()}
+
+    def grounds_with(readings: dict[str, np.ndarray]) -> tuple[Ground, ...]:
+        return grounds(replace(exact, probings=replace(probings, readings=readings)), 2)
+
+    assert grounds_with(noisy) == ()
+    for (ground,) in (grounds_with(inches), grounds(exact, 2)):
+        assert (ground.kind, ground.run, ground.subject) == (GroundKind.UNITS, 2, "")
+        assert 0.025 < ground.size < 0.05  # 1/25.4 where the statement is right
+        assert "in another unit, such as inches" in ground_sentence(ground, texts_of("en"))
 
 
 def test_a_bar_typed_one_millimetre_wrong(five_days: Campaign) -> None:
@@ -232,7 +255,7 @@ def test_no_temperature_where_a_bar_gives_the_length(five_days: Campaign) -> Non
     assert [ground.kind for ground in grounds(cold)] == [GroundKind.TEMPERATURE]
     tilting = read_campaign(EXAMPLES / "tilting-table")
     bare = replace(tilting, runs=tuple(replace(run, conditions={}) for run in tilting.runs))
-    assert grounds(bare, 1) == ()
+    assert {ground.kind for ground in grounds(bare, 1)} == {GroundKind.UNITS}  # simulated without noise
 
 
 @pytest.mark.parametrize(("degrees", "limit"), [(294.15, 60.0), (68.0, 60.0), (-60.0, -40.0)])

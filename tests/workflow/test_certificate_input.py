@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.store import Database
 from monitor.workflow.certificate.files import prepared, why_not
 from monitor.workflow.certificate.issue import issue
@@ -27,7 +28,12 @@ def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path, pdf_unr
         made = issue(
             db,
             CertificateRequest(
-                "tilting-table-compensated", None, laboratory=LABORATORY, out=tmp_path, issued_on=DAY
+                "tilting-table-compensated",
+                None,
+                laboratory=LABORATORY,
+                out=tmp_path,
+                issued_on=DAY,
+                accept={GroundKind.UNITS: "simulated without noise"},
             ),
         )
         assert made.certificate.runs == (1,)
@@ -55,7 +61,12 @@ def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path, pdf_unr
             issue(
                 db,
                 CertificateRequest(
-                    "tilting-table-compensated", 1, laboratory=LABORATORY, out=in_the_way, issued_on=DAY
+                    "tilting-table-compensated",
+                    1,
+                    laboratory=LABORATORY,
+                    out=in_the_way,
+                    issued_on=DAY,
+                    accept={GroundKind.UNITS: "simulated without noise"},
                 ),
             )
 

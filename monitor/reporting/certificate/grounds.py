@@ -30,7 +30,8 @@ class Ground:
     """One ground: of a ``run`` and a ``subject`` (a parameter, a reading, a bar), a ``size`` beyond its ``limit``.
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
-    them. Lack of fit has a parameter as its subject where it is about its budget.
+    them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and
+    none where the residuals are a ``size`` of what the statements leave.
     """
 
     kind: GroundKind
@@ -55,6 +56,8 @@ def ground_sentence(ground: Ground, texts: Texts) -> str:
     key = ground.kind.value.replace("-", "_")
     if ground.kind is GroundKind.TEMPERATURE and ground.size is not None:
         key = "impossible_temperature"
+    if ground.kind is GroundKind.UNITS and not ground.subject:
+        key = "fits_too_well"
     if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:
         key = "lack_in_budget"
     return texts(

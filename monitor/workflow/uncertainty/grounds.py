@@ -28,6 +28,8 @@ from monitor.units import MICROMETRE
 #: has its line in the budget; from five on 96 % of their variance has no known source. Largest of a complete model:
 #: 1.6; with hidden effects: 3.4 (tracked-robot).
 MOST_TIMES = 5.0
+#: And so small a part: no probe is twenty times better than its owner says; readings in inches fit 25 times too well.
+LEAST_TIMES = 0.05
 #: mm/m. A steel scale 30 K off 20 °C comes to 0.35; what is more is no property of an axis, but a wrong length. Largest
 #: in the examples: 0.07.
 LARGEST_GAIN = 1e-3
@@ -74,6 +76,7 @@ def _units(campaign: Campaign, run: int) -> Iterator[Ground]:
 
 
 def _lack_of_fit(robust: RobustFit, run: int) -> Iterator[Ground]:
+    """Residuals that contradict the stated uncertainties: too large for the model, or too small for the unit."""
     fit = robust.fit
     index = int(np.flatnonzero(fit.problem.runs == run)[0])
     weighted = fit.solution.last.residual[index]
@@ -85,6 +88,8 @@ def _lack_of_fit(robust: RobustFit, run: int) -> Iterator[Ground]:
     times = float(np.sqrt(weighted @ weighted / freedom))
     if times > MOST_TIMES:
         yield Ground(GroundKind.LACK_OF_FIT, run, "", times, MOST_TIMES)
+    elif times < LEAST_TIMES:
+        yield Ground(GroundKind.UNITS, run, "", times, LEAST_TIMES)
 
 
 def _implausible(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
