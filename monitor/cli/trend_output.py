@@ -52,6 +52,8 @@ def say(answer: TrendAnswer) -> None:
 def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
     for name, parameter in parameters:
+        yield from _out_of_tolerance(name, parameter)
+    for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
         yield from (_event_step(name, step) for step in parameter.event_steps)
     few = [
@@ -76,6 +78,14 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
     yield from answer.figures or ()
+
+
+def _out_of_tolerance(name: str, parameter: ParameterTrend) -> Iterator[str]:
+    """What the latest runs say of a limit that is passed already, whatever is foretold."""
+    latest, limit = parameter.mean.latest, parameter.forecast.limit
+    if limit is not None and abs(latest) > limit:
+        value = _latest(latest, parameter.mean.latest_u)
+        yield f"out of tolerance: {name}, {value} {parameter.unit} in the latest runs, limit {limit:g} {parameter.unit}"
 
 
 def weekly_lines(looks: WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
@@ -312,6 +322,9 @@ def _next_check(answer: TrendAnswer) -> Iterator[str]:
         return
     name = min(intervals, key=lambda parameter: intervals[parameter])
     first = answer.parameters[name]
+    if intervals[name] < 0.5:
+        yield f"check at once, for {name} ({first.forecast.recommended_by})"
+        return
     yield f"check within {intervals[name]:.0f} days, for {name} ({first.forecast.recommended_by})"
     span = first.drift.span_days
     if intervals[name] >= span:

@@ -435,6 +435,15 @@ def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
     assert "its drift was seen over 203 days only" in said
 
 
+@pytest.mark.parametrize(("latest", "lines"), [(-45.03, 1), (19.9, 0)])
+def test_what_is_beyond_its_limit_is_said_whatever_is_foretold(latest: float, lines: int) -> None:
+    parameter = SimpleNamespace(
+        mean=SimpleNamespace(latest=latest, latest_u=0.51), forecast=SimpleNamespace(limit=20.0), unit="µrad"
+    )
+    said = list(out_of_tolerance("EC0Y", parameter))
+    assert said == [f"out of tolerance: EC0Y, {latest:.2f} µrad in the latest runs, limit 20 µrad"][:lines]
+
+
 def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:
     step = SimpleNamespace(size=12345.6, u=950.0, unit="µrad", at="2026-03-05T08:00:00")
     line = headline("EB0C", SimpleNamespace(changes=[step]))
