@@ -52,7 +52,7 @@ def say(answer: TrendAnswer) -> None:
 def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
     for name, parameter in parameters:
-        yield from _out_of_tolerance(name, parameter)
+        yield from out_of_tolerance(name, parameter)
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
         yield from (_event_step(name, step) for step in parameter.event_steps)
@@ -80,8 +80,8 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from answer.figures or ()
 
 
-def _out_of_tolerance(name: str, parameter: ParameterTrend) -> Iterator[str]:
-    """What the latest runs say of a limit that is passed already, whatever is foretold."""
+def out_of_tolerance(name: str, parameter: ParameterTrend) -> Iterator[str]:
+    """Yield a sentence where the latest runs lie beyond the limit, whatever is foretold."""
     latest, limit = parameter.mean.latest, parameter.forecast.limit
     if limit is not None and abs(latest) > limit:
         value = _latest(latest, parameter.mean.latest_u)

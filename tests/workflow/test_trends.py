@@ -15,6 +15,7 @@ import pytest
 from by_path import TESTS, load
 
 from monitor.cli import main
+from monitor.cli.trend_output import out_of_tolerance
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.statistics import find_changes
