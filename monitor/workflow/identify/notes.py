@@ -15,12 +15,11 @@ from monitor.methods.model import chain_of
 from monitor.records import Machine
 from monitor.reporting.run_notes import AngleNoted, AxisAt, GrossReadingNoted, OffsetNoted, ResidualsNoted
 from monitor.units import DEGREE
-from monitor.workflow.uncertainty.grounds import LEAST_TIMES
 
 # Residuals beyond so many stated standard uncertainties: a probe's statement is seldom wrong by a factor of three.
 TOO_LARGE = 3.0
-# And so small a part: no probe is twenty times better than its owner says.
-TOO_SMALL = LEAST_TIMES
+# And so small a part: no probe is twenty times better than its owner says; readings in inches fit 25 times too well.
+TOO_SMALL = 0.05
 # Joints are mastered to some degrees at worst, and axes stand within millimetres of their drawing (five of a hundred
 # parts of a link, and never less than 5 mm): beyond, the machine file says something else than the machine is.
 LARGEST_ANGLE = np.deg2rad(5.0)

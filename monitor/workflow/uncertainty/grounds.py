@@ -23,13 +23,12 @@ from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.grounds import Ground, GroundKind
 from monitor.units import MICROMETRE
+from monitor.workflow.identify.notes import TOO_SMALL
 
 #: The residuals over what the stated uncertainties leave. Up to three a probe's statement may be wrong, and lack of fit
 #: has its line in the budget; from five on 96 % of their variance has no known source. Largest of a complete model:
 #: 1.6; with hidden effects: 3.4 (tracked-robot).
 MOST_TIMES = 5.0
-#: And so small a part: no probe is twenty times better than its owner says; readings in inches fit 25 times too well.
-LEAST_TIMES = 0.05
 #: mm/m. A steel scale 30 K off 20 °C comes to 0.35; what is more is no property of an axis, but a wrong length. Largest
 #: in the examples: 0.07.
 LARGEST_GAIN = 1e-3
@@ -88,8 +87,8 @@ def _lack_of_fit(robust: RobustFit, run: int) -> Iterator[Ground]:
     times = float(np.sqrt(weighted @ weighted / freedom))
     if times > MOST_TIMES:
         yield Ground(GroundKind.LACK_OF_FIT, run, "", times, MOST_TIMES)
-    elif times < LEAST_TIMES:
-        yield Ground(GroundKind.UNITS, run, "", times, LEAST_TIMES)
+    elif times < TOO_SMALL:
+        yield Ground(GroundKind.UNITS, run, "", times, TOO_SMALL)
 
 
 def _implausible(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
