@@ -18,11 +18,11 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.uncertainty.parts import Estimated
-from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
+from monitor.uncertainty.roots import WithCovariance, checked_covariance, covariance_root
 
 
 @dataclass(frozen=True)
-class Inputs:
+class Inputs(WithCovariance):
     """The input quantities X of a model, their estimates (n,) and covariance (n, n), in internal units.
 
     ``sources`` names for every input where its uncertainty comes from; ``dof`` gives the degrees of freedom
@@ -62,16 +62,6 @@ class Inputs:
     def source_names(self) -> tuple[str, ...]:
         """Every source once, in the order of the inputs."""
         return tuple(dict.fromkeys(self.sources))
-
-    @property
-    def u(self) -> Array:
-        """Standard uncertainties (n,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Array:
-        """Correlation matrix (n, n)."""
-        return correlation_of(self.covariance)
 
     @property
     def rank(self) -> int:

@@ -313,9 +313,9 @@ def test_what_a_server_refuses_is_refused_in_the_same_words(sides: Sides, tmp_pa
     shutil.copytree(EXAMPLES / "nothing-hidden", broken)
     (broken / "runs.csv").write_text("run,started_at\n1,yesterday\n2,today\n")
     request = QUESTIONS["import"].request(folders=[broken])
-    with pytest.raises(CampaignError) as here:
+    with pytest.raises(CampaignError, match="yesterday") as here:
         QUESTIONS["import"].load()(sides.db, request)
-    with pytest.raises(InputError) as there:
+    with pytest.raises(InputError, match="yesterday") as there:
         sides.server.answer("import", request)
     assert str(there.value) == str(here.value)
     with pytest.raises(NotFoundError, match="nowhere"):
