@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -110,13 +111,18 @@ BLOCKS_OF_PERIOD, MOST_BLOCKS = 10, 200
 
 
 def _widened(
-    fit: MixedFit, design: Array, day: npt.NDArray[np.intp], t: Array, periods: Sequence[float | None]
+    fit: MixedFit,
+    design: Array,
+    day: npt.NDArray[np.intp],
+    t: Array,
+    periods: Sequence[float | None],
+    first: int,
 ) -> MixedFit:
     """The fit with covariance and degrees of freedom for days that resemble their neighbours.
 
     Of every coefficient the part of its variance that rests on the days is widened as the slope of a line over its own
     column is, beside all others (``block_lines``). Left as it is where so few days allow no such line. ``periods`` (q,)
-    are those of the columns that are waves.
+    are those of the columns that are waves; of the columns before ``first`` nobody asks the uncertainty.
     """
     count = np.bincount(day)
     order = np.argsort(np.bincount(day, t) / count, kind="stable")
@@ -126,7 +132,7 @@ def _widened(
     weight = fit.weight[order]
     factor, dof = np.ones(len(fit.coefficients)), fit.dof.copy()
     by_day = _mean_square(np.arange(len(times)), weight, means, residual)
-    for at in range(1, design.shape[1]):
+    for at in range(first, design.shape[1]):
         block = _blocks_of(times, periods[at])
         if block is None:
             continue
@@ -212,7 +218,7 @@ def dependence(
     channels: Mapping[str, npt.ArrayLike],
     *,
     cycles: Mapping[str, float] | None = None,
-    drift: bool = True,
+    drift: bool | Literal["beside"] = True,
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
     units: DependenceUnits | None = None,
@@ -221,8 +227,9 @@ def dependence(
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
-    ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's unit is
-    that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
+    A drift that is only fitted ``"beside"`` them is not reported, and its own uncertainty, half of the work beside one
+    channel, not computed. ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's
+    unit is that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
     neglected: they pull a coefficient towards zero by the ratio of their variance to that of the channel.
@@ -236,12 +243,12 @@ def dependence(
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
     cycles = cycles or {}
-    terms, design = _design(t, channels, cycles, drift)
+    terms, design = _design(t, channels, cycles, bool(drift))
     fit = fit_with_days(y, design, run_u, index)
     if not independent:
         waves = [period for period in cycles.values() for _ in range(2)]
         periods = [None] * (design.shape[1] - len(waves)) + waves
-        fit = _widened(fit, design, index, t, periods)
+        fit = _widened(fit, design, index, t, periods, 2 if drift == "beside" else 1)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
@@ -256,7 +263,7 @@ def dependence(
             _cycle(fit, start + len(channels) + 2 * i, name, period, origin)
             for i, (name, period) in enumerate(cycles.items())
         ),
-        drift=_coefficient(fit, 1, "drift", None, level) if drift else None,
+        drift=_coefficient(fit, 1, "drift", None, level) if drift is True else None,
         terms=terms,
         correlation=fit.covariance / np.where(scale > 0.0, scale, 1.0),
         explained=1.0 - float((weight * fit.residual**2).sum()) / total if total > 0.0 else 0.0,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from monitor.exceptions import MonitorError
 from monitor.store import audit
-from monitor.store.analyses import analysis_content
+from monitor.store.analyses import analysis_contents
 from monitor.store.archiving import archived_hashes
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.campaigns import stored_content
@@ -132,8 +132,8 @@ def _contents(db: Database) -> Iterator[_Content]:
         except (MonitorError, ValueError, KeyError, TypeError):
             content = ""
         yield _Content("identification", str(number), content, number)
-    for (number,) in db.rows("SELECT analysis_id FROM analysis ORDER BY ALL"):
-        yield _Content("analysis", str(number), analysis_content(db, number))
+    for number, content in analysis_contents(db):
+        yield _Content("analysis", str(number), content)
     for (number,) in db.rows("SELECT event_id FROM event ORDER BY ALL"):
         yield _Content("event", str(number), event_content(db, number))
     for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):

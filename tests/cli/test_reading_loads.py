@@ -43,6 +43,9 @@ LOADED = {
     "trend|HU40-T": set(),
     "model|list": {"monitor.methods", "monitor.effects", "monitor.machine"},
     "stats|five-days": set(),
+    "stats|five-days|--json": set(),
+    "trend|HU40-T|--parameter|EC0Y": set(),
+    "export|tables": set(),
 }
 WATCHED = {
     *(

@@ -102,6 +102,21 @@ def test_drift_and_an_ever_warmer_channel_are_told_apart_or_said_to_be_one():
     assert abs(result.correlation[1, 2]) > 0.99
 
 
+def test_drift_that_is_not_reported_changes_no_other_number():
+    rng = np.random.default_rng(11)
+    t = np.repeat(np.arange(12.0), 3) + np.tile([0.1, 0.2, 0.3], 12)
+    ambient = 20.0 + rng.normal(size=36)
+    values = 0.3 * ambient + 0.1 * t + np.repeat(rng.normal(size=12), 3) + rng.normal(size=36)
+    for channels, cycles in (({"ambient": ambient}, None), ({}, {"day": 1.0})):
+        reported = dependence(values, t, channels, cycles=cycles, days=t.astype(int))
+        beside = dependence(values, t, channels, cycles=cycles, days=t.astype(int), drift="beside")
+        assert reported.drift is not None
+        assert beside.drift is None
+        assert beside.coefficients == reported.coefficients
+        assert beside.cycles == reported.cycles
+        assert beside.terms == reported.terms
+
+
 def test_refusals_say_what_is_needed():
     t = np.arange(10.0)
     with pytest.raises(DataError, match=r"channel ambient is 20\.0 in every run"):

@@ -44,6 +44,27 @@ def test_latest_of_its_kind_is_given_and_the_earlier_stays(db: Database, campaig
     assert numbers == [(1,), (2,), (3,)]
 
 
+def test_result_that_is_the_latest_already_is_not_stored_again(db: Database, campaign: Campaign) -> None:
+    import_campaign(db, campaign)
+
+    def save(document: dict[str, object], **subject: str) -> int:
+        return save_analysis(
+            db, "trend", document, method="m", seed=3, repeated=False, machine=campaign.machine.id, **subject
+        )
+
+    first = save(DOCUMENT)
+    entries = db.rows("SELECT count(*) FROM audit")
+    assert save(DOCUMENT) == first
+    assert db.rows("SELECT count(*) FROM audit") == entries
+    # Of another subject, another document, and the first again after it: each is news.
+    assert [save(DOCUMENT, model="samba"), save({"n": 1}), save(DOCUMENT)] == [
+        first + 1,
+        first + 2,
+        first + 3,
+    ]
+    assert load_analysis(db, "trend").document == DOCUMENT
+
+
 def test_document_that_is_not_json(db: Database) -> None:
     with pytest.raises(DataError, match=r"the trend result cannot be kept as JSON: [Oo]ut of range float"):
         save_analysis(db, "trend", {"slope": float("nan")}, method="robust")

@@ -9,6 +9,8 @@ has everything as it is. The folder gets its name when it is whole.
 from __future__ import annotations
 
 import contextlib
+import csv
+import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -154,10 +156,13 @@ def _column(column: str, kind: str) -> str:
 
 def _columns(db: Database, folder: Path) -> Path:
     path = folder / "columns.csv"
-    db.frame(
+    rows = db.rows(
         "SELECT table_name, column_name, data_type, comment FROM duckdb_columns() "
         "WHERE database_name = current_database() AND NOT internal ORDER BY table_name, column_index"
-    ).to_csv(path, index=False)
+    )
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator=os.linesep)
+        writer.writerows([("table_name", "column_name", "data_type", "comment"), *rows])
     return path
 
 

@@ -211,6 +211,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
     save_analysis(
         db, "statistics", to_document(answer), method=f"by {request.by}", campaign=campaign.name,
         model=identification.model, model_version=identification.model_version, seed=SEED,
+        repeated=False,
     )  # fmt: skip
     if request.matrices is not None:
         of_parameters = write_matrices(request.matrices, "parameters", pooled, [unit.name for unit in units])

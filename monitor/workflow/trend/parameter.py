@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -136,9 +137,10 @@ def _condition(
     part = series.part(mask)
     channel = column_unit(name) or ONE
     with_drift = part.day_count >= 3
+    drift: Literal["beside", False] = "beside" if with_drift else False
     try:
         fit = dependence(
-            part.values, part.t, {name: values}, drift=with_drift, u=part.weights(), days=part.days,
+            part.values, part.t, {name: values}, drift=drift, u=part.weights(), days=part.days,
             units=DependenceUnits(Unit(series.unit, 1.0), {name: channel}),
         )  # fmt: skip
     except DataError:
@@ -175,8 +177,8 @@ def cycles(piece: Series) -> tuple[tuple[Cycle, ...], Lack | None]:
         return (), Lack(Part.CYCLES, Cause.NO_CYCLE_SEEN, needed=(DAY_COVERAGE_H, YEAR_COVERAGE_D))
     try:
         fit = dependence(
-            piece.values, piece.t, {}, cycles=periods, drift=piece.day_count >= 3, u=piece.weights(),
-            days=piece.days,
+            piece.values, piece.t, {}, cycles=periods, drift="beside" if piece.day_count >= 3 else False,
+            u=piece.weights(), days=piece.days,
         )  # fmt: skip
     except DataError as error:
         return (), refused(Part.CYCLES, error)

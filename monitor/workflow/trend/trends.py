@@ -68,8 +68,9 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     answer = _answer(db, request, history, events, past)
     if past and request.is_plain and not db.read_only:
         save_analysis(
-            db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED
-        )
+            db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED,
+            repeated=False,
+        )  # fmt: skip
     if request.weekly_looks:
         from monitor.workflow.history.weekly_looks import weekly_notices
 
