@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import getpass
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from monitor import store
 from monitor.api.answer import Answer
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from monitor.workflow.health.request import ReportAnswer
     from monitor.workflow.intake.importing import ImportAnswer
     from monitor.workflow.model.answer import ModelsAnswer
-    from monitor.workflow.simulation import SimulateAnswer
+    from monitor.workflow.simulation import SimulateAnswer, SimulateMachineAnswer
     from monitor.workflow.trend.answer import TrendAnswer
 
 
@@ -150,13 +152,34 @@ def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s
     return Database(path, read_only=read_only, wait_s=wait_s)
 
 
-def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:
-    """Write a virtual campaign folder with or without a hidden effect.
+def simulate(
+    out: str | Path,
+    topology: str | None = None,
+    *,
+    errors: Mapping[str, float | Sequence[float]] | None = None,
+    **options: Any,
+) -> Answer[SimulateAnswer] | Answer[SimulateMachineAnswer]:
+    """Write a virtual campaign folder: of a machine of a ``topology`` with chosen ``errors``, or of one of ours.
 
-    ``options`` are ``effect``, ``peak_um``, ``noise_um``, ``seed`` and ``robot``. Raises InputError for another option
-    or a value that cannot be.
+    With a ``topology``, such as ``"w C B X b Z Y (C1) t"``: ``errors`` in µm, µrad and µm/m by effect, such as
+    ``{"EC0B": 20, "EXX:poly1": 15}``, and ``method`` (its own plan), ``days``, ``noise_um`` and ``seed``. Without:
+    ``effect`` is hidden in the virtual machine of the project, with ``peak_um``; ``noise_um``, ``seed``, ``robot``.
+    Raises InputError for another option or a value that cannot be, TopologyError, EffectError, and DataError for a
+    machine on which the plan cannot be measured.
     """
-    from monitor.workflow.simulation import SimulateRequest, simulate
+    from monitor.workflow import simulation
 
-    with options_as_arguments(SimulateRequest):
-        return Answer(simulate(request_of(SimulateRequest, {**options, "out": Path(out)})))
+    if topology is None:
+        if errors is not None:
+            raise InputError("errors needs topology, the machine that has them; without it there is effect")
+        with options_as_arguments(simulation.SimulateRequest):
+            return Answer(
+                simulation.simulate(request_of(simulation.SimulateRequest, {**options, "out": Path(out)}))
+            )
+    sizes = {
+        text: tuple(np.atleast_1d(np.asarray(size, dtype=float)).tolist())
+        for text, size in (errors or {}).items()
+    }
+    wanted = {**options, "out": Path(out), "topology": topology, "errors": sizes}
+    with options_as_arguments(simulation.SimulateMachineRequest):
+        return Answer(simulation.simulate_machine(request_of(simulation.SimulateMachineRequest, wanted)))

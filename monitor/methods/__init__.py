@@ -5,18 +5,17 @@ methods share is in ``chain`` (any machine); a new method is a new folder, found
 """
 
 from monitor.methods.method import (
-    Able,
     AnglePlan,
     ChainMethod,
     CurveMethod,
     InstrumentPlan,
     Method,
-    Rehearsal,
     Stepwise,
     TouchPlan,
     Unable,
 )
 from monitor.methods.registry import campaign_method, method_named, methods, require
+from monitor.methods.rehearsal import Able, Rehearsal
 
 __all__ = [
     "Able",

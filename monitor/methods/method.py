@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING, Protocol
 
 from monitor.exceptions import DataError
 from monitor.machine import Chain
@@ -24,16 +22,12 @@ from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.chain.results import AdviceOf, identification
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.model import Model
+from monitor.methods.rehearsal import YES, Able, Rehearsal
 from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
     from monitor.methods.curve.fit import CurveFit
-
-
-@dataclass(frozen=True)
-class Able:
-    """The method answers the question."""
 
 
 @dataclass(frozen=True)
@@ -60,32 +54,6 @@ class Stepwise(Able):
     """One run can be identified step by step too, beside the fit of all unknowns at once."""
 
     coefficients: Callable[[ChainProblem, Solution, int], tuple[StepwiseCoefficient, ...]]
-
-
-class VirtualCampaign(Protocol):
-    """Makes a campaign with an effect whose largest displacement is ``peak`` (mm), under a ``noise`` (mm) of a reading.
-
-    Raises EffectError for an effect that the virtual machine does not have or that does nothing in its plan.
-    """
-
-    def __call__(
-        self,
-        name: str,
-        rng: np.random.Generator,
-        *,
-        effect: str | None = None,
-        peak: float = 0.0,
-        noise: float = ...,
-    ) -> Campaign: ...
-
-
-@dataclass(frozen=True)
-class Rehearsal(Able):
-    """Virtual campaigns of a ``machine``; ``noise_um`` is the standard deviation of a reading where none is named."""
-
-    machine: Literal["machine tool", "robot"]
-    virtual_campaign: VirtualCampaign
-    noise_um: float
 
 
 class ExpectedAngles(Protocol):
@@ -385,14 +353,14 @@ class ChainMethod(Method):
     taken_as_known: tuple[str, ...] = ()
     taken_up: Callable[[ChainProblem], tuple[TakenUp, ...]] = nothing_taken_up
     shares_base: bool = False
-    statistics: Able | Unable = Able()
-    coordinates: Able | Unable = Able()
-    uncertainty: Able | Unable = Able()
+    statistics: Able | Unable = YES
+    coordinates: Able | Unable = YES
+    uncertainty: Able | Unable = YES
     plan: TouchPlan | AnglePlan | InstrumentPlan | Unable = NO_TOUCH_PLAN
     stepwise: Stepwise | Unable = NO_STEPWISE
-    map: Able | Unable = Able()
-    trend: Able | Unable = Able()
-    certificate: Able | Unable = Able()
+    map: Able | Unable = YES
+    trend: Able | Unable = YES
+    certificate: Able | Unable = YES
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
     standards: StandardTests | Unable = NO_STANDARDS
     instruments: Instruments | Unable = ONE_INSTRUMENT

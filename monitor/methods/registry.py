@@ -16,7 +16,8 @@ from types import MappingProxyType
 from typing import overload
 
 from monitor.exceptions import DataError, InputError
-from monitor.methods.method import Able, ChainMethod, CurveMethod, Unable
+from monitor.methods.method import ChainMethod, CurveMethod, Unable
+from monitor.methods.rehearsal import Able
 from monitor.records import Campaign, CurveCampaign
 
 GROUP = "monitor.methods"

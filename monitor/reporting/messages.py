@@ -93,6 +93,12 @@ def virtual_written(out: Path, runs: int, probings: int, hidden: tuple[str, floa
     return f"{out}: {runs} run{'s' if runs > 1 else ''} of {probings} probings; {effect}"
 
 
+def virtual_machine_written(out: Path, runs: int, probings: int, errors: Sequence[str]) -> str:
+    """Return what is said of a virtual campaign of a machine with chosen ``errors``."""
+    listed = f"the machine has {', '.join(errors)}" if errors else "the machine has no errors"
+    return f"{out}: {runs} run{'s' if runs > 1 else ''} of {probings} probings; {listed}"
+
+
 def name_means_another(name: str, label: str, before: int) -> str:
     """Return the note for other users of a model's name that means another version from now on."""
     return (

@@ -28,6 +28,7 @@ NOT_OFFERED: Mapping[str, str] = {
     "publish": "a plant publishes beside the server, by monitor publish",
     "restore": "a backup is restored beside the server, by monitor restore: no second database is served",
     "simulate": "a rehearsal is written by monitor simulate; upload its folder",
+    "simulate a machine": "a rehearsal is written by mm.simulate in Python; upload its folder",
     "simulate like a folder": "a rehearsal is written by monitor simulate; upload its folder",
     "watch": "a folder is watched by monitor watch on the computer that has it, while no server has the database",
 }

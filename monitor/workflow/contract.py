@@ -98,6 +98,7 @@ QUESTIONS = {
         "selections side by side": "selections.side_by_side:side_by_side",
         "show certificate": "certificate.states:show_certificate",
         "simulate": "simulation:simulate",
+        "simulate a machine": "simulation:simulate_machine",
         "simulate like a folder": "likeness:simulate_like",
         "simulate like a campaign": "likeness:simulate_like_stored",
         "sql": "query:sql",

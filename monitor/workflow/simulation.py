@@ -1,14 +1,15 @@
-"""Writes a virtual campaign folder, to rehearse."""
+"""Writes a virtual campaign folder, to rehearse: of the project's machine with a hidden effect, or of any machine."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, did_you_mean
 from monitor.methods import Rehearsal, methods
 from monitor.readers import write_campaign
 from monitor.reporting import messages
@@ -104,4 +105,84 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         runs=runs,
         probings=probings,
         message=messages.virtual_written(request.out, runs, probings // runs, hidden),
+    )
+
+
+@dataclass(frozen=True)
+class SimulateMachineRequest:
+    """A virtual campaign of a machine of a ``topology``, with the errors that are named and no others.
+
+    ``method`` gives the plan: the same number of runs on each of the ``days``, named after ``out``. ``errors`` by
+    effect (``EC0Y``, ``EXX:poly1``, ``EBB:harmonic2``) in display units (µm, µrad, µm/m), as many numbers as it has
+    coefficients. ``noise_um`` is the standard deviation of a reading, the method's own where it is None.
+    """
+
+    out: Path
+    topology: str
+    errors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    method: str = "samba"
+    days: int = 5
+    noise_um: float | None = None
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.noise_um is not None and not (math.isfinite(self.noise_um) and self.noise_um > 0):
+            raise InputError(f"--noise {self.noise_um}: the noise of a reading must be above 0 µm")
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
+
+
+@dataclass(frozen=True)
+class SimulateMachineAnswer:
+    """What was written, and the errors that the machine has: the truth to compare an identification with."""
+
+    folder: str
+    campaign: str
+    topology: str
+    errors: Mapping[str, tuple[float, ...]]
+    noise_um: float
+    seed: int
+    runs: int
+    probings: int
+    message: str
+
+
+def simulate_machine(request: SimulateMachineRequest) -> SimulateMachineAnswer:
+    """Write a virtual campaign of any machine.
+
+    Raises InputError for a method without a plan for any machine, TopologyError, EffectError, and DataError for a
+    machine on which the plan cannot be measured.
+    """
+    rehearsals = {
+        name: method.rehearsal
+        for name, method in methods().items()
+        if isinstance(method.rehearsal, Rehearsal) and method.rehearsal.chosen_campaign is not None
+    }
+    rehearsal = rehearsals.get(request.method)
+    if rehearsal is None or rehearsal.chosen_campaign is None:
+        raise InputError(
+            f"the method '{request.method}' has no plan of its own for any machine; "
+            f"{did_you_mean(request.method, rehearsals)}{', '.join(rehearsals)} has; for others: simulate --like"
+        )
+    noise = rehearsal.noise_um if request.noise_um is None else request.noise_um
+    campaign = rehearsal.chosen_campaign(
+        request.out.resolve().name,
+        np.random.default_rng(request.seed),
+        topology=request.topology,
+        errors=request.errors,
+        days=request.days,
+        noise=MICROMETRE.to_internal(noise),
+    )
+    write_campaign(campaign, request.out)
+    runs, probings = len(campaign.runs), len(campaign.probings)
+    return SimulateMachineAnswer(
+        folder=str(request.out),
+        campaign=campaign.name,
+        topology=campaign.machine.topology,
+        errors=request.errors,
+        noise_um=noise,
+        seed=request.seed,
+        runs=runs,
+        probings=probings,
+        message=messages.virtual_machine_written(request.out, runs, probings // runs, list(request.errors)),
     )

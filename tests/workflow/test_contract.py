@@ -123,6 +123,7 @@ def test_the_faces_ask_nothing_but_the_questions_of_the_contract() -> None:
         "history.values:values_of_machine",
         "kinematics:poses",
         "query:readings",
+        "simulation:simulate_machine",
         "uncertainty.cloud:cloud",
         "volumetric.over_stroke:over_stroke",
     }

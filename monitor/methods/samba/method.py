@@ -16,9 +16,10 @@ from monitor.machine import refuse_untouchable
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.chain.touch import Distance, TouchProblem
-from monitor.methods.method import ChainMethod, Nouns, Rehearsal, TouchPlan
+from monitor.methods.method import ChainMethod, Nouns, TouchPlan
 from monitor.methods.model import Model, chain_of
-from monitor.methods.samba.virtual import virtual_campaign
+from monitor.methods.rehearsal import Rehearsal
+from monitor.methods.samba.virtual import chosen_campaign, virtual_campaign
 from monitor.records import Array, Campaign
 from monitor.refusal import Advice, AdviceKind
 
@@ -122,5 +123,5 @@ METHOD = ChainMethod(
     refuse=refuse,
     advice=advice,
     plan=TouchPlan(),
-    rehearsal=Rehearsal("machine tool", virtual_campaign, noise_um=1.0),
+    rehearsal=Rehearsal("machine tool", virtual_campaign, noise_um=1.0, chosen_campaign=chosen_campaign),
 )

@@ -1,19 +1,23 @@
 """A virtual SAMBA campaign: the plan of Los 2017, chapter 5, touched by a machine with errors that we choose.
 
+``virtual_campaign`` is of that machine, with a hidden effect; ``chosen_campaign`` of any machine with a touch probe and
+rotary axes, with the errors that are named.
+
 For rehearsal and for the expected uncertainty of plans. Tests of the identification use another simulator,
 which shares no code with this package.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from monitor.effects import Context, context_of, parse_effect
-from monitor.exceptions import EffectError
-from monitor.machine import evaluate, parse_term, touching_positions
+from monitor.effects import ChainEffect, Context, context_of, parse_effect
+from monitor.exceptions import DataError, EffectError, InputError
+from monitor.machine import Chain, evaluate, parse_term, parse_topology, touching_positions
 from monitor.methods.model import chain_of
 from monitor.records import Array, Artefact, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
 from monitor.units import DEGREE
@@ -32,7 +36,6 @@ BALLS = {
 }
 BAR_LENGTH = 304.98923
 BAR_UNCERTAINTY = 0.0012
-BAR_AT = (0, 0, 0)
 TOPOLOGY = "w C B X b Z Y (C1) t"
 # Table 4.1 of the thesis, in its units, for the location errors and gains; offsets of the spindle from table 6.1.
 ERRORS = {
@@ -47,20 +50,39 @@ BETWEEN_RUNS = timedelta(minutes=75)
 SPREAD_MM = 0.2
 
 
-def _plan() -> list[tuple[str, tuple[int, int, int]]]:
+#: Where the ball of the probe is on a machine whose tool turns, mm: without a length a turn of the head moves nothing.
+HEAD_TIP = (0.0, 0.0, -150.0)
+MOST_DAYS = 366
+
+
+#: The errors (n, J, 2, 6) of a machine, and a function that adds others to them and to targets (n, 3), given the tip.
+_Start = Callable[[Context], Array]
+_Add = Callable[[Context, Array, Array, Array], None]
+
+
+def _plan(indexations: Sequence[tuple[int, ...]]) -> list[tuple[str, tuple[int, ...]]]:
     touches = []
-    for indexation in INDEXATIONS:
+    for indexation in indexations:
         touches += [(ball, indexation) for ball in BALLS]
-        if indexation == BAR_AT:
+        if not any(indexation):
             touches += [("S1", indexation), ("S2", indexation)]
     return touches
 
 
-def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
-    """The campaign without linear readings."""
+def _blank(
+    name: str,
+    noise: float,
+    rng: np.random.Generator,
+    machine: Machine,
+    axes: tuple[str, ...] = ("B", "C", "C1"),
+    indexations: Sequence[tuple[int, ...]] = INDEXATIONS,
+    days: int = DAYS,
+) -> Campaign:
+    """The campaign without linear readings, the rotary ``axes`` at the angles of the ``indexations``."""
     half = BAR_LENGTH / 2
+    linear = sorted(joint.name for joint in chain_of(machine).joints if not joint.turns)
     balls = {**BALLS, "S1": (-150.0, half, 60.0), "S2": (-150.0, -half, 60.0)}
-    plan = _plan()
+    plan = _plan(indexations)
     first = datetime(2026, 3, 2, 8, 30, tzinfo=UTC)
     runs = tuple(
         Run(
@@ -70,7 +92,7 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
             warm_up=False,
             conditions={"ambient_degC": round(21.5 + 0.3 * index + float(rng.normal(0.0, 0.2)), 2)},
         )
-        for day in range(DAYS)
+        for day in range(days)
         for index in range(RUNS_A_DAY)
     )
     count = len(plan)
@@ -86,7 +108,7 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
     return Campaign(
         name=name,
         method="samba",
-        machine=Machine(id="virtual", topology=TOPOLOGY),
+        machine=machine,
         probe=Probe("virtual probe", "virtual", noise),
         artefact=Artefact(
             "four balls and a scale bar",
@@ -99,8 +121,7 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
             sequence=sequence.astype(np.int64),
             time=time,
             target=np.array([target for target, _ in plan] * len(runs)),
-            readings={"X": np.zeros(len(time)), "Y": np.zeros(len(time)), "Z": np.zeros(len(time)),
-                      "B": angles[:, 0], "C": angles[:, 1], "C1": angles[:, 2]},
+            readings={axis: np.zeros(len(time)) for axis in linear} | dict(zip(axes, angles.T, strict=True)),
             channels={"x_axis_degC": np.round(21.5 + 2.0 * (1.0 - np.exp(-day_hours / 2.0)), 3)},
         ),
     )  # fmt: skip
@@ -114,32 +135,114 @@ def virtual_campaign(
 
     Raises EffectError for an effect that the machine does not have or that does nothing at this plan.
     """
-    campaign = _blank(name, noise if noise > 0 else 1e-3, rng)
-    chain = chain_of(campaign.machine)
-    places = {
-        ball.id: np.array(ball.nominal) + rng.normal(0.0, SPREAD_MM, 3) for ball in campaign.artefact.balls
-    }
-    _fit_bar(places, BAR_LENGTH + rng.normal(0.0, BAR_UNCERTAINTY))
-    tip = np.array([rng.normal(0.0, 0.1), rng.normal(0.0, 0.1), 0.0])
-    true_target = np.array([places[str(target)] for target in campaign.probings.target])
-    readings = dict(campaign.probings.readings)
-    # Two passes: what an effect does depends on where the linear axes stand, which follows from what it does.
-    for _ in range(2):
-        campaign = replace(campaign, probings=replace(campaign.probings, readings=readings))
-        context = context_of(campaign, chain)
-        errors, target = _errors(context), true_target.copy()
-        if effect is not None and any(np.any(readings[axis]) for axis in "XYZ"):
+    campaign = _blank(name, noise if noise > 0 else 1e-3, rng, Machine(id="virtual", topology=TOPOLOGY))
+    tried = _Touches(campaign, rng, (0.0, 0.0, 0.0))
+
+    def hide(context: Context, errors: Array, target: Array, tip: Array) -> None:
+        if effect is not None and any(np.any(context.positions[:, joint]) for joint in tried.linear):
             _hide(effect, peak, context, errors, target, tip)
-        positions = touching_positions(chain, context.positions, errors, target, tip)
-        for index, joint in enumerate(chain.joints):
-            if not joint.turns:
+
+    return tried.touched(_errors, hide, noise, rng)
+
+
+def chosen_campaign(
+    name: str,
+    rng: np.random.Generator,
+    *,
+    topology: str,
+    errors: Mapping[str, tuple[float, ...]],
+    days: int,
+    noise: float = 1e-3,
+) -> Campaign:
+    """A campaign of four runs a day, of a machine of a ``topology`` that has these errors and no others.
+
+    ``errors`` by effect in display units (µm, µrad, µm/m), as many numbers as it has coefficients; ``noise`` in mm. The
+    plan is that of ``virtual_campaign``: the innermost rotary axis takes the angles of C, the others those of B and
+    those after it in the list. Raises TopologyError, EffectError, InputError for a name that is no error of an axis,
+    and DataError for a machine whose balls cannot be touched or that has no rotary axis.
+    """
+    if not 1 <= days <= MOST_DAYS:
+        raise InputError(f"days = {days}: a campaign has 1 to {MOST_DAYS} days")
+    chain = parse_topology(topology)
+    axes, indexations, tip = _turns(chain)
+    machine = Machine(id="virtual", topology=chain.topology)
+    campaign = _blank(name, noise, rng, machine, axes, indexations, days)
+    if any(tip):
+        campaign = replace(campaign, probe=replace(campaign.probe, tip=tip))
+    tried = _Touches(campaign, rng, tip)
+
+    def none(context: Context) -> Array:
+        return np.zeros((len(context), len(context.chain.joints), 2, 6))
+
+    def chosen(context: Context, geometric: Array, target: Array, tip: Array) -> None:
+        for text, sizes in errors.items():
+            effect = parse_effect(text, context.chain)
+            if not isinstance(effect, ChainEffect):
+                raise InputError(f"'{text}' is no error of an axis; name errors such as EA0B or EXX:poly1")
+            basis = effect.basis(context)
+            if len(sizes) != basis.size:
+                raise InputError(f"'{text}' has {basis.size} coefficients, not {len(sizes)}")
+            basis.apply(np.array([effect.unit.to_internal(size) for size in sizes]), geometric, target)
+
+    return tried.touched(none, chosen, noise, rng)
+
+
+def _turns(chain: Chain) -> tuple[tuple[str, ...], list[tuple[int, ...]], tuple[float, float, float]]:
+    """Rotary axes, their angles in degrees at each indexation, and where the tip is (mm). Raises DataError."""
+    rotary = [joint for joint in chain.joints if joint.turns and joint.kind != "spindle"]
+    if not rotary:
+        raise DataError(f"'{chain.topology}' has no rotary axis; balls and a scale bar need one that turns")
+    angles: dict[str, list[int]] = {}
+    turning = [number for number, row in enumerate(INDEXATIONS) if any(row[:2])]
+    for index, joint in enumerate(rotary):
+        # The innermost turns all the way round; each of the others has the tilts, begun a row later than the last.
+        column = [INDEXATIONS[number][1 if index == 0 else 0] for number in turning]
+        rolled = dict(zip(turning, np.roll(column, max(index - 1, 0)).tolist(), strict=True))
+        angles[joint.name] = [int(rolled.get(number, 0)) for number in range(len(INDEXATIONS))]
+    for joint in chain.joints:
+        if joint.kind == "spindle":
+            angles[joint.name] = [row[2] for row in INDEXATIONS]
+    # Without a spindle the indexations that turn it alone are one.
+    indexations = list(dict.fromkeys(zip(*angles.values(), strict=True)))
+    on_tool = any(joint.branch == "tool" for joint in rotary)
+    return tuple(angles), indexations, HEAD_TIP if on_tool else (0.0, 0.0, 0.0)
+
+
+class _Touches:
+    """True places of the balls and of the tip (mm), drawn once, and the readings at which they touch."""
+
+    def __init__(self, campaign: Campaign, rng: np.random.Generator, tip: Sequence[float]) -> None:
+        self.campaign, self.chain = campaign, chain_of(campaign.machine)
+        self.linear = [index for index, joint in enumerate(self.chain.joints) if not joint.turns]
+        places = {
+            ball.id: np.array(ball.nominal) + rng.normal(0.0, SPREAD_MM, 3)
+            for ball in campaign.artefact.balls
+        }
+        _fit_bar(places, BAR_LENGTH + rng.normal(0.0, BAR_UNCERTAINTY))
+        self.tip = np.array(tip, dtype=float)
+        self.tip[:2] += rng.normal(0.0, 0.1), rng.normal(0.0, 0.1)
+        self.target = np.array([places[str(target)] for target in campaign.probings.target])
+
+    def touched(self, start: _Start, add: _Add, noise: float, rng: np.random.Generator) -> Campaign:
+        """The campaign with its linear readings, under a ``noise`` in mm."""
+        campaign, readings = self.campaign, dict(self.campaign.probings.readings)
+        # Two passes: what an effect does depends on where the linear axes stand, which follows from what it does.
+        for _ in range(2):
+            campaign = replace(campaign, probings=replace(campaign.probings, readings=readings))
+            context = context_of(campaign, self.chain)
+            errors, target = start(context), self.target.copy()
+            add(context, errors, target, self.tip)
+            positions = touching_positions(self.chain, context.positions, errors, target, self.tip)
+            for index in self.linear:
+                joint = self.chain.joints[index]
                 readings[joint.name] = joint.sign * positions[:, index]
-    # The controller prints six decimals of a linear reading; angles are set values.
-    noisy = {
-        axis: np.round(values + rng.normal(0.0, noise, len(values)), 6) if axis in "XYZ" else values
-        for axis, values in readings.items()
-    }
-    return replace(campaign, probings=replace(campaign.probings, readings=noisy))
+        # The controller prints six decimals of a linear reading; angles are set values.
+        moved = {self.chain.joints[index].name for index in self.linear}
+        noisy = {
+            axis: np.round(values + rng.normal(0.0, noise, len(values)), 6) if axis in moved else values
+            for axis, values in readings.items()
+        }
+        return replace(campaign, probings=replace(campaign.probings, readings=noisy))
 
 
 def _errors(context: Context) -> Array:

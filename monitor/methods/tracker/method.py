@@ -15,7 +15,8 @@ from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
-from monitor.methods.method import ChainMethod, Nouns, Rehearsal, Unable
+from monitor.methods.method import ChainMethod, Nouns, Unable
+from monitor.methods.rehearsal import Rehearsal
 from monitor.methods.tracker.assembly import NAME, problem_of, tool_side
 from monitor.methods.tracker.virtual import virtual_robot
 from monitor.records import Campaign
