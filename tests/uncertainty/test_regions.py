@@ -10,6 +10,7 @@ from scipy import stats
 
 from monitor.uncertainty import BudgetLine, Estimated, ellipsoid_factor, region_factors, single_factor
 from monitor.uncertainty.coverage_regions.stein import stein_eigenvalues
+from monitor.uncertainty.coverage_regions.tails import PartTails, tails_of
 
 
 def equal(m: int, rho: float) -> np.ndarray:
@@ -80,3 +81,56 @@ def test_stein_draws_the_eigenvalues_of_few_runs_together() -> None:
     assert np.all(np.diff(corrected) <= 0.0)
     assert corrected[0] / corrected[-1] < 0.3 * values[0] / values[-1]
     assert corrected.mean() == pytest.approx(1.0, abs=0.25)
+
+
+@pytest.mark.parametrize("dof", [3.0, 8.0, 15.0, 150.0])
+def test_the_sum_of_tails_of_one_estimated_part_is_that_of_student(dof: float) -> None:
+    of_world, _ = tails_of([PartTails(np.array([1.0, 4.0, 0.5]), dof, dof, dof)], 0.95)
+    for k in (2.0, 2.5, 3.0):
+        assert of_world(k) == pytest.approx(3.0 * 2.0 * stats.t(dof).sf(k), rel=0.01)
+
+
+def test_the_sums_of_tails_of_two_parts_and_a_known_one_are_those_of_plain_draws() -> None:
+    rng, k = np.random.default_rng(11), 2.7
+    shares, dofs = np.array([[0.5, 0.1], [0.2, 0.6], [0.3, 0.3]]), (9.0, 30.0)
+    parts = [PartTails(share, dof, dof, dof) for share, dof in zip(shares[:2], dofs, strict=True)]
+    sums = tails_of([*parts, PartTails(shares[2], math.inf, math.inf, math.inf)], 0.95)
+    first, second = (
+        [
+            rng.chisquare(dof, 400_000)[:, None] / dof * share
+            for share, dof in zip(shares[:2], dofs, strict=True)
+        ]
+        for _ in range(2)
+    )
+    once = sum(first) + shares[2]
+    scaled = [one * again / share for one, again, share in zip(first, second, shares[:2], strict=True)]
+    for tails, true, estimated in (
+        (sums[0], 1.0 + 0.0 * once, once),
+        (sums[1], once, sum(scaled) + shares[2]),
+    ):
+        beyond = 2.0 * stats.norm.sf(k * np.sqrt(estimated / true)).sum(axis=1)
+        error = beyond.std() / math.sqrt(len(beyond))
+        assert tails(k) == pytest.approx(beyond.mean(), abs=4.0 * error + 2e-4)
+
+
+def test_k_q_of_parts_is_the_quantile_of_plain_draws_taken_twice() -> None:
+    # The quotient of the factors of the two worlds, each from a million plain draws that share no code with ours.
+    rng, m, dof = np.random.default_rng(23), 4, 12
+    cov, bar = equal(m, 0.4), rank_one(m, 0.5)
+    factors = region_factors([BudgetLine("readings", cov, float(dof)), BudgetLine("bar", bar, math.inf)])
+
+    def wishart(root: np.ndarray) -> np.ndarray:
+        drawn = root @ rng.standard_normal((len(root), m, dof))
+        return drawn @ np.swapaxes(drawn, 1, 2) / dof
+
+    def quantile(true: np.ndarray) -> float:
+        root = np.linalg.cholesky(true)
+        u = np.sqrt(np.einsum("nii->ni", wishart(root)) + np.diag(bar))
+        e = (root @ rng.standard_normal((len(true), m, 1)))[:, :, 0]
+        e[:, 0] += math.sqrt(0.5) * rng.standard_normal(len(true))
+        return float(np.quantile(np.max(np.abs(e) / u, axis=1), 0.95))
+
+    truth = np.broadcast_to(cov, (400_000, m, m))
+    first = quantile(truth)
+    second = quantile(wishart(np.linalg.cholesky(truth)))
+    assert factors.k_q == pytest.approx(first * first / second, abs=4.0 * factors.k_q_error + 0.02)

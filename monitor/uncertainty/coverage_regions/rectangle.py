@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -17,12 +17,13 @@ import scipy
 from monitor.records import Array
 from monitor.uncertainty.coverage_regions.coverage import rectangle_factor
 from monitor.uncertainty.coverage_regions.ellipsoid import wishart_roots
+from monitor.uncertainty.coverage_regions.tails import TAILS_ERROR, PartTails, Tails, normal_tails, tails_of
 from monitor.uncertainty.parts import BudgetLine, Estimated
 
 #: A part below this share of every variance is none.
 _NEGLIGIBLE = 1e-6
-#: Operations that a group of trials may take, some 20 ms, and the trials of a group at least and at most.
-_WORK, _FEWEST_TRIALS, _MOST_TRIALS = 1e5, 50, 5000
+#: Operations that a group of trials may take, some 5 ms, and the trials of a group at least and at most.
+_WORK, _FEWEST_TRIALS, _MOST_TRIALS = 2.5e4, 50, 5000
 #: So many outputs lead in a group of trials.
 _MOST_LEADING = 24
 #: The search ends where the tail is within this part of what is wanted, or after so many steps.
@@ -30,14 +31,14 @@ _SOLVED, _MOST_STEPS = 1e-3, 12
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """``roots`` (n, m, k) or (1, m, k) of a part's true covariances, and how it is estimated; known where infinite."""
 
     roots: Array
     dof: float
     kind: Estimated
 
-    def redrawn(self, rng: np.random.Generator, count: int) -> _Part:
+    def redrawn(self, rng: np.random.Generator, count: int) -> Part:
         """What is estimated of it at another time, ``count`` times."""
         if math.isinf(self.dof):
             return self
@@ -48,7 +49,7 @@ class _Part:
         if self.dof >= size:
             drawn = wishart_roots(rng, count, size, self.dof)
         else:
-            drawn = rng.standard_normal((count, size, max(1, math.floor(self.dof))))
+            drawn = rng.standard_normal((count, size, _drawn_runs(self.dof)))
         return replace(self, roots=self.roots @ drawn / math.sqrt(self.dof))
 
     @property
@@ -56,24 +57,52 @@ class _Part:
         """Variances (n, m) or (1, m)."""
         return np.asarray(np.einsum("nmk,nmk->nm", self.roots, self.roots))
 
+    @property
+    def tails(self) -> PartTails:
+        """What one variance of it does by itself when it is redrawn, and redrawn once more."""
+        size, first, second = self.roots.shape[2], self.dof, self.dof
+        if self.kind is Estimated.MATRIX and self.dof < size:
+            first = float(_drawn_runs(self.dof))
+            second = self.dof if self.dof >= first else first
+        return PartTails(self.variances[0], self.dof, first, second)
+
+
+def _drawn_runs(dof: float) -> int:
+    """How many runs are drawn of a part that has fewer degrees of freedom than dimensions."""
+    return max(1, math.floor(dof))
+
 
 @dataclass(frozen=True)
 class RectangleLaw:
     """The law of max_j |e_j|/u_j: roots (m, k) of every part of the correlation matrix, degrees of freedom, kind."""
 
     parts: tuple[tuple[Array, float, Estimated], ...]
+    _kept: dict[float, tuple[Tails, Tails]] = field(default_factory=dict, init=False, repr=False)
 
     def factor(self, rng: np.random.Generator, p: float) -> float:
         """Return k_q from one group of trials."""
         count = self.trials
-        world = [_Part(root[None], dof, kind) for root, dof, kind in self.parts]
+        world = [Part(root[None], dof, kind) for root, dof, kind in self.parts]
         if all(math.isinf(part.dof) for part in world):
-            return _quantile(rng, world, count, p)
+            return _quantile(rng, world, count, p, normal_tails(len(self.parts[0][0])))
+        of_world, of_observed = self._tails(p)
         observed = [part.redrawn(rng, count) for part in world]
         state = rng.bit_generator.state
-        k_first = _quantile(rng, world, count, p)
+        k_first = _quantile(rng, world, count, p, of_world)
         rng.bit_generator.state = state
-        return k_first * k_first / _quantile(rng, observed, count, p)
+        return k_first * k_first / _quantile(rng, observed, count, p, of_observed)
+
+    def _tails(self, p: float) -> tuple[Tails, Tails]:
+        """The sums of tails of both worlds, the same for every group."""
+        if p not in self._kept:
+            world = [Part(root[None], dof, kind) for root, dof, kind in self.parts]
+            self._kept[p] = tails_of([part.tails for part in world], p)
+        return self._kept[p]
+
+    @property
+    def common_error(self) -> float:
+        """The standard error, as a part of the factor, of what all groups have in common."""
+        return 0.0 if all(math.isinf(dof) for _, dof, _ in self.parts) else TAILS_ERROR
 
     @property
     def trials(self) -> int:
@@ -126,12 +155,13 @@ def _root(matrix: Array) -> Array:
     return np.asarray(vectors[:, inside] * np.sqrt(values[inside]))
 
 
-def _quantile(rng: np.random.Generator, world: Sequence[_Part], count: int, p: float) -> float:
+def _quantile(rng: np.random.Generator, world: Sequence[Part], count: int, p: float, tails: Tails) -> float:
     """Return the p-quantile of the largest deviation in what is estimated of a world.
 
-    The probability that any output exceeds k u_j is the sum over the outputs of that of each, times the mean of one
-    over how many exceed together with it (Adler, Blanchet and Liu, Ann. Appl. Probab. 22 (2012) 1167): that of each is
-    computed from the normal law, only the others are counted. So a hundred times fewer trials do.
+    The probability that any output exceeds k u_j is the sum over the outputs of that of each, ``tails``, times the
+    mean of one over how many exceed together with it (Adler, Blanchet and Liu, Ann. Appl. Probab. 22 (2012) 1167):
+    that of each is computed from the normal law, only the others are counted. The sum is known far better than these
+    trials show it, so they give that mean alone, a ratio in which their own sum falls out.
     """
     outputs = world[0].roots.shape[1]
     none = np.zeros((1, outputs))
@@ -159,7 +189,7 @@ def _quantile(rng: np.random.Generator, world: Sequence[_Part], count: int, p: f
         exceeds = np.abs(others + slope * reached[:, None, :]) > k * limit
         exceeds[:, leading, lead] = True
         together = np.count_nonzero(exceeds, axis=1)
-        return float(np.sum(tail / together) * 2.0 * outputs / len(leading) / count)
+        return tails(k) * float(np.sum(tail / together) / np.sum(tail))
 
     return _solved(beyond, 1.0 - p, outputs)
 

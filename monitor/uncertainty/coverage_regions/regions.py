@@ -69,7 +69,9 @@ def _factor(
         quantile = scattered(values)
         enough = quantile.standard_error <= max(_ERROR, _RELATIVE_ERROR * quantile.value)
         if enough or len(values) >= most:
-            return quantile, len(values) * law.trials
+            common = law.common_error * quantile.value if isinstance(law, RectangleLaw) else 0.0
+            error = math.hypot(quantile.standard_error, common)
+            return Quantile(quantile.value, error), len(values) * law.trials
 
 
 def _single(parts: Sequence[BudgetLine], p: float) -> float | None:

@@ -31,8 +31,12 @@ def stein_eigenvalues(eigenvalues: Array, dof: float) -> Array:
     apart = np.where(np.abs(apart) < least, sign * least, apart)
     np.einsum("nii->ni", apart)[:] = np.inf
     divisors = dof - count + 1.0 + 2.0 * np.sum(values[:, :, None] / apart, axis=-1)
-    pooled = np.stack([_pooled(row, divisor) for row, divisor in zip(values, divisors, strict=True)])
-    return np.asarray(pooled.reshape(np.shape(eigenvalues)))
+    corrected = values / divisors
+    upset = np.any(divisors <= 0.0, axis=1)
+    upset |= np.any(values[:, 1:] * divisors[:, :-1] > values[:, :-1] * divisors[:, 1:], axis=1)
+    for row in np.flatnonzero(upset):
+        corrected[row] = _pooled(values[row], divisors[row])
+    return np.asarray(corrected.reshape(np.shape(eigenvalues)))
 
 
 def _pooled(values: Array, divisors: Array) -> Array:

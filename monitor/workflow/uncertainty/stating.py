@@ -102,7 +102,10 @@ def _framework(result: RunUncertainty) -> FrameworkAnswer:
     pairs = list(zip(framework.budget, framework.budget_shares(), strict=True))
     # The line that matters most for any parameter first; none is dropped.
     lines = sorted(pairs, key=lambda pair: -float(np.max(np.abs(pair[1]), initial=0.0)))
-    factors, of_known = framework.factors, region_factors(known(framework.budget), framework.p)
+    factors = framework.factors
+    # Where nothing was estimated the factors are those already.
+    estimated = any(not line.known for line in framework.budget)
+    of_known = region_factors(known(framework.budget), framework.p) if estimated else factors
     return FrameworkAnswer(
         estimate=_displayed(result, framework.estimate),
         u=_displayed(result, framework.u),
