@@ -38,7 +38,7 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
         says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
         traces=machine_traces(residuals),
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.0, "y": -1.35, "z": 0.7}}},
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.2, "y": -1.62, "z": 0.84}}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
             "uirevision": "scene",
             "showlegend": True,
@@ -247,6 +247,6 @@ def _level(value: float, name: str = "") -> Any:
     if name:
         font = {"size": 11, "color": "@ink"}
         line["label"] = {
-            "text": f"{name} {value:.2f} µm", "textposition": "end", "yanchor": "top", "font": font,
+            "text": f"{name} {value:.2f} µm", "textposition": "middle", "yanchor": "top", "font": font,
         }  # fmt: skip
     return line

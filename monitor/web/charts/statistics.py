@@ -58,7 +58,7 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
     middles = [(low + high) / 2 for low, high in pairwise(edges)]
     return Chart(
         key=f"p-{name}",
-        says=f"p-values of {count} probed coordinates, {TESTS.get(name, name)}; flat where the groups are equal",
+        says=f"p-values of {count} probed coordinates, {TESTS.get(name, name)}; dashed: where the groups are equal",
         traces=[
             {
                 "type": "bar", "x": middles, "y": list(histogram.counts),
@@ -74,7 +74,6 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
                     "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": histogram.expected,
                     "y1": histogram.expected,
                     "line": {"color": "@orange", "dash": "dash"},
-                    "label": {"text": "equal groups", "font": {"size": 11, "color": "@ink"}, "textposition": "middle"},
                 }
             ],
         },
