@@ -77,6 +77,13 @@ def test_a_draft_says_so_on_paper_and_when_verified(
     made = typed(*issue, "--out", "draft.pdf", "--json", db=db).document
     assert (made["state"], made["file"]) == ("draft", "draft.pdf")
     assert "DRAFT, not valid" in text_of(Path("draft.pdf"))
+    # On every page: in the running head, and across it.
+    pages = [page.extract_text() for page in pypdf.PdfReader("draft.pdf").pages]
+    assert len(pages) > 1
+    assert all("DRAFT · Certificate D-1" in page and page.count("DRAFT") >= 2 for page in pages)
+    assert typed("certificate", "show", "D-1", "--dcc", "draft.xml", db=db).status == 0
+    assert '<dcc:statement id="draft">' in Path("draft.xml").read_text(encoding="utf-8")
+    assert typed("certificate", "show", "D-1", "--json", db=db).document["record"]["draft"] is True
     found = typed("certificate", "verify", "draft.pdf", "--json", db=db)
     assert (found.status, found.document["state"]) == (1, "draft")
     assert "it is a draft" in found.document["faults"]

@@ -50,6 +50,7 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
         "standards",
         "anchor",
         "dcc_version",
+        "draft",
         "signer",
         "country",
         "replaces",

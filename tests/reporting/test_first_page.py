@@ -114,7 +114,7 @@ def test_the_six_questions_are_answered_in_plain_words_on_page_one() -> None:
     assert "Since when? Since 2026-02-06: every run since then lies beyond the tolerance." in page
     assert "What to do? Adjust or compensate squareness X-Y (EC0Y) and measure again now." in page
     assert "What is fine? 1 of 4 machines: Good." in page
-    assert "Not judged? Not measured this week: Away." in page
+    assert "Not judged? Not measured this week: Away; no tolerances are stated for 1 of 3 machines" in page
     # The second machine has its card as well.
     assert "EA0C stepped by +12 µrad (squareness of axis C to Y)." in page
     assert "find out what was done or happened then" in page.lower()
@@ -146,17 +146,39 @@ def test_a_quiet_week_says_so() -> None:
             "No parameter is out of its tolerance, none changed, and the models explain the measurements.",
         ),
         (
-            machine("M", "no change seen"),
+            machine("M", "no change seen", probability_out=0.01),
             "why",
             "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain "
             "the measurements.",
         ),
         (AWAY, "fine", "No machine could be stated to be fine."),
-        (machine("M", "no change seen"), "unjudged", "Not against every tolerance: M."),
+        (machine("M", "no change seen", probability_out=0.01), "unjudged", "Not against every tolerance: M."),
+        (machine("M", "no change seen"), "unjudged", "Nothing was judged: no tolerances are stated."),
+        (machine("M", "model fails"), "unjudged", "Nothing was judged: no tolerances are stated."),
+        (
+            machine("M", "no change seen"),
+            "why",
+            "No parameter changed, and the models explain the measurements; no tolerances are stated.",
+        ),
     ],
 )
 def test_every_state_has_its_answer(health: MachineHealth, kind: str, sentence: str) -> None:
     assert {answer.kind: answer.sentence for answer in answers(fleet(health)[0])}[kind] == sentence
+
+
+def test_machines_without_tolerances_are_counted_among_those_that_have_some() -> None:
+    week = fleet(GOOD, DRIFTED, CHANGED, AWAY, machine("Bare", "no change seen"))[0]
+    sentences = {answer.kind: answer.sentence for answer in answers(week)}
+    assert sentences["unjudged"] == (
+        "Not measured this week: Away; no tolerances are stated for 2 of 4 machines evaluated: Stepped, Bare."
+    )
+
+
+def test_a_page_without_tolerances_says_that_nothing_was_judged() -> None:
+    page = pages_of(machine("Bare", "no change seen"), AWAY)[0]
+    assert "Not judged? Nothing was judged: no tolerances are stated; not measured this week: Away." in page
+    for question in ("Worst machine?", "Why?", "Since when?", "What to do?", "What is fine?", "Not judged?"):
+        assert question in page
 
 
 def test_a_drift_that_will_reach_its_limit_is_said_with_the_day() -> None:

@@ -50,6 +50,8 @@ _STATUS = {
     Verdict.UNDECIDED: "noPass",
 }
 
+#: The identifier of the statement that only a draft has: the schemas have no element for it.
+DRAFT = "draft"
 #: The refType of a statement, where the vocabulary has one.
 _REFS = {"traceability": "basic_metrologicallyTraceableToSI", "amendment": "basic_revision"}
 
@@ -208,6 +210,11 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
     if version_of(record).by_vocabulary and record.accredited is not None:
         statements += [("accreditation", f"{record.accredited.body}, {record.accredited.number}")]
     statements += [("accepted", accepted) for accepted in accepted_statements(record.accepted or (), texts)]
+    if record.draft:
+        statement = add(parent, "statement")
+        statement.set("id", DRAFT)
+        say(statement, "name", texts("dcc.draft"), texts.language)
+        say(statement, "declaration", texts("dcc.draft_statement"), texts.language)
     named = [(texts(f"dcc.{key}"), value, _REFS.get(key)) for key, value in statements]
     if not version_of(record).by_vocabulary:  # later releases have them among the measuring equipment
         named[3:3] = [

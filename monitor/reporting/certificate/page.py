@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from monitor.reporting.certificate.behind import PrintedBehind, printed_behind
 from monitor.reporting.certificate.completeness import check_complete
+from monitor.reporting.certificate.draft_word import draft_word
 from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
@@ -63,6 +64,7 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
         "texts": texts,
         "heading": texts.markup("page.number_issued", number=record.number, day=texts.day(record.issued_on)),
         "replaces": amendment(record.replaces, texts),
+        "draft_picture": _across_pages(record, texts),
         "accepted": accepted_statements(record.accepted or (), texts),
         "received_on": answer(record.received_on, texts),
         "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
@@ -89,6 +91,11 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
             *_beside_the_file(record, texts),
         ],
     }
+
+
+def _across_pages(record: CertificateRecord, texts: Texts) -> str | None:
+    """The picture behind every page of a draft; None for a certificate."""
+    return draft_word(texts("page.draft")) if record.draft else None
 
 
 def _beside_the_file(record: CertificateRecord, texts: Texts) -> list[tuple[str, str]]:

@@ -226,8 +226,8 @@ class CertificateRecord:
     printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
     there were none. ``accredited`` and ``mark`` (a picture as a data address) are printed where the laboratory states
     them, ``standards`` with the traceability. ``anchor`` is the last entry of the audit when the certificate was made,
-    ``signer`` who signs the file; ``dcc_version`` the release of the digital certificate (3.2.1 without); all None in
-    records of earlier versions.
+    ``draft`` is true of a draft, which says so on every page. ``signer`` who signs the file; ``dcc_version`` the
+    release of the digital certificate (3.2.1 without); all None in records of earlier versions.
     """
 
     title: str | None
@@ -265,3 +265,4 @@ class CertificateRecord:
     anchor: AuditAnchor | None = field(default=None, metadata=OMITTED)
     signer: Signer | None = field(default=None, metadata=OMITTED)
     dcc_version: str | None = field(default=None, metadata=OMITTED)
+    draft: bool | None = field(default=None, metadata=OMITTED)

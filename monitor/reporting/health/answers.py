@@ -23,6 +23,13 @@ from monitor.reporting.plain_names import plain_name
 URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index(State.SUSPECT_DATA) + 1])
 #: States in which nothing is wrong.
 FINE: tuple[State, ...] = (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
+#: States of machines that were measured and evaluated, but need not have had a tolerance to be judged by.
+_WITHOUT_LIMIT: tuple[State, ...] = (
+    State.MODEL_FAILS,
+    State.CHANGED,
+    State.SUSPECT_DATA,
+    State.NO_CHANGE_SEEN,
+)
 #: Names of machines in a sentence; of more, their number.
 _NAMED = 6
 #: A drift is spoken of below this probability of seeing it where there is none.
@@ -32,6 +39,7 @@ _QUIET_IN_PART = (
     "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
     "measurements."
 )
+_QUIET_WITHOUT = "No parameter changed, and the models explain the measurements; no tolerances are stated."
 _UNMEASURED = "No machine was measured this week, so nothing is known of its state."
 _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
 
@@ -65,6 +73,8 @@ def _quiet(fleet: Fleet) -> str:
         return _NOTICED
     if not states & set(FINE):
         return _UNMEASURED
+    if not any(_was_judged(row) for row in fleet.rows):
+        return _QUIET_WITHOUT
     return _QUIET_IN_PART if State.NO_CHANGE_SEEN in states else _QUIET
 
 
@@ -258,7 +268,14 @@ def _fine(rows: Sequence[FleetRow]) -> str:
     return f"{len(fine)} of {len(rows)} machine{'s' if len(rows) != 1 else ''}: {_names(fine)}."
 
 
+def _was_judged(row: FleetRow) -> bool:
+    """Whether a machine was judged by a tolerance; one that is in tolerance was, whatever else is stored of it."""
+    return row.probability_out is not None or row.state in (State.IN_TOLERANCE, *ALARMS[:2])
+
+
 def _unjudged(fleet: Fleet) -> str:
+    without = [row for row in fleet.rows if row.state in _WITHOUT_LIMIT and not _was_judged(row)]
+    judged = sum(_was_judged(row) for row in fleet.rows)
     parts = [
         f"{phrase}: {_names(rows)}"
         for state, phrase in (
@@ -266,10 +283,15 @@ def _unjudged(fleet: Fleet) -> str:
             (State.NOT_EVALUATED, "measured but not evaluated"),
             (State.NO_CHANGE_SEEN, "not against every tolerance"),
         )
-        if (rows := [row for row in fleet.rows if row.state == state])
+        if (rows := [row for row in fleet.rows if row.state == state and row not in without])
     ]
     if fleet.refused_imports:
         parts.append(f"{len(fleet.refused_imports)} refused imports of machines not known here")
+    if without and not judged:
+        parts.insert(0, "nothing was judged: no tolerances are stated")
+    elif without:
+        counted = f"{len(without)} of {len(without) + judged} machines evaluated"
+        parts.append(f"no tolerances are stated for {counted}: {_names(without)}")
     return _sentence("; ".join(parts)) if parts else "Everything was judged."
 
 

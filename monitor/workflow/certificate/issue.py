@@ -208,7 +208,7 @@ def _record(
         )
         record = dataclasses.replace(record, conformity=statement)
     if request.draft and record.title:
-        record = dataclasses.replace(record, title=texts("record.draft", title=record.title))
+        record = dataclasses.replace(record, title=texts("record.draft", title=record.title), draft=True)
     return record
 
 
