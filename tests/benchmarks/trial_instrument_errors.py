@@ -64,6 +64,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--empty", type=int, default=0)
+    parser.add_argument("--empty-first", type=int, default=10_000, help="the first seed without an error")
     parser.add_argument("--only", default="")
     parser.add_argument("--without", action="store_true")
     parser.add_argument("--verbose", action="store_true")
@@ -89,10 +90,10 @@ def main() -> None:
         if options.without
         else mock.MagicMock()
     ):
-        for seed in range(10_000, 10_000 + options.empty):
+        for seed in range(options.empty_first, options.empty_first + options.empty):
             findings, _ = named(seed)
             false += bool(findings)
-            if findings:
+            if findings or options.verbose:
                 print(f"  empty seed {seed}: {findings}", flush=True)
     if options.empty:
         print(f"false effects: {_rate(false, options.empty)}; {time.process_time() - begin:.0f} s")

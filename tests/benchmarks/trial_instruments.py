@@ -5,6 +5,8 @@
 is the ellipsoid of the stated covariance at 95 % (chi-square, JCGM 102, 6.5.2). ``--heavy``: noise of Student's t with
 three degrees of freedom and the same standard deviation; ``--drift``: the machine grows by 2 µm in X in the R-test's
 hour; ``--pitch``: the effect of the example, which the model lacks; ``--bar``: the ball bar alone, in three planes.
+``--session``: three runs of a day with one bar, the first with a laser too; ``--apart``: the same with a length for
+every run, as until 23 November 2026.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import argparse
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,13 +68,47 @@ def campaign_of(folder: Path, seed: int, options: argparse.Namespace, cycles: in
     return read_campaign(folder), expected(truth)
 
 
+def sessions(seeds: int, apart: bool) -> None:
+    """Print the rates of days of three runs: of each run by itself."""
+    names = PARAMETERS[4:]
+    limit = scipy.stats.chi2.ppf(0.95, len(names))
+    inside, distance, u = np.zeros(3, dtype=int), np.zeros(3), np.zeros((3, len(names)))
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        truths = [truth_of(rng) for _ in range(3)]
+        with tempfile.TemporaryDirectory() as folder:
+            campaign = read_campaign(shop.session(Path(folder) / "day", rng, truths, 10.0))
+        problem = campaign_method(campaign).problem_of(campaign)
+        solution = solve_problem(replace(problem, session=None) if apart else problem)
+        columns = [problem.base_names.index(name) for name in names]
+        assert solution.local_free[:, columns].all()
+        for run, truth in enumerate(truths):
+            off = solution.local[run, columns] - expected(truth)[4:]
+            covariance = solution.local_covariance[run][np.ix_(columns, columns)]
+            square = float(off @ np.linalg.solve(covariance, off))
+            inside[run] += square <= limit
+            distance[run] += square / seeds
+            u[run] += np.sqrt(np.diag(covariance)) / seeds
+    for run in range(3):
+        low, high = scipy.stats.binomtest(int(inside[run]), seeds).proportion_ci(method="exact")
+        print(
+            f"run {run + 1}: truth inside the joint region of {len(names)} parameters: {inside[run]} of {seeds}, "
+            f"{100 * inside[run] / seeds:.1f} % (95 % interval {100 * low:.1f} to {100 * high:.1f} %), mean square "
+            f"distance {distance[run]:.2f}; u in µrad, µm/m: "
+            + ", ".join(f"{name} {1e6 * of:.2f}" for name, of in zip(names, u[run], strict=True))
+        )
+
+
 def main() -> None:
     """Print the rates."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=300)
-    for name in ("--heavy", "--drift", "--pitch", "--bar"):
+    for name in ("--heavy", "--drift", "--pitch", "--bar", "--session", "--apart"):
         parser.add_argument(name, action="store_true")
     options = parser.parse_args()
+    if options.session:
+        sessions(options.seeds, options.apart)
+        return
     names = PARAMETERS[4:] if options.bar else PARAMETERS
     inside, singly, distance, iterations = 0, np.zeros(len(names)), [], []
     limit = scipy.stats.chi2.ppf(0.95, len(names))

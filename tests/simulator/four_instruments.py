@@ -26,6 +26,8 @@ TRUTH = {
     "EXX": 12e-6, "EYY": -8e-6, "EZZ": 5e-6,
 }  # fmt: skip
 BAR, BAR_AT = 100.0, np.array([150.0, 120.0, 380.0])
+#: Of the bar's calibration, mm.
+BAR_U = 3e-4
 BALL = np.array([80.0, 0.0, 60.0])
 LASER, LENGTH, NEST, DIAL = 3e-4, 5e-4, 5e-4, 1e-3
 Row = dict[str, object]
@@ -88,12 +90,15 @@ def laser(chain: SimulatedChain, rng: np.random.Generator, cycles: int = 5) -> t
     return text, rows
 
 
-def ball_bar(chain: SimulatedChain, rng: np.random.Generator, step: float = 5.0) -> tuple[str, list[Row]]:
-    """Three planes, both senses, high above the table."""
+def ball_bar(
+    chain: SimulatedChain, rng: np.random.Generator, step: float = 5.0, off: float | None = None
+) -> tuple[str, list[Row]]:
+    """Three planes, both senses, high above the table; the bar is ``off`` its length by so much, drawn where None."""
     text, rows = "", []
-    length = BAR + rng.normal(0.0, 3e-4)
+    length = BAR + (rng.normal(0.0, BAR_U) if off is None else off)
     for name, first, second in (("xy", 0, 1), ("yz", 1, 2), ("zx", 2, 0)):
-        keys = f"work_point_mm = {BAR_AT.tolist()}\nlength_mm = {BAR}\nlength_standard_uncertainty_um = 0.3\n"
+        keys = f"work_point_mm = {BAR_AT.tolist()}\nlength_mm = {BAR}\n"
+        keys += f"length_standard_uncertainty_um = {1e3 * BAR_U:g}\n"
         text += _setup(f"bar-{name}", "distance", "ball bar", LENGTH, keys)
         centre = BAR_AT + rng.normal(0.0, 0.02, 3)
         there = np.arange(0.0, 360.0 + step / 2.0, step)
@@ -134,6 +139,23 @@ def dial(chain: SimulatedChain, rng: np.random.Generator) -> tuple[str, list[Row
             }
         )
     return _setup("square", "component", "dial on a square", DIAL, 'direction = "X"\n'), rows
+
+
+def session(
+    folder: Path, rng: np.random.Generator, truths: Sequence[Mapping[str, float]], step: float = 5.0
+) -> Path:
+    """Write one day: a run with laser and bar, then runs with the same bar alone, each of a machine of its own."""
+    off = rng.normal(0.0, BAR_U)
+    text, rows = "", []
+    for run, truth in enumerate(truths, start=1):
+        chain = machine(0.0, truth)
+        parts = [ball_bar(chain, rng, step, off)]
+        if run == 1:
+            parts.insert(0, laser(chain, rng, 1))
+            text = "".join(setups for setups, _ in parts)
+        rows += [{"run": run, **row} for _, of in parts for row in of]
+    started = [f"2026-03-02T{8 + run:02d}:00:00+00:00" for run in range(len(truths))]
+    return chain.write(folder, text, rows, started=started, days=[1] * len(truths))
 
 
 def _setup(name: str, reading: str, instrument: str, u: float, keys: str) -> str:

@@ -120,12 +120,18 @@ class SimulatedChain:
         rows: Sequence[Mapping[str, object]],
         *,
         started: Sequence[str] = ("2026-03-02T20:00:00+00:00",),
+        days: Sequence[int] | None = None,
     ) -> Path:
-        """Write the folder: ``rows`` hold run, the readings by axis and the columns of the instruments."""
+        """Write the folder: ``rows`` hold run, the readings by axis and the columns of the instruments; every run is a
+        day of its own unless ``days`` says otherwise."""
         folder.mkdir(parents=True)
         (folder / "campaign.toml").write_text(self.toml(folder.name, setups), encoding="utf-8")
         runs = ["run,started_at,day,warm_up,ambient_degC"]
-        runs += [f"{run},{moment},{run},false," for run, moment in enumerate(started, start=1)]
+        numbers = days or range(1, len(started) + 1)
+        runs += [
+            f"{run},{moment},{day},false,"
+            for run, (moment, day) in enumerate(zip(started, numbers, strict=True), start=1)
+        ]
         (folder / "runs.csv").write_text("\n".join(runs) + "\n", encoding="utf-8")
         others = list(dict.fromkeys(name for row in rows for name in row if name not in ("run", "setup")))
         others = [name for name in others if name not in {axis.name for axis in self.all_axes}]

@@ -20,6 +20,7 @@ from monitor.effects import ChainEffect, Context, Effect
 from monitor.effects.catalogue import of_balls
 from monitor.machine import ChainPose
 from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.sessions import Stays
 from monitor.records import Array
 
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
@@ -118,6 +119,21 @@ class MeasuredChain(ABC):
         """Change (e,) of each calibrated quantity with a strain of the measurement standard of 1, in the unit that its
         deviation has as an input of the uncertainty: 0 where no standard expands."""
         return np.zeros(len(self.extra_names))
+
+    @property
+    def left_out(self) -> Mapping[str, str]:
+        """Effects of the model that have no column in these readings, by their texts, and why; they are not among the
+        ``added`` ones."""
+        return {}
+
+    @property
+    def stays(self) -> Stays | None:
+        """Own unknowns that several runs of a session have in common; None where there are none."""
+        return None
+
+    def beside_others(self, solution: Solution, run: int) -> Self:
+        """The problem for ``run`` to be looked at by itself, knowing what the other runs of its session say."""
+        return self
 
     @property
     def touches_centres(self) -> bool:

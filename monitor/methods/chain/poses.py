@@ -83,7 +83,7 @@ def widening_of_common(problem: ChainProblem, solution: Solution) -> Array:
     if pose is None or count == 0:
         return np.ones(count)
     basis = eliminate(solution.last.local).basis
-    both = np.concatenate([solution.last.common, solution.last.residual[..., None]], axis=-1)
+    both = np.concatenate([solution.last.common[..., :count], solution.last.residual[..., None]], axis=-1)
     numbers = both.shape[0] * both.shape[1]
     columns, residual = np.split(project_out(basis, both).reshape(numbers, -1), [count], axis=1)
     shared, stated = covariance_by_poses(columns, basis.reshape(numbers, -1), residual[:, 0], pose)

@@ -23,6 +23,7 @@ from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, colum
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
+from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
 from monitor.units import Unit, mistaken_for_mm
 
@@ -267,12 +268,26 @@ def solve_problem(
         return without_held(problem.linearise(local, common), held)
 
     if common is not None or not any(added.searched for added in problem.shared):
-        solution = solve(linearise, begin, np.where(held, 0.0, first), most)
+        solution = _solved(problem, linearise, begin, np.where(held, 0.0, first), most)
     else:
         solution = _from_several_starts(problem, linearise, begin)
     solution = replace(solution, common_held=held)
     _refuse_another_machine(problem, solution)
     return solution
+
+
+def _solved(
+    problem: ChainProblem,
+    linearise: Callable[[Array, Array], Linearisation],
+    begin: Array,
+    common: Array,
+    most: int = MOST_ITERATIONS,
+) -> Solution:
+    """The point of one search; what stays for a session is one number in its runs."""
+    stays = problem.stays
+    if stays is None:
+        return solve(linearise, begin, common, most)
+    return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 
 def _from_several_starts(
@@ -282,7 +297,7 @@ def _from_several_starts(
     fault: DataError | None = None
     for start in STARTS_S:
         try:
-            solutions.append(solve(linearise, begin, problem.common_from(start)))
+            solutions.append(_solved(problem, linearise, begin, problem.common_from(start)))
         except DataError as error:
             fault = error
     if not solutions:

@@ -7,11 +7,20 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ArtefactEffect, Context, InstrumentRows, ParsedEffect, ReadBy, context_of
+from monitor.effects import (
+    ArtefactEffect,
+    Context,
+    InstrumentEffect,
+    InstrumentRows,
+    ParsedEffect,
+    ReadBy,
+    context_of,
+)
 from monitor.exceptions import DataError, EffectError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.instruments.base import instrument_base
-from monitor.methods.instruments.problem import InstrumentProblem, Part
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
@@ -45,15 +54,39 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     _refuse_artefact((*base, *added))
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     context = replace(context, sight=_sight(setups, number), nominal=_places(context, parts))
+    context = replace(context, instruments=_instrument_rows(context, parts))
+    absent = _absent(context, added)
     return InstrumentProblem(
-        context=replace(context, instruments=_instrument_rows(context, parts)),
+        context=context,
         base=base,
-        added=added,
+        added=tuple(effect for effect in added if effect.text not in absent),
         sigma=_sigma(context, setups, number, parts),
         parts=parts,
         setups=used,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
+        session=_sessions(campaign, context),
+        absent=tuple(absent.items()),
     )
+
+
+def _absent(context: Context, added: tuple[ParsedEffect, ...]) -> dict[str, str]:
+    """The effects of instruments that measured nothing here, and why: a model holds for every campaign of a machine,
+    whatever it was measured by."""
+    reasons = {}
+    for effect in added:
+        if isinstance(effect, InstrumentEffect):
+            try:
+                effect.change.setups(context)
+            except EffectError as error:
+                reasons[effect.text] = str(error)
+    return reasons
+
+
+def _sessions(campaign: Campaign, context: Context) -> npt.NDArray[np.int64]:
+    """The session (R,) of every run that has rows: runs of one day are one."""
+    days = {run.run: run.day for run in campaign.runs}
+    of_runs = [days.get(int(run), -int(run)) for run in np.unique(context.run)]
+    return np.asarray(np.unique(of_runs, return_inverse=True)[1], dtype=np.int64)
 
 
 def _parts(

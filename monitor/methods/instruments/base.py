@@ -19,7 +19,8 @@ from monitor.machine import COMPONENTS, MOTION, Chain
 from monitor.methods.chain.base_effects import location_candidates
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
-from monitor.methods.instruments.problem import InstrumentProblem, Part
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import COSINE, Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction

@@ -40,8 +40,10 @@ class _Information:
     triangle: Array
 
     def joined(self, other: _Information) -> _Information:
-        """Both together."""
-        return replace(self, triangle=_triangle(np.vstack([self.triangle, other.triangle])))
+        """Both together, among the coefficients of either: what one instrument does wrong is in its rows alone."""
+        names = tuple(dict.fromkeys((*self.names, *other.names)))
+        both = [information.among(names).triangle for information in (self, other)]
+        return _Information(names, _triangle(np.vstack(both)))
 
     def among(self, names: tuple[str, ...]) -> _Information:
         """The same among more coefficients, of which these rows say nothing."""
@@ -78,7 +80,11 @@ class InstrumentForecast:
 
     def unit_of(self, parameter: str) -> Unit:
         """The display unit of a parameter."""
-        return self._units[parameter]
+        if parameter in self._units:
+            return self._units[parameter]
+        # An effect of an instrument that a test would bring: its coefficients are named after it.
+        added = (parse_effect(text, self.chain) for text in self.model.added)
+        return next(effect.unit for effect in added if f"{parameter}.".startswith(f"{effect.text}."))
 
     @cached_property
     def _units(self) -> dict[str, Unit]:
@@ -139,8 +145,7 @@ class InstrumentForecast:
         """The information of a test, computed once."""
         key = (id(test), base)
         if key not in self._of_test:
-            of_test = _information(self._problem(test, base))
-            self._of_test[key] = of_test.among(self._measured(base).names)
+            self._of_test[key] = _information(self._problem(test, base))
         return self._of_test[key]
 
     @cached_property
@@ -168,14 +173,7 @@ class InstrumentForecast:
         )  # fmt: skip
         artefact = replace(self.campaign.artefact, setups=(setup,))
         campaign = replace(self.campaign, artefact=artefact, probings=probings)
-        # What another instrument does wrong is nothing in these rows.
-        names = [name for name in (setup.id, setup.instrument) if name]
-        added = tuple(
-            text
-            for text in self.model.added
-            if not text.startswith("instrument:") or any(f":{name}:" in text for name in names)
-        )
-        return problem_of(campaign, replace(self.model, base=base, added=added))
+        return problem_of(campaign, replace(self.model, base=base))
 
     def _read(self, test: CandidateTest) -> Array:
         """What a machine without errors shows (m, k) in the columns of the kind, as far as a search begins there."""

@@ -50,7 +50,8 @@ def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
     """What these setups cannot give a number, whatever the plan."""
     assert isinstance(problem, InstrumentProblem)
     centres = (TakenUp(f"the centre of {name} across its bar", ()) for name in problem.bars_of_one_direction)
-    return (*taken_up(problem.context.chain, problem.setups), *centres)
+    absent = (TakenUp(effect, ()) for effect in problem.left_out)
+    return (*taken_up(problem.context.chain, problem.setups), *centres, *absent)
 
 
 METHOD = ChainMethod(

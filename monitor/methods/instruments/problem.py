@@ -16,7 +16,10 @@ from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, in_mm
+from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
+from monitor.methods.instruments.contradiction import wrong_direction, wrong_length
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.records import Array, Setup
 
@@ -25,28 +28,10 @@ from monitor.records import Array, Setup
 LARGEST_OUTSIDE = (5.0, 0.02)
 # A zero that is off by more than 20 degrees is another zero.
 LARGEST_TURN = 0.35
-# Residuals of directions of more than a tenth of a radian are no errors of this mount.
-CONTRADICTS = 0.1
-# Residuals of lengths beyond this part of the travel, and beyond a millimetre, are those of another machine: the limit
-# of the tracker.
-CONTRADICTS_TRAVEL, LEAST_CONTRADICTION = 0.02, 1.0
-
 # What is read of an error's displacement is at least this part, else it comes from products of errors alone.
 SECOND_ORDER = 5e-3
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
-
-
-@dataclass(frozen=True)
-class Part:
-    """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, their indices ``at`` (m,) among all
-    rows, and the ``instrument`` as people call it."""
-
-    id: str
-    reading: Reading
-    rows: Rows
-    at: npt.NDArray[np.int64]
-    instrument: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +47,8 @@ class InstrumentProblem(ChainProblem):
 
     ``setups`` are those that have rows, ``gear_ratios`` those that the machine file gives. ``separated`` (R, p, p) is
     the projector of ``linearise`` where it was computed before; none is applied where the problem ``is_whole``.
+    ``session`` (R,) numbers the sessions that runs belong to, None where every run stands by itself; ``from_others`` is
+    what such a run knows from the others of its session.
     """
 
     parts: tuple[Part, ...] = ()
@@ -69,6 +56,9 @@ class InstrumentProblem(ChainProblem):
     gear_ratios: tuple[tuple[str, float], ...] = ()
     separated: Array | None = None
     is_whole: bool = False
+    session: npt.NDArray[np.int64] | None = None
+    from_others: KnownFromOthers | None = None
+    absent: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -342,10 +332,10 @@ class InstrumentProblem(ChainProblem):
         chain = self.context.chain
         shape = (len(at), shown.residual.shape[1], len(chain.joints), 2, 6)
         total = np.zeros((*shape[:2], shape[2] * 12))
-        turns = sides.by_error[at].reshape(len(at), 3, -1)
+        turns = sides.by_error[at].reshape(len(at), 3, shape[2] * 12)
         on_tool = np.repeat(np.arange(len(chain.joints)) >= len(chain.work), 12)
         if shown.by_shift is not None:
-            total += shown.by_shift @ pose.by_error[at].reshape(len(at), 3, -1)
+            total += shown.by_shift @ pose.by_error[at].reshape(len(at), 3, shape[2] * 12)
         if shown.by_turn is not None:
             relative = np.swapaxes(sides.work[at], 1, 2) @ (turns * np.where(on_tool, 1.0, -1.0))
             total += shown.by_turn @ relative
@@ -382,11 +372,46 @@ class InstrumentProblem(ChainProblem):
         for number, (index, u) in enumerate(self._priors):
             residual[:, number] = nuisance[:, index] / u
             by_own[:, number, index] = 1.0 / u
+        others = self.from_others
+        if others is not None:
+            columns = others.columns - len(self.base_names)
+            residual[:, others.rows] = (nuisance[:, columns] - others.values) @ others.root.T
+            by_own[:, others.rows] = 0.0
+            by_own[:, others.rows[:, None], columns] = others.root
         return residual, by_own
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Effects on instruments that measured nothing here."""
+        return dict(self.absent)
+
+    @cached_property
+    def stays(self) -> Stays | None:
+        """The lengths of bars that are known beforehand: one bar has one length in all runs of a session."""
+        if self.session is None or len(np.unique(self.session)) == len(self.session):
+            return None
+        staying = {
+            int(columns[index])
+            for part, columns in zip(self.parts, self.own_columns, strict=True)
+            for index, name in enumerate(part.reading.unknowns)
+            if name in part.reading.staying
+        }
+        rows = [number for number, (index, _) in enumerate(self._priors) if index in staying]
+        columns = np.array([self._priors[row][0] for row in rows], dtype=np.int64) + len(self.base_names)
+        return Stays(columns, np.array(rows), self.session) if rows else None
+
+    def beside_others(self, solution: Solution, run: int) -> Self:
+        """The problem for ``run`` by itself, which knows of its bars what the other runs of its session say."""
+        if self.stays is None:
+            return self
+        index = int(np.searchsorted(self.runs, run))
+        from_others = known_from_others(solution, self.stays, index, len(self.extra_names))
+        return replace(self, session=None, from_others=from_others)
 
     def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
         """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
-        problem = replace(super().taken(rows, run), separated=self._separated_of(rows, run))
+        separated = self._separated_of(rows, run)
+        problem = replace(super().taken(rows, run), separated=separated, session=None)
         index = np.searchsorted(problem.runs, run)
         parts = []
         for part in self.parts:
@@ -405,38 +430,11 @@ class InstrumentProblem(ChainProblem):
 
     def contradiction(self, solution: Solution) -> str | None:
         """Directions that are off by more than any mount's errors, lengths by more than a part of the travel."""
-        wrong = self._wrong_length(solution)
-        if wrong is not None:
-            return wrong
-        pointing = [part for part in self.parts if part.reading.name == "direction"]
-        if not pointing:
-            return None
-        vectors = self.vectors(solution.local, solution.common)
-        for part in pointing:
-            # A direction that points the other way has no component across: it is looked at by itself.
-            weighted = np.isfinite(self.sigma[part.at]).all(axis=1)
-            off = np.linalg.norm(vectors[part.at][weighted], axis=1) / 1000.0
-            if len(off) and float(np.sqrt(np.mean(off**2))) > CONTRADICTS:
-                return (
-                    f"setup {part.id}: after the fit the directions are off by {np.sqrt(np.mean(off**2)):.2g} rad; "
-                    "check the signs and directions of the axes, tool_direction and the outer frame"
-                )
-        return None
-
-    def _wrong_length(self, solution: Solution) -> str | None:
-        """The first setup of lengths whose readings are off by more than any machine's errors, in words."""
         vectors = self.vectors(solution.local, solution.common)
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        limit = max(LEAST_CONTRADICTION, CONTRADICTS_TRAVEL * travel)
-        for part in self.parts:
-            numbers = vectors[part.at][np.isfinite(self.sigma[part.at])]
-            off = float(np.sqrt(np.mean(numbers**2))) if len(numbers) else 0.0
-            if not part.reading.angular and off > limit:
-                return (
-                    f"setup {part.id}: after the fit its readings are off by {off:.3g} mm; check the points, "
-                    "the directions and the signs of the axes, and the unit of the readings"
-                )
-        return None
+        return wrong_length(self.parts, self.sigma, vectors, travel) or wrong_direction(
+            self.parts, self.sigma, vectors
+        )
 
 
 def _stance(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Stance:

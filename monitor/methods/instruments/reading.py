@@ -115,6 +115,8 @@ class Reading(Protocol):
     holdable: ClassVar[tuple[str, ...]]
     #: Whether a reading counts from the first row of the run.
     relative: ClassVar[bool]
+    #: Unknowns of what is the same in all runs of a session (a bar), where they are known beforehand.
+    staying: ClassVar[tuple[str, ...]]
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
@@ -163,6 +165,7 @@ class Plain:
     angular: ClassVar[bool] = False
     turns: ClassVar[int] = 0
     relative: ClassVar[bool] = False
+    staying: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:

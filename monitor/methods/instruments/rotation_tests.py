@@ -14,7 +14,8 @@ from itertools import combinations
 import numpy as np
 
 from monitor.machine import Joint
-from monitor.methods.instruments.problem import InstrumentProblem, Part
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.component import Component
 from monitor.methods.instruments.readings.vector import VectorReading
 from monitor.methods.method import RotationTest

@@ -29,8 +29,9 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
     """The share of every instrument in a run, and the part (k,) of the variance from what is known beforehand."""
     assert isinstance(problem, InstrumentProblem)
     index = int(np.searchsorted(problem.runs, run))
-    jacobian = np.hstack([solution.last.local[index], solution.last.common[index]])
-    residual = solution.last.residual[index]
+    # By itself a run has its covariance in the joint fit once it knows what the others say of what they share.
+    at = problem.beside_others(solution, run).linearise(solution.local, solution.common)
+    jacobian, residual = np.hstack([at.local[index], at.common[index]]), at.residual[index]
     count = len(problem.base_names)
     whole = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
     nominal = np.hstack([whole.local[index], whole.common[index]])

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from monitor.machine import Joint, evaluate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.problem import InstrumentProblem, Part
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, direction_of
 from monitor.methods.instruments.readings.angle import Angle
 from monitor.methods.instruments.readings.displacement import Displacement

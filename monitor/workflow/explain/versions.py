@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from monitor.discovery import Fit, version_error
 from monitor.discovery.curve.compare import lack_of_fit
 from monitor.discovery.curve.quality import bic, held_out
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import EffectError, NotFoundError
 from monitor.methods.chain.shared_effects import shared_parameters
 from monitor.methods.curve.fit import CurveFit
 from monitor.records import Campaign, CurveCampaign
@@ -18,7 +18,7 @@ from monitor.workflow.explain.machine_answer import micrometres
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.identify.curve import in_micrometres, response_unit
-from monitor.workflow.identify.fitting import fit_of
+from monitor.workflow.identify.fitting import fit_of, machine_problem
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve
 from monitor.workflow.uncertainty.machine_frame import refers_to
@@ -40,11 +40,18 @@ def history(db: Database, request: HistoryRequest) -> HistoryAnswer:
 def fitted_version(
     db: Database, version: StoredModel, campaign: str | None
 ) -> tuple[MachineVersion | CurveVersion, ...]:
-    """Fit a version that need not be stored yet, and its ancestors, to a campaign. Raises NotFoundError, DataError."""
+    """Fit a version that need not be stored yet, and its ancestors, to a campaign.
+
+    Raises NotFoundError, DataError, EffectError where its last effect has no column in the campaign.
+    """
     ancestors = () if version.parent is None else model_history(db, *version.parent)
     if campaign is None:
         campaign = latest_campaign(db, ancestors[-1] if ancestors else version)
-    return error_steps(load_measured(db, campaign), (*ancestors, version))
+    measured = load_measured(db, campaign)
+    left_out = machine_problem(measured, version).left_out if isinstance(measured, Campaign) else {}
+    if version.effects and version.effects[-1] in left_out:
+        raise EffectError(left_out[version.effects[-1]])
+    return error_steps(measured, (*ancestors, version))
 
 
 def latest_campaign(db: Database, model: StoredModel) -> str:

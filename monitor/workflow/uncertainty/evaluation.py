@@ -122,7 +122,7 @@ def evaluate_fit(
     """As ``evaluate``, of a campaign with a model fitted to it: nothing is read from the database."""
     number = int(fit.problem.runs[-1]) if request.run is None else request.run
     # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
-    fixed, coefficients = fit.problem.resolved(fit.solution.common)
+    fixed, coefficients = fit.problem.beside_others(fit.solution, number).resolved(fit.solution.common)
     run = measured_run(fixed, number, coefficients)
     _refuse_too_many(len(run.reading_names), request.method)
     index = int(np.flatnonzero(fit.problem.runs == number)[0])

@@ -136,8 +136,8 @@ def _of_shared(fit: Fit, run: int, local: list[int], shared: list[int]) -> Array
     """
     solution = fit.solution
     space = eliminate(solution.last.local[[run]])
-    response = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[run]))
     count = len(solution.common)
+    response = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[run, :, :count]))
     both = np.concatenate([response[local], np.eye(count)[shared]])
     covariance = np.where(np.isfinite(solution.common_covariance), solution.common_covariance, 0.0)
     added: Array = fit.scale**2 * both @ covariance @ both.T

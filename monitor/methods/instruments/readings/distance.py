@@ -36,6 +36,7 @@ class DistanceReading(AtWorkPoint):
     name: ClassVar[str] = "distance"
     columns: ClassVar[tuple[str, ...]] = ("reading_um",)
     holdable: ClassVar[tuple[str, ...]] = ("work_point", "length")
+    staying: ClassVar[tuple[str, ...]] = ("length",)
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
