@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED, WORDED, named
-from monitor.reporting.lacks import Lack, Undecided
+from monitor.reporting.lacks import Lack
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
@@ -108,8 +108,7 @@ class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
-    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it, nor where one or
-    two days on a side say too little: ``why_not_decided`` says which.
+    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it.
     """
 
     at: str
@@ -121,7 +120,6 @@ class StepAtEvent:
     p_value: float
     scatter_of: str
     decided: bool
-    why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
 
 
 @dataclass(frozen=True)
