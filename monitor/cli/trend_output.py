@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.reporting.lacks import Undecided
-from monitor.reporting.messages import SEASON_NOT_TOLD
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
-from monitor.workflow.history.season import Season
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -17,6 +15,7 @@ from monitor.workflow.trend.answer import (
     Cycle,
     DatedChange,
     ParameterTrend,
+    Season,
     StepAtEvent,
     TrendAnswer,
     VectorState,
@@ -371,8 +370,8 @@ def _resemblance(answer: TrendAnswer) -> Iterator[str]:
         yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
     seasons = {drift.season for drift in stated.values()}
     if Season.NOT_TOLD in seasons:
-        yield SEASON_NOT_TOLD
-    if Season.ALLOWED_FOR in seasons:
+        yield "the history does not cover the year: a drift is not told from what the season does"
+    elif Season.ALLOWED_FOR in seasons:
         yield "what goes up and down with the year is allowed for beside the slopes"
 
 

@@ -6,12 +6,6 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
-#: What is said of slopes over too short a history to show a season.
-SEASON_NOT_TOLD = (
-    "the history is too short to tell a drift from a part of a yearly season: slopes hold it, their intervals and the "
-    "forecasts allow for it (record the temperature, or wait for 300 days)"
-)
-
 
 def backup_made(file: Path, tables: int, rows: int) -> str:
     """Return what is said of a backup."""

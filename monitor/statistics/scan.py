@@ -39,7 +39,7 @@ HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
 #: above that of normal values, 3, by so many times its scatter, the root of 24/n, the series without a change are
 #: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with
 #: a lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md).
-TAILED, TAIL_FREEDOM = 1.5, 3.25
+TAILED, TAIL_FREEDOM = 1.5, 4.0
 #: Amplitude of a yearly wave that is allowed for where a history is too short to show it, in scatters of a run, beside
 #: independent runs: without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and 28 % at 1 %
 #: (docs/trials-statistics.md). Over less than this part of the period it moves nothing.

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.group_sums import GroupSums
 from monitor.records import Array
-from monitor.statistics.days.block_lines import DEPENDENT, Blocks, beside_season, block_lines
+from monitor.statistics.days.block_lines import DEPENDENT, Blocks, block_lines
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
 
@@ -150,10 +151,10 @@ def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = N
     """The drift of every cell with the resemblance of its groups allowed for, as ``trend`` does.
 
     The slope is that of all groups, or, where a ``cycle`` is fitted beside it, that of the blocks; its uncertainty is
-    that of the blocks, and that of the season where it may be a part of the slope (``beside_season``). NaN where they
-    are too few.
+    that of the blocks. NaN where they are too few.
     """
     lines = block_lines(blocks, cycle=cycle)
     slope = np.where(lines.cyclic, lines.slope, np.where(np.isfinite(lines.slope), drift.slope, np.nan))
-    u, p_value = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal)
-    return CellDrift(slope, u, p_value, lines.widening)
+    u = lines.u_slope
+    p_value = 2.0 * scipy.special.stdtr(lines.dof, -np.abs(_quotient(slope, u)))
+    return CellDrift(slope, u, np.asarray(p_value), lines.widening)

@@ -18,10 +18,8 @@ from monitor.records import Array
 from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
 from monitor.statistics.days.block_lines import (
     FEWEST_BLOCKS,
-    AgainstSeason,
     BlockLines,
     Blocks,
-    beside_season,
     block_lines,
     blocks_of_days,
     fits_cycle,
@@ -36,8 +34,7 @@ class Resemblance:
     """How days resembled each other: ``correlation`` of neighbouring ``blocks`` of days, as estimated and ``allowed``.
 
     ``widening``: the interval of the slope is so many times wider than with independent days. ``cyclic``: a cycle was
-    fitted beside the line; ``beside`` columns were as well. ``seasonal``: the history is too short for a cycle, which
-    may be a part of the slope; the p-value is that beside one of any size.
+    fitted beside the line; ``beside`` columns were as well.
     """
 
     correlation: float
@@ -46,7 +43,6 @@ class Resemblance:
     blocks: int
     cyclic: bool
     beside: int
-    seasonal: bool = False
 
 
 #: Days that are taken as independent.
@@ -132,7 +128,7 @@ def _independent(fit: MixedFit, at: float) -> BlockLines:
     return BlockLines(
         at=np.array([at]), slope=fit.coefficients[-1:], covariance=fit.covariance[pick][np.newaxis], dof=fit.dof[-1:],
         correlation=none, allowed=none, widening=unity, scatter=unity, blocks=np.zeros(1, dtype=np.int64),
-        cyclic=np.zeros(1, dtype=np.bool_), seasonal=AgainstSeason(np.full(1, np.nan), np.full(1, np.nan)),
+        cyclic=np.zeros(1, dtype=np.bool_),
     )  # fmt: skip
 
 
@@ -154,18 +150,16 @@ def _result(
     fit: MixedFit, lines: BlockLines, at: float, y: Array, u: Array | None, columns: Array, p: float
 ) -> Trend:
     """The line without what rests on ranks; ``columns`` (n, e) are what is fitted beside it."""
-    slope, dof = float(fit.coefficients[-1]), float(lines.dof[0])
-    widened, p_values = beside_season(np.array([slope]), lines.u_slope, lines.dof, lines.seasonal)
-    u_slope = float(widened[0])
+    slope, u_slope, dof = float(fit.coefficients[-1]), float(lines.u_slope[0]), float(lines.dof[0])
     # From the mean time of the blocks to that of the runs.
     shift = np.array([[1.0, at - float(lines.at[0])], [0.0, 1.0]])
-    covariance = shift @ lines.covariance[0] @ shift.T
-    covariance[1, 1] = u_slope**2
     half = -float(scipy.special.stdtrit(dof, (1.0 - p) / 2.0)) * u_slope
     scatter = float(lines.scatter[0])
     run_u = 1.0 if u is None else float(np.sqrt(np.mean(u**2)))
     beside = columns @ fit.coefficients[1:-1]
     run_variance = (fit.within * run_u) ** 2 * (1.0 if fit.repeated else scatter) + fit.between**2 * scatter
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p_value = 2.0 * float(scipy.special.stdtr(dof, -np.abs(np.divide(slope, u_slope))))
     return Trend(
         at=at,
         level_at=float(fit.coefficients[0]),
@@ -173,8 +167,8 @@ def _result(
         u_slope=u_slope,
         slope_interval=(slope - half, slope + half),
         dof=dof,
-        p_value=float(p_values[0]),
-        covariance=covariance,
+        p_value=p_value,
+        covariance=shift @ lines.covariance[0] @ shift.T,
         within=fit.within * (1.0 if fit.repeated else float(np.sqrt(scatter))),
         between=fit.between * float(np.sqrt(scatter)),
         run_sd=float(np.sqrt(run_variance + np.var(beside))),
@@ -187,7 +181,6 @@ def _result(
         resemblance=Resemblance(
             float(lines.correlation[0]), float(lines.allowed[0]), float(lines.widening[0]), int(lines.blocks[0]),
             bool(lines.cyclic[0]), columns.shape[1] - 2 * int(lines.cyclic[0]),
-            bool(np.isfinite(lines.seasonal.t[0])),
         ),
     )  # fmt: skip
 
@@ -210,7 +203,6 @@ def trend(
     scale bar, moves no slope and is better left out); their common scale is estimated. ``days`` (n,) labels
     whose runs share a day component, and which count at the mean time of the day; None: every run is its own day.
     ``cycle`` is the period of a wave that is fitted beside the line where the history covers most of one (the year);
-    a shorter history without columns beside the line is judged beside a wave of any size (``beside_season``);
     ``beside`` (n, e) are columns, such as the temperature, that are fitted beside it by their means of each day.
     At least three days. Without ``robust`` what rests on the slopes of all pairs of days is left out (NaN, None):
     a forecast has no use for it. Days that resemble each other are allowed for (``block_lines``), unless they are known
@@ -254,10 +246,7 @@ def trend(
     design = np.column_stack([np.ones_like(t), beside_line, on_day - at])
     fit = fit_with_days(y, design, run_u, index)
     judged = _Days(fit.weight, time, plain.value, plain.beside)
-    lines = _independent(fit, at) if independent else _line_of_days(judged, cycle)
-    if not wave.size and lines.cyclic[0]:
-        # The weights of the fit bring in a wave that it does not have.
-        lines = _line_of_days(judged, None)
+    lines = _independent(fit, at) if independent else _line_of_days(judged, cycle if wave.size else None)
     result = _result(fit, lines, at, y, run_u, beside_line, level)
     if not robust:
         return result

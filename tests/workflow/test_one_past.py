@@ -118,7 +118,7 @@ def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -
         limits = {
             name: abs(parameter.mean.latest) + 1.5 * abs(parameter.drift.slope_per_year)
             for name, parameter in trend(db, TrendRequest("HU40-T")).parameters.items()
-            if parameter.drift.monotone_p is not None and parameter.drift.monotone_p < 0.01
+            if parameter.drift.p_value is not None and parameter.drift.p_value < 1e-4
         }
         db.execute(
             "UPDATE imported_campaign SET machine_description = json_merge_patch(machine_description, ?)",
@@ -252,7 +252,7 @@ def test_fleet_and_page_fit_the_same_temperature_beside_the_line(
 
 
 def test_a_machine_that_follows_its_temperature_does_not_drift_in_the_fleet(tmp_path: Path) -> None:
-    """Thirty machines follow a season of two kelvin over 26 weeks, with and without a thermometer."""
+    """Thirty machines follow a season of two kelvin over 26 weeks: no temperature in the null calls a fifth of them."""
     rng = np.random.default_rng(4)
     weeks, machines = 26, 30
     with Database(tmp_path / "season.duckdb") as db:
@@ -269,8 +269,7 @@ def test_a_machine_that_follows_its_temperature_does_not_drift_in_the_fleet(tmp_
     def called(rows: tuple[FleetTableRow, ...]) -> int:
         return sum(row.drift_p is not None and row.drift_p < 0.05 for row in rows)
 
-    # Without one the season may be all of a slope: its p-value is that beside a wave of any size.
-    assert called(without) <= 4
+    assert called(without) >= 6
     # 1.5 of 30 expected; more than 5 in 0.3 % of such samples.
     assert called(with_it) <= 5
 

@@ -266,8 +266,6 @@ def _drift(parameter: ParameterHealth) -> str:
         in_words(value, u, sign=True)[0] for value in (parameter.drift.per_year, *parameter.drift.between)
     )
     sentence = f"{slope} ({low} to {high}) {parameter.unit}/year"
-    if parameter.drift.season_not_told:
-        sentence += ", not told from the season"
     if parameter.drift.crosses_at is not None:
         first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""

@@ -19,14 +19,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
-from monitor.statistics.days.block_lines import (
-    Blocks,
-    beside_season,
-    block_count,
-    block_lines,
-    block_of,
-    fits_cycle,
-)
+from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of, fits_cycle
 from monitor.statistics.mixed import LARGEST, STEPS
 from monitor.statistics.sums import label_groups
 
@@ -219,11 +212,6 @@ def _forecasts(
     away, from_blocks = t - lines.at, t - judged.at
     c = judged.covariance
     of_line = c[:, 0, 0] + 2.0 * from_blocks * c[:, 0, 1] + from_blocks**2 * c[:, 1, 1]
-    # What the season may be of the slope turns the line about the mean of its runs, as in ``trend``.
-    widened, _ = beside_season(lines.slope, judged.u_slope, judged.dof, judged.seasonal)
-    d = is_past.shape[1]
-    at_runs = (is_past @ (np.diff(days.runs[:d], prepend=0.0) * days.time[:d])) / runs
-    of_line += (t - at_runs) ** 2 * (widened**2 - c[:, 1, 1])
     spread = of_line + run_variance + variance * unit * judged.scatter + lines.of_wave
     return lines.level + lines.slope * away, np.sqrt(spread), judged.dof
 

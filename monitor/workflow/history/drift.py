@@ -13,7 +13,6 @@ from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Trend
 from monitor.statistics.trend import trend
 from monitor.units import DAYS_PER_YEAR
-from monitor.workflow.history.season import Season
 from monitor.workflow.history.series import Series
 
 #: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by
@@ -85,16 +84,6 @@ class PieceDrift:
     def stated(self) -> Trend | None:
         """The line where the piece is long enough for a slope a year."""
         return self.line if self.span >= SHORTEST_DAYS else None
-
-    @property
-    def season(self) -> Season | None:
-        """What the stated slope says of the year; None without one, or where a temperature stands beside the line."""
-        line = self.stated
-        if line is None or not (line.resemblance.cyclic or line.resemblance.seasonal):
-            return None
-        if line.resemblance.seasonal and line.p_value >= 1.0 - line.confidence:
-            return Season.NOT_TOLD
-        return Season.ALLOWED_FOR
 
     @property
     def why_not_stated(self) -> Lack | None:
