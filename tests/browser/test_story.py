@@ -127,7 +127,9 @@ def test_story_the_log_in_ends_while_somebody_types(site: Site) -> None:
         assert "What you filled in is here" in page.locator("main").inner_text()
         assert "belt changed" in page.locator("main").inner_text()
         page.get_by_role("button", name="send it").dblclick()
-        page.wait_for_url("**/machine?**")  # the form's own page is complete too while its answer is under way
+        page.wait_for_url(
+            "**/machine?**"
+        )  # the form's own page is complete too while its answer is under way
         visit.settle()
         assert page.locator("li", has_text="note, belt changed").count() == 1
 
