@@ -181,9 +181,10 @@ def test_the_demo_does_the_main_job_and_prints_what_the_readme_shows(folder: Pat
 def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
     typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))
-    assert len(typed) == 2
+    assert len(typed) == 3
     printed = [try_out(example, tmp_path) for example in typed]
     assert "EZC1:const@warmup" in printed[0]
+    assert "EC0A" in printed[2]
     assert (tmp_path / "figures/missing-effects.svg").is_file()
 
 
