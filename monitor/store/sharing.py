@@ -27,8 +27,10 @@ from monitor.store.connection import Database
 from monitor.store.opening import busy, connect, is_missing
 from monitor.store.turns import Patience, turn_to_write, writer_at_work
 
-#: How long the file stays open for the next question, in s: to open it takes some 10 ms.
+#: How long the file stays open for the next question, in s: to open it takes some 10 ms. Whoever reads keeps it longer
+#: while nobody has taken the turn to write: what is computed between two questions of one verb.
 _IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
+_IDLE_ALONE_S = 0.3
 #: How long it is kept without a pause, in s; longer only by the one question or transaction that is under way.
 _LONGEST_S = 0.5
 #: How long a process that ends waits for a question of another thread, in s.
@@ -204,11 +206,17 @@ class SharedDatabase(Database):
             if not self._lock.acquire(blocking=False):
                 continue
             try:
-                idle_s = _IDLE_WRITING_S if self._writes else _IDLE_READING_S
-                if self._is_open_since(opening) and time.monotonic() - self._used_at > idle_s:
+                if self._is_open_since(opening) and self._is_idle():
                     self._let_go()
             finally:
                 self._lock.release()
+
+    def _is_idle(self) -> bool:
+        """Whether nothing was asked for so long that others may have the file."""
+        idle_s = time.monotonic() - self._used_at
+        if self._writes:
+            return idle_s > _IDLE_WRITING_S
+        return idle_s > _IDLE_ALONE_S or (idle_s > _IDLE_READING_S and writer_at_work(self.path) is not None)
 
     def _is_open_since(self, opening: int) -> bool:
         return self._connection is not None and self._openings == opening

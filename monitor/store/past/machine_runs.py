@@ -135,8 +135,10 @@ def latest_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str]
 def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> dict[str, str]:
     """What parameters of a machine refer to, in the words of ``parameter_frame``; "or" where models differ."""
     rows = db.rows(
-        "SELECT parameter, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) FROM v_parameters "
-        "WHERE machine = ? AND refers_to IS NOT NULL GROUP BY parameter",
+        "SELECT parameter, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) FROM parameter_frame "
+        "JOIN (SELECT identification_id FROM identification JOIN campaign USING (campaign_id) WHERE machine = ? "
+        "QUALIFY identification_id = max(identification_id) OVER (PARTITION BY campaign_id, model, model_version)) "
+        "USING (identification_id) GROUP BY parameter",
         [machine],
     )
     of_machine = dict(rows)
