@@ -41,6 +41,10 @@ class DataError(InputError):
     """Readings, arrays or groups from which the requested result cannot be computed."""
 
 
+class NotConvergedError(DataError):
+    """An adjustment that found no minimum: the readings contradict the file that describes the machine."""
+
+
 class StoreError(InputError):
     """A database that cannot be opened, is newer than the software, or was altered."""
 

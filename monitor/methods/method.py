@@ -379,7 +379,7 @@ class ChainMethod(Method):
         try:
             solution = solve(problem)
         except DataError as error:
-            raise DataError(f"{error}{problem.unsettled}{_suspected(problem)}") from error
+            raise type(error)(f"{error}{problem.unsettled}{_suspected(problem)}") from error
         return replace(
             identification(campaign, model, problem, solution, self.advice), taken_up=self.taken_up(problem)
         )

@@ -23,6 +23,8 @@ from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import ExplainRequest
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import as_model, resolve
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -149,6 +151,14 @@ def test_explain_names_it_where_no_machine_fits(tmp_path: Path) -> None:
         import_campaign(db, campaign)
         with pytest.raises(DataError, match="It looks as if the columns x_mm and y_mm were exchanged"):
             explain(db, ExplainRequest(campaign.name))
+
+
+def test_identify_names_it_where_no_machine_fits(tmp_path: Path) -> None:
+    campaign = recorded("five-days", readings(X="Z", Z="X"))
+    with Database(tmp_path / "mistaken.duckdb") as db:
+        import_campaign(db, campaign)
+        with pytest.raises(DataError, match="It looks as if the columns x_mm and z_mm were exchanged"):
+            identify(db, IdentifyRequest(campaign.name))
 
 
 def test_a_pitch_that_a_grid_of_places_cannot_tell_is_no_candidate() -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from monitor.exceptions import DataError
+from monitor.exceptions import NotConvergedError
 from monitor.records import Array
 from monitor.stopping import checkpoint
 
@@ -140,8 +140,8 @@ def solve(
 ) -> Solution:
     """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
 
-    Raises DataError if it does not converge in ``most`` steps, which means readings that contradict the machine file
-    (a wrong sign, a wrong axis or a ball confused with another).
+    Raises NotConvergedError if it does not converge in ``most`` steps, which means readings that contradict the machine
+    file (a wrong sign, a wrong axis or a ball confused with another).
     """
     current = linearise(local, common)
     cost = float(np.sum(current.residual**2))
@@ -170,7 +170,7 @@ def solve(
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
             return _solution(local, common, current, space, of_common, iteration)
         before = size
-    raise DataError(
+    raise NotConvergedError(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
         "check the axis signs, the topology, the order of the targets and the units"
     )

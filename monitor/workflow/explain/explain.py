@@ -24,17 +24,17 @@ from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign, Verdict
-from monitor.reporting.machine_finding import mistake_sentence
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
-from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation, mistakes_found
+from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation
 from monitor.workflow.explain.measurements import with_measurements
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
+from monitor.workflow.identify.mistaken_columns import with_mistake
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
@@ -49,11 +49,8 @@ def first_fit(campaign: Campaign, model: StoredModel) -> RobustFit:
     """
     try:
         return robust_fit(machine_problem(campaign, model))
-    except DataError as error:
-        mistakes = find_mistakes(campaign, lambda changed: machine_problem(changed, model), None)
-        raise DataError(
-            f"{error}. {mistake_sentence(mistakes_found(mistakes))}" if mistakes else str(error)
-        ) from error
+    except DataError as refusal:
+        raise with_mistake(refusal, campaign, model) from refusal
 
 
 def explanation_of(

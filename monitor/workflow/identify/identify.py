@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from monitor.documents import to_document
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, NotConvergedError
 from monitor.methods import campaign_method
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
@@ -22,6 +22,7 @@ from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
 from monitor.workflow.identify.fitting import curve_problem
 from monitor.workflow.identify.machine import identified, machine_answer
+from monitor.workflow.identify.mistaken_columns import with_mistake
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve, resolve_for
@@ -63,7 +64,10 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
         if isinstance(measured, CurveCampaign):
             fit = campaign_method(measured).fit(curve_problem(measured, model))
             return Identified(curve_answer(fit, label(model)), None)
-        identification, stored = identified(measured, model)
+        try:
+            identification, stored = identified(measured, model)
+        except NotConvergedError as refusal:
+            raise with_mistake(refusal, measured, model) from refusal
         return Identified(machine_answer(measured.machine, identification), stored)
 
 

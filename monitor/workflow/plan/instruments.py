@@ -242,6 +242,12 @@ def _asked(
     ) or tuple(present)
     for name in asked:
         if name not in names:
+            plain, equals, uncertainty = name.partition("=")
+            if equals:
+                raise InputError(
+                    f"--for {name}: an uncertainty is wanted by --wanted {plain}={uncertainty or '1.5'}, "
+                    f"and --for names parameters: {', '.join(names)}"
+                )
             raise InputError(
                 f"there is no parameter '{name}'; {did_you_mean(name, names)}there are {', '.join(names)}"
             )

@@ -37,8 +37,8 @@ def plan(db: Database, request: PlanRequest) -> PlanAnswer:
         raise InputError(f"{campaign.name} is planned by angles of a table; there are no indexations to keep")
     if request.parameters and not isinstance(method, InstrumentPlan):
         raise InputError(
-            f"--for: {campaign.name} is no campaign of instruments; name a wanted uncertainty by --wanted, or leave "
-            "it out"
+            f"--for: {campaign.name} is no campaign of instruments; name a wanted uncertainty by --wanted, "
+            "two effects to be told apart by --separate EFFECT,EFFECT, or leave it out"
         )
     answer: PlanAnswer
     if isinstance(method, AnglePlan):
