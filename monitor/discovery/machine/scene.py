@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -95,12 +95,13 @@ class ChainScene:
 
     def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
         """The shared columns, then those of the candidates."""
-        return np.concatenate([self.shared, *(candidate.columns for candidate in candidates)], axis=1)
+        return _side_by_side(self.shared, candidates)
 
     @cached_property
     def remainders(self) -> Remainders:
         """What selected effects, beside ``shared``, leave of the residual."""
-        return Remainders(self.residual, self.degrees_of_freedom, self.columns)
+        # Of the columns alone: with the scene it would be a circle, which stays until Python looks for garbage.
+        return Remainders(self.residual, self.degrees_of_freedom, partial(_side_by_side, self.shared))
 
     @property
     def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
@@ -143,6 +144,10 @@ class ChainScene:
         if parts is None:
             return None
         return LeftOutBlocks(self.fit.nuisance.basis.reshape(len(self.residual), -1), parts)
+
+
+def _side_by_side(shared: Array, candidates: Sequence[Candidate[object]]) -> Array:
+    return np.concatenate([shared, *(candidate.columns for candidate in candidates)], axis=1)
 
 
 def scene_of(fit: Fit, variants: Sequence[ChainVariant]) -> ChainScene:
