@@ -171,7 +171,7 @@ def test_what_acts_in_one_run_only_is_no_prediction(virtual_campaigns):
 
 def test_a_scene_goes_with_its_last_reference(seen):
     """Half a hundred megabytes of columns: in a circle they would stay until Python looks for garbage."""
-    now, scene, _ = seen
+    _, scene, _ = seen
     again = replace(scene)
     again.remainders.beside([])
     still_there = weakref.ref(again)
