@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -21,6 +21,8 @@ REFERENCE_TEMPERATURE_DEGC = 20.0
 # a few microradians, and play and friction of guides and gears take a few of each to be turned round.
 SMALLEST_MOVE_MM = 10e-3
 SMALLEST_MOVE_RAD = 50e-6
+# Columns of up to so many probings are held: 0.1 MB each, some hundred in a search.
+MOST_REMEMBERED = 20_000
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,26 @@ class Context:
             if name in columns and not np.array_equal(expected[:, index], self.positions[:, index]):
                 columns[name] = joint.sign * expected[:, index] / (DEGREE.factor if joint.turns else 1.0)
         return replace(self, expected=expected, columns=columns)
+
+    def remembered(self, source: object, joint: int | None, compute: Callable[[], Array]) -> Array:
+        """What ``compute`` gives of a ``source`` (a shape, a driver) at a joint, computed once for these probings.
+
+        A search looks at some thousand products of a few dozen of them. Sources that cannot be hashed are computed each
+        time, and so are those of many probings, which would be held beside each other.
+        """
+        if len(self) > MOST_REMEMBERED:
+            return compute()
+        try:
+            columns = self._columns.get((source, joint))
+        except TypeError:
+            return compute()
+        if columns is None:
+            columns = self._columns[source, joint] = compute()
+        return columns
+
+    @cached_property
+    def _columns(self) -> dict[tuple[object, int | None], Array]:
+        return {}
 
     @cached_property
     def travel(self) -> Array:

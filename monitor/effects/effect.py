@@ -187,8 +187,9 @@ class ChainEffect:
         return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
 
     def basis(self, context: Context) -> ChainBasis:
-        shape = self.shape.columns(context, self.term.joint)
-        driver = self.driver.columns(context, self.term.joint)
+        joint = self.term.joint
+        shape = context.remembered(self.shape, joint, lambda: self.shape.columns(context, joint))
+        driver = context.remembered(self.driver, joint, lambda: self.driver.columns(context, joint))
         product = (shape[:, :, None] * driver[:, None, :]).reshape(len(shape), -1)
         return ChainBasis(self.term, product)
 

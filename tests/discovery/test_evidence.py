@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -165,3 +167,17 @@ def test_what_acts_in_one_run_only_is_no_prediction(virtual_campaigns):
     problem = problem_of(campaign)
     moved = parse_effect("ball:2:moved(run 3, sequence 30)", problem.context.chain)
     assert version_error(fit(replace(problem, added=(moved,)))).held_out_rms == pytest.approx(1e-3, rel=0.05)
+
+
+def test_a_scene_goes_with_its_last_reference(seen):
+    """Half a hundred megabytes of columns: in a circle they would stay until Python looks for garbage."""
+    _, scene, _ = seen
+    again = replace(scene)
+    again.remainders.beside([])
+    still_there = weakref.ref(again)
+    gc.disable()
+    try:
+        del again
+        assert still_there() is None
+    finally:
+        gc.enable()

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods.chain.least_squares import RANK_TOLERANCE, Linearisation, eliminate, project_out, solve
+from monitor.methods.chain.least_squares import (
+    RANK_TOLERANCE,
+    Linearisation,
+    eliminate,
+    project_out,
+    solve,
+    space_of_run,
+)
 from monitor.records import Array
 
 
@@ -158,3 +165,22 @@ def test_fewer_rows_than_unknowns_span_what_they_can() -> None:
     nulls = space.null_space / scale[:, None, :]
     assert np.einsum("rnp,rkp->rnk", local, nulls) == pytest.approx(np.zeros((2, 5, 8)), abs=1e-12)
     assert [np.linalg.matrix_rank(vectors) for vectors in nulls] == [3, 3]
+
+
+@pytest.mark.parametrize("alike", [1.0, 1e-2, 1e-4, 1e-7, 0.0])
+@pytest.mark.parametrize("rows", [40, 4])
+def test_the_space_of_one_run_is_that_of_the_elimination(alike: float, rows: int) -> None:
+    rng = np.random.default_rng(1)
+    columns = rng.standard_normal((rows, 6)) * 10.0 ** np.arange(-3, 3)
+    columns[:, 5] = columns[:, 0] + alike * columns[:, 5] / 10.0**5
+    fast, slow = space_of_run(columns), eliminate(columns[None])
+    assert fast.rank == int(slow.rank[0])
+    # The projection, and the shortest unknowns behind it, do not depend on how the basis is turned.
+    np.testing.assert_allclose(fast.basis @ fast.basis.T, slow.basis[0] @ slow.basis[0].T, rtol=0, atol=1e-9)
+    scale = np.linalg.norm(columns, axis=0)[:, None]
+    np.testing.assert_allclose(
+        scale * (fast.inverse @ fast.basis.T),
+        scale * (slow.inverse[0] @ slow.basis[0].T),
+        rtol=1e-6,
+        atol=1e-6,
+    )

@@ -86,6 +86,32 @@ def test_ptb_dcc_schema_validates_every_part(
     assert not schema.validate(etree.fromstring(broken))
 
 
+@pytest.mark.parametrize("release", list(DccVersion))
+@pytest.mark.parametrize(("language", "word"), [("en", "DRAFT"), ("de", "ENTWURF")])
+def test_ptb_dcc_schema_validates_a_draft_that_says_what_it_is(
+    make_record: Make, release: DccVersion, language: str, word: str
+) -> None:
+    etree = pytest.importorskip("lxml.etree", reason="lxml validates XML schemas")
+    record = dataclasses.replace(
+        make_record(13, language=language, maps=1), country="DE", dcc_version=release, draft=True
+    )
+    draft = etree.fromstring(dcc_xml(record))
+    schema_of(release).assertValid(draft)
+    texts = [text for text in draft.xpath("//*[@id='draft']//text()") if text.strip()]
+    assert any(word.lower() in text.lower() for text in texts)
+    issued = etree.fromstring(dcc_xml(dataclasses.replace(record, draft=False)))
+    assert not issued.xpath("//*[@id='draft']")
+
+
+def test_d_si_2_2_1_an_element_of_the_covariance_is_a_line(make_record: Make) -> None:
+    """Of 149 parameters the file has 7.0 MB instead of 9.4 MB; an XML reader sees the same."""
+    record = dataclasses.replace(make_record(13), country="DE", dcc_version="3.3.0")
+    lines = dcc_xml(record).decode().splitlines()
+    elements = [line for line in lines if "<si:covarianceXMLList>" in line]
+    assert len(elements) == 2 * 13 * 13
+    assert all(line.strip().endswith("</si:covarianceXMLList>") for line in elements)
+
+
 @pytest.mark.parametrize(("region", "factor"), [("ellipsoidal", "k_p"), ("rectangular", "k_q")])
 def test_d_si_2_1_both_regions_hold_the_covariance_to_the_last_bit(
     tree: ET.Element, record: CertificateRecord, region: str, factor: str

@@ -33,16 +33,17 @@ def broken(rules: Any, xml: bytes) -> list[str]:
     return sorted(rules.validation_report.xpath(path, namespaces={"svrl": "http://purl.oclc.org/dsdl/svrl"}))
 
 
+@pytest.mark.parametrize("draft", [False, True])
 @pytest.mark.parametrize("language", ["en", "de"])
 @pytest.mark.parametrize("count", [1, 13])
 def test_iso_19757_3_a_certificate_breaks_no_rule(
-    make_record: Make, rules: Any, count: int, language: str
+    make_record: Make, rules: Any, count: int, language: str, draft: bool
 ) -> None:
     record = make_record(count, language=language, maps=1)
     assert record.results is not None
     as_left = dataclasses.replace(record.results[0], state="as left")
     record = dataclasses.replace(
-        record, country="DE", dcc_version="3.3.0", results=(record.results[0], as_left)
+        record, country="DE", dcc_version="3.3.0", results=(record.results[0], as_left), draft=draft
     )
     assert broken(rules, dcc_xml(record)) == []
 

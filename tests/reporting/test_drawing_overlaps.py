@@ -36,7 +36,7 @@ from monitor.reporting.health.pictures import against_driver, error_steps, where
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.svg.letter_widths import BOLD, in_units, units_an_em
 from monitor.reporting.svg.map_slices import map_drawing, slices_of
-from monitor.reporting.svg.plot import LETTER, SCALE
+from monitor.reporting.svg.plot import LETTER, SCALE, nice_ticks, words_of_ticks
 from monitor.reporting.texts import texts_of
 
 HERE = Path(__file__).parent
@@ -113,6 +113,39 @@ def _model(count: int, size: float, heldout: float | None) -> ModelHealth:
 @pytest.mark.parametrize("heldout", [None, 0.2, 3.0])
 def test_error_steps(count: int, size: float, heldout: float | None) -> None:
     assert faults(error_steps(_model(count, size, heldout))) == []
+
+
+@pytest.mark.parametrize("count", [1, 9])
+@pytest.mark.parametrize("heldout", [0.2, 3.0])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 3e5])
+def test_nothing_strikes_names_or_numbers_of_the_steps_through(
+    count: int, heldout: float, size: float
+) -> None:
+    svg = error_steps(_model(count, size, heldout))
+    marks = [
+        (float(x), float(top), float(x), float(bottom))
+        for x, top, bottom in re.findall(r'd="M([-\d.]+) ([-\d.]+)L\1 ([-\d.]+)"', svg)
+    ] + [
+        (float(x), float(y) - float(r), float(x) + 2 * float(r), float(y) + float(r))
+        for x, y, r in re.findall(r'd="M([-\d.]+) ([-\d.]+)a([\d.]+) ', svg)
+    ]
+    assert len(marks) > 2 * min(count, 8)
+    struck = [
+        (text, mark)
+        for text, left, top, right, bottom in boxes_of(svg)
+        for mark in marks
+        if min(right, mark[2]) - max(left, mark[0]) >= 0.0 and min(bottom, mark[3]) - max(top, mark[1]) > 0.0
+    ]
+    assert struck == []
+    # Small numbers are numbers, too.
+    assert "0.00" not in svg
+
+
+@pytest.mark.parametrize("level", [0.0, 24.0, 3e7])
+@pytest.mark.parametrize("span", [1e-3, 2.0])
+def test_numbers_along_an_axis_are_told_from_each_other(level: float, span: float) -> None:
+    words = words_of_ticks(nice_ticks(level, level + span, 6))
+    assert len(set(words.values())) == len(words) > 2
 
 
 @pytest.mark.parametrize("size", SIZES)

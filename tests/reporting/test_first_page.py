@@ -27,6 +27,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import health_html, health_pdf
+from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.trend_picture import trend_picture
 
 LAST = datetime(2026, 3, 6, 9)
@@ -164,6 +165,24 @@ def test_a_quiet_week_says_so() -> None:
 )
 def test_every_state_has_its_answer(health: MachineHealth, kind: str, sentence: str) -> None:
     assert {answer.kind: answer.sentence for answer in answers(fleet(health)[0])}[kind] == sentence
+
+
+def test_tolerances_without_uncertainties_are_not_said_to_be_lacking() -> None:
+    bare = machine("Bare", "no change seen", next_check=NextCheck(CheckKind.NO_TOLERANCE))
+    limited = machine("Limited", "no change seen", next_check=NextCheck(CheckKind.NO_FORECAST))
+    sentences = {answer.kind: answer.sentence for answer in answers(fleet(limited)[0])}
+    assert sentences["unjudged"] == ("Not against the tolerances stated, for want of uncertainties: Limited.")
+    assert sentences["why"] == (
+        "No parameter changed, and the models explain the measurements; without uncertainties nothing is held against "
+        "the tolerances."
+    )
+    sentences = {answer.kind: answer.sentence for answer in answers(fleet(limited, bare)[0])}
+    assert sentences["unjudged"] == (
+        "Not against the tolerances stated, for want of uncertainties: Limited; no tolerances are stated for 1 of 2 "
+        "machines evaluated: Bare."
+    )
+    sentences = {answer.kind: answer.sentence for answer in answers(fleet(bare)[0])}
+    assert sentences["unjudged"] == "Nothing was judged: no tolerances are stated."
 
 
 def test_machines_without_tolerances_are_counted_among_those_that_have_some() -> None:

@@ -63,6 +63,11 @@ class Fit:
         assert pose.by_error is not None
         return pose.by_error
 
+    @cached_property
+    def observed_by_error(self) -> Array:
+        """The same derivatives (n, d, J, 2, 6) of the numbers of the rows."""
+        return self.problem.observe(self.by_error)
+
     def moved_by(self, basis: Basis) -> Array:
         """Change (n, d, k) of the residuals for each coefficient of an effect."""
         return self.problem.observe(basis.displacement(self.by_error))

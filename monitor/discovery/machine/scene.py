@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -22,16 +22,15 @@ from monitor.discovery.machine.evidence.held_out import (
     pose_parts,
 )
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
+from monitor.discovery.machine.scene_columns import columns_of, raw_columns, raw_lengths
+from monitor.discovery.search.candidate import Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms
 from monitor.discovery.search.remainder import Remainders
-from monitor.effects import ParsedEffect
+from monitor.effects import Basis, ParsedEffect
 from monitor.exceptions import EffectError
 from monitor.methods.chain.shared_effects import largest_coefficient
 from monitor.records import Array
 
-# A unit of a coefficient (1 mm, 1 rad) that moves the tip by less than this, in mm, is a sine of 180 degrees.
-ROUNDING = 1e-9
 # An effect is found for certain where its visible part is this many standard deviations long: the 1 % level
 # over some 300 candidates lies at 4.2.
 DETECTABLE = 5.0
@@ -42,10 +41,21 @@ ChainVariant: TypeAlias = Variant[MachineEffect]
 
 @dataclass(frozen=True)
 class ChainCandidate(Candidate[MachineEffect]):
-    """An effect of a chain as the data see it; ``raw`` (n, d, k) mm is the displacement at every probing for a unit of
-    each coefficient, ``largest`` the coefficients that a machine in use is likely to have at most."""
+    """An effect of a chain as the data of a ``fit`` see it; ``basis`` is the effect at every probing, ``largest`` the
+    coefficients that a machine in use is likely to have at most."""
 
-    raw: Array
+    fit: Fit
+    basis: Basis
+
+    @property
+    def raw(self) -> Array:
+        """The displacement (n, d, k) in mm at every probing for a unit of each coefficient."""
+        return np.moveaxis(raw_columns(self.fit, self.basis), 0, 2)
+
+    @property
+    def raw_lengths(self) -> Array:
+        """The lengths (k,) in mm of those displacements over all probings."""
+        return raw_lengths(self.fit, self.basis)
 
     @cached_property
     def detectable(self) -> bool:
@@ -85,12 +95,13 @@ class ChainScene:
 
     def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
         """The shared columns, then those of the candidates."""
-        return np.concatenate([self.shared, *(candidate.columns for candidate in candidates)], axis=1)
+        return _side_by_side(self.shared, candidates)
 
     @cached_property
     def remainders(self) -> Remainders:
         """What selected effects, beside ``shared``, leave of the residual."""
-        return Remainders(self.residual, self.degrees_of_freedom, self.columns)
+        # Of the columns alone: with the scene it would be a circle, which stays until Python looks for garbage.
+        return Remainders(self.residual, self.degrees_of_freedom, partial(_side_by_side, self.shared))
 
     @property
     def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
@@ -135,79 +146,25 @@ class ChainScene:
         return LeftOutBlocks(self.fit.nuisance.basis.reshape(len(self.residual), -1), parts)
 
 
+def _side_by_side(shared: Array, candidates: Sequence[Candidate[object]]) -> Array:
+    return np.concatenate([shared, *(candidate.columns for candidate in candidates)], axis=1)
+
+
 def scene_of(fit: Fit, variants: Sequence[ChainVariant]) -> ChainScene:
     """The residual of a fit and what the data can see of every effect."""
     problem = fit.problem
-    raw: list[Array] = []
-    allowed: list[tuple[ChainVariant, float]] = []
+    allowed: list[tuple[ChainVariant, Basis]] = []
     refused = []
     for variant in variants:
         try:
-            basis = variant.effect.basis(problem.context)
+            allowed.append((variant, variant.effect.basis(problem.context)))
         except EffectError as error:
             refused.append((variant.family, str(error)))
-            continue
-        moved = np.ascontiguousarray(np.moveaxis(fit.moved_by(basis), 2, 0))
-        moved[np.abs(moved).max(axis=(1, 2), initial=0.0) < ROUNDING] = 0.0
-        peak = float(np.sqrt(np.einsum("kna,kna->kn", moved, moved).max(initial=0.0)))
-        raw.append(moved)
-        allowed.append((variant, largest_coefficient(variant.effect, basis, peak, problem.largest_effect)))
-    projected, before = _projected(fit, raw)
     candidates = []
-    start = 0
-    for moved, (variant, largest) in zip(raw, allowed, strict=True):
-        rows = slice(start, start + len(moved))
-        start += len(moved)
-        columns, share = _significant(projected[rows], before[rows])
-        candidates.append(ChainCandidate(variant, columns.T, share, largest, np.moveaxis(moved, 0, 2)))
+    every = columns_of(fit, [basis for _, basis in allowed])
+    for (variant, basis), effect_columns in zip(allowed, every, strict=True):
+        largest = largest_coefficient(variant.effect, basis, effect_columns.peak, problem.largest_effect)
+        candidates.append(
+            ChainCandidate(variant, effect_columns.columns.T, effect_columns.share, largest, fit, basis)
+        )
     return ChainScene(fit, fit.nuisance.shared, tuple(candidates), tuple(refused))
-
-
-def _projected(fit: Fit, raw: Sequence[Array]) -> tuple[Array, Array]:
-    """Whitened columns (K, M) of all effects less what every run's own unknowns can do, and their lengths (K,)
-    before. One contiguous row a coefficient: the rows are read effect by effect."""
-    problem = fit.problem
-    runs, rows = fit.solution.last.residual.shape
-    count = sum(len(moved) for moved in raw)
-    # Calibrated quantities follow the probings of a run and do not depend on the effects.
-    weights = 1.0 / problem.sigma
-    sources = problem.padded(np.arange(float(weights.size)).reshape(weights.shape) + 1.0).astype(np.int64) - 1
-    projected = np.zeros((count, runs, rows))
-    filled = sources >= 0
-    # Probings of one run after another, all runs of the same length: the usual file needs no reordering.
-    straight = np.array_equal(sources.reshape(-1), np.arange(weights.size))
-    start = 0
-    # Effect by effect: all columns once more beside ``projected`` would be fetched from the system page by page.
-    for moved in raw:
-        white = (moved * weights).reshape(len(moved), -1)
-        target = projected[start : start + len(moved), :, : sources.shape[1]]
-        start += len(moved)
-        if straight:
-            target[...] = white.reshape(len(moved), *sources.shape)
-        else:
-            target[...] = np.where(filled, white[:, np.where(filled, sources, 0)], 0.0)
-    if fit.whitening is not None:
-        projected = fit.whitening(projected)
-    before = np.sqrt(np.einsum("krn,krn->k", projected, projected))
-    for run, basis in enumerate(fit.nuisance.basis):
-        part = projected[:, run]
-        part -= (part @ basis) @ basis.T
-    return projected.reshape(count, runs * rows), before
-
-
-def _significant(projected: Array, before: Array) -> tuple[Array, float]:
-    """Rows (k, M) without the directions of which nothing remains, and the largest share that remains."""
-    scale = np.where(before == 0, 1.0, before)
-    if len(projected) == 1:
-        share = float(np.sqrt(projected[0] @ projected[0])) / float(scale[0])
-        return (projected if share > SMALLEST_SHARE else np.zeros_like(projected)), share
-    scaled = projected / scale[:, None]
-    values, vectors = np.linalg.eigh(scaled @ scaled.T)
-    share = float(np.sqrt(max(values.max(initial=0.0), 0.0)))
-    if values.min(initial=1.0) > SMALLEST_SHARE**2:
-        return projected, share
-    keep = vectors[:, values > SMALLEST_SHARE**2]
-    cleaned: Array = (keep @ keep.T) @ scaled
-    # A coefficient of which nothing remains (a ball touched once) must not come back as rounding at full length.
-    cleaned[np.sqrt(np.sum(cleaned**2, axis=1)) <= SMALLEST_SHARE] = 0.0
-    return cleaned * scale[:, None], share

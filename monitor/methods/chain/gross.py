@@ -13,13 +13,14 @@ points (``monitor.discovery``).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from monitor.machine import MOTION
-from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
+from monitor.methods.chain.least_squares import Linearisation, RunSpace, Solution, space_of_run
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 
@@ -119,11 +120,15 @@ class _Rows:
         weights[len(weights) - usual :] = HELD
         return replace(self, residual=weights * self.residual, columns=weights[:, None] * self.columns)
 
+    @cached_property
+    def space(self) -> RunSpace:
+        """What the unknowns can do."""
+        return space_of_run(self.columns)
+
     @property
     def is_plausible(self) -> bool:
         """Whether the linear fit is a machine: without a ball of its bar, a run fits gains of -1 perfectly."""
-        space = eliminate(self.columns[None])
-        step = space.inverse[0] @ (space.basis[0].T @ self.residual)
+        step = self.space.inverse @ (self.space.basis.T @ self.residual)
         errors = (self.base - step[: len(self.base)])[self.is_limited]
         return bool(np.abs(errors).max(initial=0.0) <= self.largest)
 
@@ -156,8 +161,7 @@ class _Deletion:
 
 
 def _deletion(rows: _Rows, out: npt.NDArray[np.bool_]) -> _Deletion:
-    space = eliminate(rows.columns[None])
-    basis, rank = space.basis[0], int(space.rank[0])
+    basis, rank = rows.space.basis, rows.space.rank
     remainder = rows.residual - basis @ (basis.T @ rows.residual)
     count = len(rows.index)
     of_rows = basis[: count * rows.numbers].reshape(count, rows.numbers, -1)

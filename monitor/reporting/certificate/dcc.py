@@ -83,6 +83,11 @@ def dcc_xml(record: CertificateRecord) -> bytes:
     if not version.by_vocabulary:
         strip_vocabulary(root)
     ET.indent(root, " ")
+    # An element of a covariance is a line: of 149 parameters there are 44 402, two matrices as D-SI asks for them.
+    for covariance in root.iter(f"{{{SI}}}covarianceXMLList"):
+        covariance.text, covariance.tail = None, "\n"
+        for part in covariance:
+            part.tail = None
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
 

@@ -16,6 +16,7 @@ from monitor.reporting.health.records import (
     ParameterHealth,
     State,
 )
+from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
 from monitor.reporting.plain_names import plain_name
 
@@ -40,6 +41,10 @@ _QUIET_IN_PART = (
     "measurements."
 )
 _QUIET_WITHOUT = "No parameter changed, and the models explain the measurements; no tolerances are stated."
+_QUIET_UNCERTAIN = (
+    "No parameter changed, and the models explain the measurements; without uncertainties nothing is held against the "
+    "tolerances."
+)
 _UNMEASURED = "No machine was measured this week, so nothing is known of its state."
 _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
 
@@ -74,7 +79,8 @@ def _quiet(fleet: Fleet) -> str:
     if not states & set(FINE):
         return _UNMEASURED
     if not any(_was_judged(row) for row in fleet.rows):
-        return _QUIET_WITHOUT
+        checked = [row for row in fleet.rows if row.state in FINE]
+        return _QUIET_UNCERTAIN if any(map(_has_tolerances, checked)) else _QUIET_WITHOUT
     return _QUIET_IN_PART if State.NO_CHANGE_SEEN in states else _QUIET
 
 
@@ -273,9 +279,13 @@ def _was_judged(row: FleetRow) -> bool:
     return row.probability_out is not None or row.state in (State.IN_TOLERANCE, *ALARMS[:2])
 
 
+def _has_tolerances(row: FleetRow) -> bool:
+    """Whether tolerances are stated for a machine: then its next check is not open for the lack of them."""
+    return isinstance(row.next_check, NextCheck) and row.next_check.kind is not CheckKind.NO_TOLERANCE
+
+
 def _unjudged(fleet: Fleet) -> str:
-    without = [row for row in fleet.rows if row.state in _WITHOUT_LIMIT and not _was_judged(row)]
-    judged = sum(_was_judged(row) for row in fleet.rows)
+    open_rows = [row for row in fleet.rows if row.state in _WITHOUT_LIMIT and not _was_judged(row)]
     parts = [
         f"{phrase}: {_names(rows)}"
         for state, phrase in (
@@ -283,16 +293,26 @@ def _unjudged(fleet: Fleet) -> str:
             (State.NOT_EVALUATED, "measured but not evaluated"),
             (State.NO_CHANGE_SEEN, "not against every tolerance"),
         )
-        if (rows := [row for row in fleet.rows if row.state == state and row not in without])
+        if (rows := [row for row in fleet.rows if row.state == state and row not in open_rows])
     ]
     if fleet.refused_imports:
         parts.append(f"{len(fleet.refused_imports)} refused imports of machines not known here")
-    if without and not judged:
-        parts.insert(0, "nothing was judged: no tolerances are stated")
-    elif without:
-        counted = f"{len(without)} of {len(without) + judged} machines evaluated"
-        parts.append(f"no tolerances are stated for {counted}: {_names(without)}")
+    parts = _without_judgement(open_rows, parts, sum(map(_was_judged, fleet.rows)))
     return _sentence("; ".join(parts)) if parts else "Everything was judged."
+
+
+def _without_judgement(rows: Sequence[FleetRow], parts: list[str], judged: int) -> list[str]:
+    """The parts of the answer with that of the ``rows`` that were held against no tolerance, beside so many judged."""
+    without = [row for row in rows if not _has_tolerances(row)]
+    uncertain = [row for row in rows if _has_tolerances(row)]
+    if uncertain:
+        parts = [*parts, f"not against the tolerances stated, for want of uncertainties: {_names(uncertain)}"]
+    if without and not judged and not uncertain:
+        return ["nothing was judged: no tolerances are stated", *parts]
+    if without:
+        counted = f"{len(without)} of {len(rows) + judged} machines evaluated"
+        return [*parts, f"no tolerances are stated for {counted}: {_names(without)}"]
+    return parts
 
 
 def _names(rows: Sequence[FleetRow]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from monitor.reporting.health.answers import URGENT, answers, concern, reason, to_do
+from monitor.reporting.health.columns import column_widths
 from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
     ALARMS,
@@ -115,6 +116,7 @@ class PrintedMachine:
     head: FleetLine
     meaning: str
     lines: tuple[ParameterLine, ...]
+    widths: tuple[float, ...]
     no_trend: str
     changes: tuple[tuple[str, str, bool], ...]
     more_changes: int
@@ -178,12 +180,14 @@ def machine_pages(machines: Iterable[MachineHealth]) -> Iterator[PrintedMachine]
 def _page(health: MachineHealth) -> PrintedMachine:
     shown = health.changes[:_CHANGES_SHOWN]
     blind = health.quality.blind_spots
+    lines = tuple(_parameter(parameter) for parameter in health.parameters)
     more = f" and {len(blind) - _BLIND_SHOWN} more" if len(blind) > _BLIND_SHOWN else ""
     return PrintedMachine(
         health=health,
         head=_line(fleet_row(health)),
         meaning=STATES[health.state],
-        lines=tuple(_parameter(parameter) for parameter in health.parameters),
+        lines=lines,
+        widths=column_widths(lines),
         no_trend=(
             ""
             if any(parameter.drift for parameter in health.parameters)

@@ -197,8 +197,12 @@ def error_steps(model: ModelHealth) -> str:
     most = max(
         [step.rms_um for step in steps] + [step.heldout_um or 0.0 for step in steps] + [model.stated_um]
     )
-    panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
-    for index, step in enumerate(steps):
+    # Numbers stand behind the longest bar and the circle, wherever these end.
+    numbers = [_error_words(step) for step in steps]
+    wide = RIGHT_MM * SCALE - 6.0 - max(160.0, *map(text_width, numbers)) - _SIGN - 10.0
+    panel = Panel(6.0, 40.0, wide, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
+    at = panel.x(model.stated_um)
+    for index, (step, errors) in enumerate(zip(steps, numbers, strict=True)):
         top = panel.top + index * row
         on.text(
             panel.x0, top + 26, shortened(str(step.what), RIGHT_MM * SCALE - 12.0), bold=not step.proposed
@@ -209,16 +213,16 @@ def error_steps(model: ModelHealth) -> str:
             f"M{panel.x0:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.x0:g}Z",
             fill="white" if step.proposed else BLUE, stroke=BLUE, width=3,
         )  # fmt: skip
-        held, values = end, _micrometres(step.rms_um)
+        # Beside the bars alone: it would strike the names of the models through.
+        on.line(at, y - 5, at, y + 39, "white", 8)
+        on.line(at, y - 5, at, y + 39, INK, 3, "10 6")
+        held = end
         if step.heldout_um is not None:
             held = panel.x(step.heldout_um)
             on.path(_circle(held, y + 17, _SIGN), fill="white", stroke=ORANGE, width=4)
-            values += f" ({_micrometres(step.heldout_um)})"
-        beside = max(end, held, panel.x(model.stated_um)) + 14.0
-        on.text(min(beside, RIGHT_MM * SCALE - text_width(values)), y + 26, values)
+        beside = max(end, held + _SIGN, at) + 14.0
+        on.text(min(beside, RIGHT_MM * SCALE - text_width(errors)), y + 26, errors)
     bottom = panel.top + panel.height
-    at = panel.x(model.stated_um)
-    on.line(at, panel.top - 6, at, bottom + 6, INK, 3, "10 6")
     stated = f"probe's statement {model.stated_um:.2g} µm"
     half = text_width(stated) / 2.0
     on.text(min(max(at, half), RIGHT_MM * SCALE - half), panel.top - 14, stated, anchor="middle")
@@ -231,8 +235,14 @@ def error_steps(model: ModelHealth) -> str:
     return on.svg()
 
 
+def _error_words(step: ErrorStep) -> str:
+    """The fitted error, and the held-out one in brackets."""
+    held_out = "" if step.heldout_um is None else f" ({_micrometres(step.heldout_um)})"
+    return _micrometres(step.rms_um) + held_out
+
+
 def _micrometres(value: float) -> str:
-    return f"{value:.2f}" if value < 1e3 else f"{value:.3g}"
+    return f"{value:.2f}" if 0.1 <= value < 1e3 or value == 0.0 else f"{value:.3g}"
 
 
 def _shown(steps: tuple[ErrorStep, ...]) -> tuple[ErrorStep, ...]:

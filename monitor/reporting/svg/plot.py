@@ -7,6 +7,7 @@ The figures of the command line are drawn by matplotlib (``figures_*``); one of 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -95,16 +96,16 @@ class Panel:
     ) -> None:
         """Draw axes with ticks and names; ``named`` ticks across replace numbers."""
         bottom = self.top + self.height
-        shown = {at: tick_words(at) for at in nice_ticks(*self.across, ticks)} if named is None else named
+        shown = words_of_ticks(nice_ticks(*self.across, ticks)) if named is None else named
         for value, label in shown.items():
             at = self.x(value)
             on.line(at, bottom, at, bottom + 8, MID, 2)
             on.text(at, bottom + 12 + LETTER, label, anchor="middle")
-        for value in nice_ticks(*self.up, ticks + 1):
+        for value, label in words_of_ticks(nice_ticks(*self.up, ticks + 1)).items():
             at = self.y(value)
             on.line(self.x0, at, self.x0 + self.width, at, PALE, 1.5)
             on.line(self.x0 - 8, at, self.x0, at, MID, 2)
-            on.text(self.x0 - 13, at + 0.36 * LETTER, tick_words(value), anchor="end")
+            on.text(self.x0 - 13, at + 0.36 * LETTER, label, anchor="end")
         if self.up[0] < 0.0 < self.up[1]:
             on.line(self.x0, self.y(0.0), self.x0 + self.width, self.y(0.0), MID, 2.4)
         on.path(
@@ -134,7 +135,7 @@ def text_width(text: str, *, bold: bool = False) -> float:
 
 def tick_room(shown: tuple[float, float], most: int) -> float:
     """Return how far the widest number beside an axis reaches from it."""
-    return 13.0 + max((text_width(tick_words(tick)) for tick in nice_ticks(*shown, most)), default=0.0)
+    return 13.0 + max(map(text_width, words_of_ticks(nice_ticks(*shown, most)).values()), default=0.0)
 
 
 def shortened(text: str, room: float) -> str:
@@ -143,9 +144,20 @@ def shortened(text: str, room: float) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
-def tick_words(value: float, sign: str = ".") -> str:
+def words_of_ticks(ticks: Sequence[float]) -> dict[float, str]:
+    """Return the numbers along an axis as written, with as many digits as tell them from each other."""
+    for digits in range(6, 17):
+        written = {tick: tick_words(tick, digits=digits) for tick in ticks}
+        if len(set(written.values())) == len(written):
+            break
+    return written
+
+
+def tick_words(value: float, sign: str = ".", digits: int = 6) -> str:
     """Write a number along an axis, with the decimal ``sign`` of a language."""
-    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}").replace(".", sign) if abs(value) > 1e-12 else "0"
+    return (
+        f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}").replace(".", sign) if abs(value) > 1e-12 else "0"
+    )
 
 
 def arrow_head(x1: float, y1: float, x2: float, y2: float, size: float) -> str:

@@ -42,7 +42,7 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
     parts: list[tuple[str, int]] = []
     columns: list[Array] = []
     for whole in scene_of(scene.fit, wholes).candidates:
-        before = np.linalg.norm(whole.raw, axis=(0, 1)) / scene.fit.sigma
+        before = whole.raw_lengths / scene.fit.sigma
         remainder = without(beside.basis, whole.columns)
         length = np.linalg.norm(remainder, axis=0)
         able = np.flatnonzero(length > SMALLEST_SHARE * np.maximum(before, 1e-300))
