@@ -23,6 +23,9 @@ from monitor.units import CONDITION_SUFFIXES
 #: With two or three coordinates a probing, or a finer print, it does not.
 FEWEST_PROBINGS = 12
 
+#: A folder imported again and again under new names gives a sentence for each of the first, a list of the rest.
+SENTENCES = 3
+
 
 def run_fingerprints(touches: Probings) -> dict[int, str]:
     """The hash of targets and readings by run, of every run with ``FEWEST_PROBINGS`` or more.
@@ -100,12 +103,20 @@ def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
         "WHERE campaign = ? ORDER BY same_as_campaign, run, same_as_run",
         [campaign],
     )
-    for (other, its_machine, machine), rows in groupby(repeated, key=lambda row: row[:3]):
+    copies = [(key, list(rows)) for key, rows in groupby(repeated, key=lambda row: row[:3])]
+    for (other, its_machine, machine), rows in copies[:SENTENCES]:
         pairs = [(run, same) for *_, run, same in rows]
         shown = ", ".join(f"{run} (there {same})" for run, same in pairs[:5]) + ", ..." * (len(pairs) > 5)
         of = "" if machine == its_machine else f" of machine {its_machine}"
         notes.append(
             f"{len(pairs)} run{'s' * (len(pairs) > 1)} of {campaign} equal those of campaign {other}{of} in every "
             f"reading, which two measurements never do: run {shown}; withdraw the copy (monitor withdraw)"
+        )
+    more = [str(other) for (other, *_), _ in copies[SENTENCES:]]
+    if more:
+        shown = ", ".join(more[:10]) + ", ..." * (len(more) > 10)
+        notes.append(
+            f"{len(more)} more campaign{'s hold' if len(more) > 1 else ' holds'} runs that equal those of {campaign}: "
+            f"{shown}"
         )
     return tuple(notes)
