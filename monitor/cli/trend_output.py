@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
-from monitor.reporting.lacks import Undecided
+from monitor.reporting.health.sentences import SteppedAtEvent
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
@@ -173,15 +173,10 @@ def _change(name: str, change: DatedChange) -> str:
 
 
 def _event_step(name: str, step: StepAtEvent) -> str:
-    size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
-    event = f"the event of {_minute(step.at)} UTC, {step.kind}: {step.description}"
-    if step.decided:
-        return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
-    if step.scatter_of == "days":
-        return f"{name} differs by {size} before and after {event}, {Undecided.DAYS_MAY_DO}"
-    return (
-        f"{name} differs by {size} before and after {event}; u is of the runs alone, {Undecided.ONE_DAY_EACH}"
-    )
+    """The sentence of the weekly report, with the time and the probability."""
+    what = SteppedAtEvent(name, step.description, step.size, step.u, step.unit, step.why_not_decided)
+    p_value = f" (p = {output.probability(step.p_value)})" if step.decided else ""
+    return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"
 
 
 def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:

@@ -248,14 +248,14 @@ def charts(rng: np.random.Generator) -> None:
     )
 
 
-#: Histories of 20 day means of a cell, of days of several runs too; of 52 half, of 104 a quarter.
+#: Histories of a cell.
 HISTORIES = 1200
 
 
 def changes(rng: np.random.Generator) -> None:
     """Histories with any change at 1 %, of one parameter and of one of 13."""
     rows: list[list[object]] = []
-    for n, count in ((20, HISTORIES), (52, HISTORIES // 2), (104, HISTORIES // 4)):
+    for n, count in ((20, HISTORIES), (52, HISTORIES), (104, HISTORIES)):
         t = 7.0 * np.arange(n)
         wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (count, 1))) / YEAR)
         step = 1.0 * (np.arange(n) >= 0.6 * n)

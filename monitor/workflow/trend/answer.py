@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, WORDED, named
-from monitor.reporting.lacks import Lack
+from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
@@ -114,7 +114,8 @@ class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
-    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it.
+    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it, nor where one or
+    two days on a side say too little: ``why_not_decided`` says which.
     """
 
     at: str
@@ -126,6 +127,7 @@ class StepAtEvent:
     p_value: float
     scatter_of: str
     decided: bool
+    why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
 
 
 @dataclass(frozen=True)
