@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
-from monitor.reporting.lacks import Undecided
+from monitor.reporting.health.sentences import SteppedAtEvent
+from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
+from monitor.workflow.history.season import Season, SlopeVerdict
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
     ConditionEffect,
     Cycle,
     DatedChange,
+    DriftStatement,
     ParameterTrend,
-    Season,
     StepAtEvent,
     TrendAnswer,
     VectorState,
@@ -173,15 +175,10 @@ def _change(name: str, change: DatedChange) -> str:
 
 
 def _event_step(name: str, step: StepAtEvent) -> str:
-    size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
-    event = f"the event of {_minute(step.at)} UTC, {step.kind}: {step.description}"
-    if step.decided:
-        return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
-    if step.scatter_of == "days":
-        return f"{name} differs by {size} before and after {event}, {Undecided.DAYS_MAY_DO}"
-    return (
-        f"{name} differs by {size} before and after {event}; u is of the runs alone, {Undecided.ONE_DAY_EACH}"
-    )
+    """The sentence of the weekly report, with the time and the probability."""
+    what = SteppedAtEvent(name, step.description, step.size, step.u, step.unit, step.why_not_decided)
+    p_value = f" (p = {output.probability(step.p_value)})" if step.decided else ""
+    return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"
 
 
 def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
@@ -365,14 +362,27 @@ def _resemblance(answer: TrendAnswer) -> Iterator[str]:
             f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
             f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
         )
+    yield from _seasons(stated)
+
+
+def _seasons(stated: Mapping[str, DriftStatement]) -> Iterator[str]:
+    """Yield what answers for the season beside the slopes, and which of them may be nothing else."""
     names = dict.fromkeys(drift.temperature for drift in stated.values() if drift.temperature)
     if names:
         yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
+    unsure = [name for name, drift in stated.items() if drift.verdict is SlopeVerdict.DRIFT_OR_SEASON]
+    if unsure:
+        moves = ", ".join(f"{name} {_direction(stated[name])}" for name in unsure)
+        yield f"{moves}; {DRIFT_OR_SEASON}"
     seasons = {drift.season for drift in stated.values()}
     if Season.NOT_TOLD in seasons:
-        yield "the history does not cover the year: a drift is not told from what the season does"
-    elif Season.ALLOWED_FOR in seasons:
+        yield SEASON_NOT_TOLD
+    if Season.ALLOWED_FOR in seasons:
         yield "what goes up and down with the year is allowed for beside the slopes"
+
+
+def _direction(drift: DriftStatement) -> str:
+    return "rises" if (drift.slope_per_year or 0.0) > 0.0 else "falls"
 
 
 def _backtest(answer: TrendAnswer) -> Iterator[str]:

@@ -144,6 +144,7 @@ class Undecided(StrEnum):
 
     ONE_DAY_EACH = "one_day_each"
     DAYS_MAY_DO = "days_may_do"
+    FEW_DAYS = "few_days"
 
     def __str__(self) -> str:
         """The words behind the name of the parameter."""
@@ -158,5 +159,9 @@ _UNDECIDED = {
         "not decided: more than independent days that scatter alike explain, but days that follow each other, a side "
         "whose days scatter more, or campaigns that differ by more than their days may do as much; more days on each "
         "side or further campaigns decide it"
+    ),
+    Undecided.FEW_DAYS: (
+        "not decided: too few days on a side to tell a step of one of many parameters from days that differ; measure "
+        "further days"
     ),
 }

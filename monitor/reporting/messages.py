@@ -6,6 +6,24 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
+#: What is said of a slope that a season may be all of.
+DRIFT_OR_SEASON = "drift or season cannot be told apart"
+#: What is said of a parameter of the fleet in place of its class, where that is so.
+_MOVES = {
+    "drifts out of tolerance within a year": f"reaches its tolerance within a year at this rate; {DRIFT_OR_SEASON}",
+    "drifts": f"moves; {DRIFT_OR_SEASON}",
+}
+#: What is said of slopes over too short a history to show a season.
+SEASON_NOT_TOLD = (
+    "the history is too short to tell a drift from a part of a yearly season: slopes hold it, their intervals and the "
+    "forecasts allow for a season as large as what was seen (record the temperature, or wait for 300 days)"
+)
+
+
+def attention_words(attention: str, season_not_told: bool | None) -> str:
+    """Return the class of a parameter of the fleet; of a slope that may be a season not that it drifts."""
+    return _MOVES.get(attention, attention) if season_not_told else attention
+
 
 def backup_made(file: Path, tables: int, rows: int) -> str:
     """Return what is said of a backup."""

@@ -38,8 +38,10 @@ HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
 #: Values with heavy tails gain more by a change than normal ones. Where the kurtosis of what the best change leaves is
 #: above that of normal values, 3, by so many times its scatter, the root of 24/n, the series without a change are
 #: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with
-#: a lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md).
-TAILED, TAIL_FREEDOM = 1.5, 4.0
+#: a lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md). From ``MANY``
+#: values on 4 degrees are too light for those of Student 3, 2 % of 104 are called at 1 %, and 3.5 cost no power;
+#: with fewer 3.5 degrees would hide steps (one of fifteen scatters in sixteen runs of four days) and win nothing.
+TAILED, TAIL_FREEDOM, MANY, FREEDOM_OF_MANY = 1.5, 4.0, 80, 3.5
 #: Amplitude of a yearly wave that is allowed for where a history is too short to show it, in scatters of a run, beside
 #: independent runs: without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and 28 % at 1 %
 #: (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
@@ -241,7 +243,8 @@ class Scanner:
             # Every shape sees the same noise: their p-values differ by the shape alone.
             size = len(self.root), BLOCK if len(gains) else FIRST_BLOCK
             draws = np.random.default_rng([self._seed, len(gains)])
-            noise = draws.standard_t(TAIL_FREEDOM, size) if null.tailed else draws.standard_normal(size)
+            freedom = FREEDOM_OF_MANY if len(self.root) >= MANY else TAIL_FREEDOM
+            noise = draws.standard_t(freedom, size) if null.tailed else draws.standard_normal(size)
             coloured = self.prepared[null.shape].shape.colour(noise)
             if null.season and self._phase is not None:
                 start = draws.uniform(0.0, 2.0 * np.pi, size[1])

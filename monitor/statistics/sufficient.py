@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-import scipy
 
 from monitor.exceptions import DataError
 from monitor.group_sums import GroupSums
 from monitor.records import Array
 from monitor.statistics.days.block_lines import DEPENDENT, Blocks, block_lines
+from monitor.statistics.days.seasonal_slopes import beside_season
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
 
@@ -45,12 +45,16 @@ class CellDrift:
     """Straight line of the group means over time, unweighted: ``slope`` per unit of t, ``u``, ``p_value`` (c,).
 
     ``widening`` (c,) is how much wider ``u`` is than with independent groups; NaN where they were taken as such.
+    ``season_p`` is the p-value of a season being all of the slope, NaN where none is asked of it; ``steepness`` the
+    slope over its uncertainty without a season.
     """
 
     slope: Array
     u: Array
     p_value: Array
     widening: Array
+    season_p: Array
+    steepness: Array
 
 
 def _quotient(numerator: Array, denominator: Array) -> Array:
@@ -124,7 +128,8 @@ def drift_from_sums(
     dof = np.where(enough, k - 2.0, 1.0)
     u = np.sqrt(_quotient(np.maximum(smm - slope * stm, 0.0) / dof, np.where(enough, stt, np.nan)))
     p_value = 2.0 * student_tail(np.abs(_quotient(slope, u)), dof)
-    return CellDrift(slope, u, p_value, np.full(count, np.nan))
+    none = np.full(count, np.nan)
+    return CellDrift(slope, u, p_value, none, none, np.abs(_quotient(slope, u)))
 
 
 def slope_beside(
@@ -151,10 +156,10 @@ def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = N
     """The drift of every cell with the resemblance of its groups allowed for, as ``trend`` does.
 
     The slope is that of all groups, or, where a ``cycle`` is fitted beside it, that of the blocks; its uncertainty is
-    that of the blocks. NaN where they are too few.
+    that of the blocks, and that of the season where it may be a part of the slope (``beside_season``). NaN where they
+    are too few.
     """
     lines = block_lines(blocks, cycle=cycle)
     slope = np.where(lines.cyclic, lines.slope, np.where(np.isfinite(lines.slope), drift.slope, np.nan))
-    u = lines.u_slope
-    p_value = 2.0 * scipy.special.stdtr(lines.dof, -np.abs(_quotient(slope, u)))
-    return CellDrift(slope, u, np.asarray(p_value), lines.widening)
+    u, p_value, season_p = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal)
+    return CellDrift(slope, u, p_value, lines.widening, season_p, np.abs(_quotient(slope, lines.u_slope)))

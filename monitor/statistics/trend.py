@@ -18,12 +18,14 @@ from monitor.records import Array
 from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
 from monitor.statistics.days.block_lines import (
     FEWEST_BLOCKS,
+    AgainstSeason,
     BlockLines,
     Blocks,
     block_lines,
     blocks_of_days,
     fits_cycle,
 )
+from monitor.statistics.days.seasonal_slopes import SeasonAhead, beside_season
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall, pairs, theil_sen
 from monitor.statistics.sums import label_groups
@@ -34,7 +36,8 @@ class Resemblance:
     """How days resembled each other: ``correlation`` of neighbouring ``blocks`` of days, as estimated and ``allowed``.
 
     ``widening``: the interval of the slope is so many times wider than with independent days. ``cyclic``: a cycle was
-    fitted beside the line; ``beside`` columns were as well.
+    fitted beside the line; ``beside`` columns were as well. ``seasonal``: the history is too short for a cycle, which
+    may be a part of the slope: then ``season_p`` of the line is its p-value beside one of any size.
     """
 
     correlation: float
@@ -43,6 +46,7 @@ class Resemblance:
     blocks: int
     cyclic: bool
     beside: int
+    seasonal: bool = False
 
 
 #: Days that are taken as independent.
@@ -58,7 +62,9 @@ class Trend:
     standard deviation where none were given); ``run_sd`` is the scatter of a run on a day of its own, what a cycle or
     other columns beside the line contribute included. ``robust_interval`` and ``monotone`` are None below 6 days,
     where ranks cannot reach their level; ``monotone`` also where two days have one mean time. ``resemblance`` says
-    how far days that resemble each other are allowed for.
+    how far days that resemble each other are allowed for. ``p_value`` says whether the values move, ``season_p``
+    whether a season alone moves them; None where none is asked of the line, else ``u_slope`` holds what a season may be
+    of it (``beside_season``), which is no part of the ``covariance``: ``season_ahead`` adds it to what is foretold.
     """
 
     at: float
@@ -79,6 +85,8 @@ class Trend:
     robust_interval: tuple[float, float] | None
     monotone: MonotoneTrend | None
     resemblance: Resemblance = INDEPENDENT
+    season_p: float | None = None
+    season_ahead: SeasonAhead | None = None
 
 
 @dataclass(frozen=True)
@@ -128,7 +136,7 @@ def _independent(fit: MixedFit, at: float) -> BlockLines:
     return BlockLines(
         at=np.array([at]), slope=fit.coefficients[-1:], covariance=fit.covariance[pick][np.newaxis], dof=fit.dof[-1:],
         correlation=none, allowed=none, widening=unity, scatter=unity, blocks=np.zeros(1, dtype=np.int64),
-        cyclic=np.zeros(1, dtype=np.bool_),
+        cyclic=np.zeros(1, dtype=np.bool_), seasonal=AgainstSeason(np.full(1, np.nan), np.full(1, np.nan)),
     )  # fmt: skip
 
 
@@ -150,7 +158,9 @@ def _result(
     fit: MixedFit, lines: BlockLines, at: float, y: Array, u: Array | None, columns: Array, p: float
 ) -> Trend:
     """The line without what rests on ranks; ``columns`` (n, e) are what is fitted beside it."""
-    slope, u_slope, dof = float(fit.coefficients[-1]), float(lines.u_slope[0]), float(lines.dof[0])
+    slope, dof = float(fit.coefficients[-1]), float(lines.dof[0])
+    seasonal = beside_season(np.array([slope]), lines.u_slope, lines.dof, lines.seasonal)
+    u_slope, season_p = float(seasonal.u[0]), float(seasonal.season_p[0])
     # From the mean time of the blocks to that of the runs.
     shift = np.array([[1.0, at - float(lines.at[0])], [0.0, 1.0]])
     half = -float(scipy.special.stdtrit(dof, (1.0 - p) / 2.0)) * u_slope
@@ -158,8 +168,6 @@ def _result(
     run_u = 1.0 if u is None else float(np.sqrt(np.mean(u**2)))
     beside = columns @ fit.coefficients[1:-1]
     run_variance = (fit.within * run_u) ** 2 * (1.0 if fit.repeated else scatter) + fit.between**2 * scatter
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p_value = 2.0 * float(scipy.special.stdtr(dof, -np.abs(np.divide(slope, u_slope))))
     return Trend(
         at=at,
         level_at=float(fit.coefficients[0]),
@@ -167,7 +175,7 @@ def _result(
         u_slope=u_slope,
         slope_interval=(slope - half, slope + half),
         dof=dof,
-        p_value=p_value,
+        p_value=float(seasonal.p_value[0]),
         covariance=shift @ lines.covariance[0] @ shift.T,
         within=fit.within * (1.0 if fit.repeated else float(np.sqrt(scatter))),
         between=fit.between * float(np.sqrt(scatter)),
@@ -181,8 +189,24 @@ def _result(
         resemblance=Resemblance(
             float(lines.correlation[0]), float(lines.allowed[0]), float(lines.widening[0]), int(lines.blocks[0]),
             bool(lines.cyclic[0]), columns.shape[1] - 2 * int(lines.cyclic[0]),
+            bool(np.isfinite(lines.seasonal.t[0])),
         ),
+        season_p=None if np.isnan(season_p) else season_p,
     )  # fmt: skip
+
+
+def _judged_line(days: _Days, cycle: float | None, *, is_cyclic: bool) -> BlockLines:
+    """The line of the blocks, with a wave where the fit has one; its weights may bring in one that it does not have."""
+    lines = _line_of_days(days, cycle)
+    return _line_of_days(days, None) if lines.cyclic[0] and not is_cyclic else lines
+
+
+def _with_season(line: Trend, alone: BlockLines, t: Array, cycle: float | None) -> Trend:
+    """The line with what a season may be of it ahead of its runs at ``t``; ``alone`` is it without one."""
+    if line.season_p is None or cycle is None:
+        return line
+    u = float(np.sqrt(max(line.u_slope**2 - float(alone.u_slope[0]) ** 2, 0.0)))
+    return replace(line, season_ahead=SeasonAhead(u, float(t.min()), float(t.max()), cycle))
 
 
 def trend(
@@ -203,6 +227,7 @@ def trend(
     scale bar, moves no slope and is better left out); their common scale is estimated. ``days`` (n,) labels
     whose runs share a day component, and which count at the mean time of the day; None: every run is its own day.
     ``cycle`` is the period of a wave that is fitted beside the line where the history covers most of one (the year);
+    a shorter history without columns beside the line is judged beside a wave of any size (``beside_season``);
     ``beside`` (n, e) are columns, such as the temperature, that are fitted beside it by their means of each day.
     At least three days. Without ``robust`` what rests on the slopes of all pairs of days is left out (NaN, None):
     a forecast has no use for it. Days that resemble each other are allowed for (``block_lines``), unless they are known
@@ -246,8 +271,8 @@ def trend(
     design = np.column_stack([np.ones_like(t), beside_line, on_day - at])
     fit = fit_with_days(y, design, run_u, index)
     judged = _Days(fit.weight, time, plain.value, plain.beside)
-    lines = _independent(fit, at) if independent else _line_of_days(judged, cycle if wave.size else None)
-    result = _result(fit, lines, at, y, run_u, beside_line, level)
+    lines = _independent(fit, at) if independent else _judged_line(judged, cycle, is_cyclic=wave.size > 0)
+    result = _with_season(_result(fit, lines, at, y, run_u, beside_line, level), lines, t, cycle)
     if not robust:
         return result
     slope, interval, monotone = _ranked(*day_averages(y, t, run_u, index), level)

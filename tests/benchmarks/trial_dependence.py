@@ -30,6 +30,9 @@ from monitor.statistics import (
 from monitor.statistics.changes import _repeated, _Search, _Series
 from monitor.statistics.days.before_after import OtherDays, before_after
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.days.seasonal_slopes import beside_season
+from monitor.statistics.forecasts.forecast import predict
+from monitor.statistics.trend import trend
 
 SEED = 20261122
 YEAR = 365.25
@@ -61,7 +64,10 @@ def first_order(rng: np.random.Generator, count: int, n: int, r: float) -> np.nd
 def slope_rate(
     values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR, beside: np.ndarray | None = None
 ) -> float:
-    """Share of series (c, n) of day means whose slope is called at 5 %; ``beside`` (c, n) is fitted beside it."""
+    """Share of series (c, n) of day means whose slope is called a drift at 5 %; ``beside`` (c, n) is fitted beside it.
+
+    Without a ``cycle``: whose slope is said to move, by either word.
+    """
     place = np.unique(block_of(t, int(block_count(len(t))), t[0], t[-1]), return_inverse=True)[1]
     counts = np.bincount(place).astype(float)
     sums = np.zeros((len(values), len(counts)))
@@ -77,7 +83,8 @@ def slope_rate(
     lines = block_lines(
         Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days, column), cycle=cycle
     )
-    return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
+    _, p_value, season_p = beside_season(lines.slope, lines.u_slope, lines.dof, lines.seasonal)
+    return float((np.where(np.isnan(season_p), p_value, season_p) < 0.05).mean())
 
 
 def plain_rate(values: np.ndarray, t: np.ndarray) -> float:
@@ -176,6 +183,75 @@ def slopes(rng: np.random.Generator) -> None:
     )
 
 
+#: Series of a cell of the parts of a year, and histories of their forecasts.
+PARTS, FORETOLD = 4000, 300
+
+
+def parts_of_a_year(rng: np.random.Generator) -> None:
+    """Slopes and forecasts of histories that show a part of a yearly season, and no temperature."""
+    rows: list[list[object]] = []
+    for n, gap in (
+        (5, 7.0), (8, 7.0), (12, 7.0), (20, 7.0), (30, 7.0), (38, 7.0), (42, 7.0), (44, 7.0), (6, 30.0), (9, 30.0),
+        (10, 30.0), (5, 60.0), (5, 90.0), (90, 1.0), (250, 1.0),
+    ):  # fmt: skip
+        t = gap * np.arange(n)
+        for r in (0.0, 0.6):
+            shape = (PARTS, n)
+            mean = rng.normal(size=(*shape, 4)).mean(axis=2)
+            wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (PARTS, 1))) / YEAR)
+            warmth = wave + 0.5 * first_order(rng, PARTS, n, 0.7)
+            noise = r * first_order(rng, PARTS, n, r) + mean
+            u = np.sqrt(1.25 / ((t - t.mean()) ** 2).sum())
+            cases = (
+                noise, noise + wave, noise + 2.0 * wave, noise + 2.0 * warmth,
+                0.5 * (rng.standard_t(3, shape) / np.sqrt(3.0)) + 2.0 * wave,
+                0.5 * (rng.exponential(size=shape) - 1.0) + 2.0 * wave,
+                # A season that is no wave: a half of it, as in a shop that is heated but not cooled.
+                noise + 4.0 * np.maximum(wave, 0.0),
+            )  # fmt: skip
+            rows.append([
+                f"{n} every {gap:g}", r,
+                *(f"{100 * slope_rate(case, t):.1f} ({100 * slope_rate(case, t, None):.0f})" for case in cases),
+                *(
+                    f"{100 * slope_rate(drift, t):.0f} ({100 * slope_rate(drift, t, None):.0f})"
+                    for drift in (noise + size * u * t for size in (4.0, 8.0, 16.0))
+                ),
+            ])  # fmt: skip
+    head = ["season 0", "1", "2", "2 and weather", "2, Student 3", "2, exponential", "half a wave of 4"]
+    table(
+        "Slopes called a drift at 5 % over a part of a year, in % (said to move by either word; before all a drift)",
+        ["days", "r", *head, "drift of 4 u", "8 u", "16 u"],
+        rows,
+    )
+    rows = []
+    for n in (8, 12, 20, 30, 38):
+        for size in (0.0, 1.0, 2.0):
+            inside = np.zeros((2, 3), dtype=int)
+            day = np.repeat(np.arange(n + 8), 4)
+            t = 7.0 * day + np.tile([0.0, 0.05, 0.1, 0.15], n + 8)
+            past = day < n
+            for _ in range(FORETOLD):
+                y = size * np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR)) / YEAR)
+                y += rng.normal(size=len(t)) + 0.5 * rng.normal(size=n + 8)[day]
+                for row, cycle in enumerate((YEAR, None)):
+                    line = trend(y[past], t[past], days=day[past], cycle=cycle, robust=False)
+                    later = np.array([np.flatnonzero(day == n - 1 + weeks)[0] for weeks in (4, 8)])
+                    value, _, u_run = predict(line, t[later])
+                    inside[row, :2] += np.abs(y[later] - value) <= stats.t.isf(0.025, line.dof) * u_run
+                    inside[row, 2] += line.slope_interval[0] <= 0.0 <= line.slope_interval[1]
+            texts = (
+                f"{interval(after, FORETOLD)}; {100 * before / FORETOLD:.0f}"
+                for after, before in zip(*inside, strict=True)
+            )
+            rows.append([n, size, *texts])
+    table(
+        "Weekly days of four runs with a season: runs 4 and 8 weeks later in their 95 % interval, and no drift in that "
+        "of the slope, in %; before",
+        ["days", "season", "4 weeks later", "8 weeks later", "slope"],
+        rows,
+    )
+
+
 def forecasts(rng: np.random.Generator) -> None:
     """Held-out runs in their interval."""
     rows: list[list[object]] = []
@@ -248,14 +324,14 @@ def charts(rng: np.random.Generator) -> None:
     )
 
 
-#: Histories of 20 day means of a cell, of days of several runs too; of 52 half, of 104 a quarter.
+#: Histories of a cell.
 HISTORIES = 1200
 
 
 def changes(rng: np.random.Generator) -> None:
     """Histories with any change at 1 %, of one parameter and of one of 13."""
     rows: list[list[object]] = []
-    for n, count in ((20, HISTORIES), (52, HISTORIES // 2), (104, HISTORIES // 4)):
+    for n, count in ((20, HISTORIES), (52, HISTORIES), (104, HISTORIES)):
         t = 7.0 * np.arange(n)
         wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (count, 1))) / YEAR)
         step = 1.0 * (np.arange(n) >= 0.6 * n)
@@ -479,7 +555,7 @@ def means(rng: np.random.Generator) -> None:
 
 
 if __name__ == "__main__":
-    every = (slopes, means, events, conditions, charts, forecasts, changes)
+    every = (slopes, parts_of_a_year, means, events, conditions, charts, forecasts, changes)
     seed = next((int(text) for text in sys.argv[1:] if text.isdecimal()), SEED)
     for trial in [trial for trial in every if trial.__name__ in sys.argv[1:]] or every:
         trial(np.random.default_rng(seed))

@@ -113,6 +113,22 @@ class Ground:
         fit.__dict__["noise_design"] = self.plan.fit.noise_design
         return fit
 
+    def refuses(self, noise: np.ndarray) -> tuple[bool, bool]:
+        """Whether a campaign without a hidden effect is refuted at 0.1 %, and whether its certificate is refused.
+
+        The test of the readings comes first: where it is passed, the size of the line no longer matters.
+        """
+        fit = self.with_residual(self.plan.noisy(noise), np.zeros(self.plan.fit.solution.last.residual.shape))
+        p_value = beyond_neighbours(fit)
+        missing = compare(fit, "", "").verdict is Verdict.SOMETHING_IS_MISSING
+        if not (missing if p_value is None else p_value < LEVEL):
+            return False, False
+        line = model_uncertainty(fit, len(fit.problem.runs) - 1, self.variants)
+        if line is None:
+            return True, False
+        ratio = np.diag(line.covariance)[: self.outputs] / np.diag(self.covariance)
+        return True, bool(np.sqrt(ratio.max()) > MOST_OF_THE_REST)
+
     def stated(self, noise: np.ndarray, more: np.ndarray) -> tuple[bool, float, np.ndarray]:
         """Whether the certificate is refused, the largest lack of fit over the rest of the budget, and U (m,)."""
         fit = self.with_residual(self.plan.noisy(noise), more)
@@ -129,6 +145,21 @@ class Ground:
         return refused, times, K_Q * np.sqrt(rest + extra)
 
 
+def count_right(options: argparse.Namespace) -> None:
+    """Print how often right models are refuted and refused, ``--empty`` campaigns of every plan and noise."""
+    print("| plan | noise | refuted at 0.1 % | refused |\n| --- | --- | --- | --- |")
+    for plan in options.plans:
+        ground = Ground(PLANS[plan])
+        for name in NOISES:
+            refuted = refused = 0
+            for seed in range(options.empty):
+                rng = np.random.default_rng((options.first + seed, len(plan)))
+                is_refuted, is_refused = ground.refuses(ground.noise(name, rng))
+                refuted, refused = refuted + is_refuted, refused + is_refused
+            rates = (unknown.interval(calls, options.empty) for calls in (refuted, refused))
+            print(f"| {plan} | {name} | {' | '.join(rates)} |", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seconds", type=float, default=600.0, help="processor time")
@@ -137,7 +168,11 @@ def main() -> None:
         "--empty", type=int, default=300, help="right models of every plan and noise, at most"
     )
     parser.add_argument("--plans", nargs="+", choices=list(PLANS), default=list(PLANS), help="of these plans")
+    parser.add_argument("--right", action="store_true", help="right models alone, refuted and refused")
     options = parser.parse_args()
+    if options.right:
+        count_right(options)
+        return
     begin = time.process_time()
     print("| plan | noise | right models refused |\n| --- | --- | --- |")
     grounds = {name: Ground(PLANS[name]) for name in options.plans}

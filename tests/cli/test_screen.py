@@ -51,6 +51,7 @@ OTHER = frozenset(
             "kruskal_p",
             "normality_p",
             "monotone_p",
+            "season_p",
             "noise_alone_p",
             "excess_over_statement_p",
         ),

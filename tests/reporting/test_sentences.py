@@ -86,6 +86,16 @@ def test_the_schema_of_a_sentence_is_a_text() -> None:
             SteppedAtEvent("EXX", "crash", 5.0, 1.0, "µm", Undecided.DAYS_MAY_DO),
             f"EXX differs by +5.0 µm before and after the event 'crash' (u = 1.0 µm): {Undecided.DAYS_MAY_DO}",
         ),
+        (
+            NewThisWeek(
+                (SteppedAtEvent("EXX", "crash", 5.0, 1.0, "µm", Undecided.FEW_DAYS), "repair: zero set")
+            ),
+            "EXX may have stepped by +5.0 µm (not decided); repair: zero set",
+        ),
+        (
+            NewThisWeek((SteppedAtEvent("EXX", "crash", 5.0, 1.0, "µm", None),)),
+            "EXX stepped by +5.0 µm at the event 'crash' (u = 1.0 µm)",
+        ),
         (BadPoint(3, 17, "B", "Z", -41.26), "run 3, touch 17, ball B: Z is off by -41.3 µm"),
         (NewThisWeek(()), "nothing this week"),
         (

@@ -10,6 +10,7 @@ from scipy import signal, stats
 from monitor.exceptions import DataError
 from monitor.statistics import backtest, predict
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.days.seasonal_slopes import SeasonAhead, beside_season
 from monitor.statistics.trend import trend
 
 
@@ -36,7 +37,8 @@ def cut(values, t):
 
 def rate(values, t, cycle=None):
     lines = block_lines(cut(values, t), cycle=cycle)
-    return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
+    _, p_value, season_p = beside_season(lines.slope, lines.u_slope, lines.dof, lines.seasonal)
+    return float((np.where(np.isnan(season_p), p_value, season_p) < 0.05).mean())
 
 
 @pytest.mark.parametrize(("n", "cycle"), [(7, None), (16, None), (40, None), (90, 365.25)])
@@ -154,3 +156,99 @@ def test_backtest_beside_a_wave_is_that_of_each_day_by_itself():
         predicted, _, u = predict(line, t[day == target][:1])
         assert result.z[target - 5] == pytest.approx((y[day == target][0] - predicted[0]) / u[0], rel=1e-9)
     assert line.resemblance.cyclic
+
+
+@pytest.mark.parametrize(
+    ("n", "gap"), [(5, 7.0), (8, 7.0), (12, 7.0), (20, 7.0), (30, 7.0), (38, 7.0), (9, 30.0)]
+)
+@pytest.mark.parametrize("r", [0.0, 0.6])
+def test_a_part_of_a_yearly_season_is_no_drift(n, gap, r):
+    """Allowed is 1.5 times 5 %; without the season in the null up to 50 % of these are called."""
+    rng = np.random.default_rng([n, int(10 * r)])
+    t = gap * np.arange(n)
+    noise = r * first_order(rng, 2000, n, r) + rng.normal(size=(2000, n, 4)).mean(axis=2)
+    wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, 365.25, (2000, 1))) / 365.25)
+    warmth = wave + 0.5 * first_order(rng, 2000, n, 0.7)
+    for season in (
+        noise,
+        noise + wave,
+        noise + 2.0 * wave,
+        noise + 2.0 * warmth,
+        noise + 4.0 * np.maximum(wave, 0),
+    ):
+        assert rate(season, t, 365.25) <= 0.075
+
+
+def test_a_steep_drift_of_30_weeks_is_none_of_the_season():
+    rng = np.random.default_rng(30)
+    t = 7.0 * np.arange(30)
+    u = np.sqrt(1.25 / ((t - t.mean()) ** 2).sum())
+    noise = rng.normal(size=(500, 30, 4)).mean(axis=2)
+    assert rate(noise + 16.0 * u * t, t, 365.25) > 0.85
+
+
+def test_beside_a_season_is_beside_its_columns():
+    """Student's t of the slope in a dense fit of line, cosine and sine; days alike, so that no resemblance is seen."""
+    rng = np.random.default_rng(2)
+    t = 20.0 * np.arange(12)
+    y = rng.normal(size=12) + 0.4 * t
+    lines = block_lines(cut(y[np.newaxis], t), cycle=365.25)
+    phase = 2.0 * np.pi * t / 365.25
+    x = np.column_stack([np.ones(12), np.cos(phase), np.sin(phase), t])
+    slope = np.linalg.lstsq(x, y, rcond=None)[0][-1]
+    wide = block_lines(
+        Blocks(*(column[np.newaxis] for column in (np.ones(12), t, y)), np.array([12.0]),
+               np.column_stack([np.cos(phase), np.sin(phase)])[np.newaxis])
+    )  # fmt: skip
+    assert wide.slope[0] == pytest.approx(slope, rel=1e-9)
+    assert lines.seasonal.t[0] == pytest.approx(abs(slope) / wide.u_slope[0], rel=1e-9)
+    assert lines.seasonal.dof[0] == pytest.approx(wide.dof[0], rel=1e-9)
+    # A recorded temperature beside the line answers for the season itself.
+    assert np.isnan(
+        block_lines(
+            Blocks(*(column[np.newaxis] for column in (np.ones(12), t, y)), np.array([12.0]),
+                   np.cos(phase)[np.newaxis, :, np.newaxis]), cycle=365.25
+        ).seasonal.t[0]
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [12, 20, 30])
+def test_no_drift_lies_in_the_interval_of_a_slope_that_holds_a_season(n):
+    rng = np.random.default_rng(n)
+    t, inside = 7.0 * np.arange(n), 0
+    for _ in range(200):
+        wave = np.cos(2.0 * np.pi * (t / 365.25 + rng.uniform()))
+        low, high = trend(2.0 * wave + 0.5 * rng.normal(size=n), t, cycle=365.25, robust=False).slope_interval
+        inside += low <= 0.0 <= high
+    assert inside >= 185
+
+
+@pytest.mark.parametrize("weeks", [2, 8, 20, 30, 40])
+def test_what_a_season_adds_ahead_is_how_far_a_wave_departs_from_its_own_line(weeks):
+    """The wave by numpy's line through it, odd about the middle: the phase in which most of it is slope."""
+    t = np.linspace(0.0, 7.0 * weeks, 4001)
+    phase = 2.0 * np.pi / 365.25
+    wave = np.sin(phase * (t - t.mean()))
+    slope = np.polyfit(t, wave, 1)[0]
+    for ahead in (7.0, 28.0, 90.0):
+        time = t[-1] + ahead
+        departs = slope * ahead - (np.sin(phase * (time - t.mean())) - wave[-1])
+        of_season = SeasonAhead(slope, t[0], t[-1], 365.25).at(time)
+        assert of_season == pytest.approx(max(slope * ahead, departs), rel=1e-3)
+    assert SeasonAhead(slope, t[0], t[-1], 365.25).at(t[-1] - 1.0) == 0.0
+
+
+def test_a_season_may_be_any_part_of_a_slope_or_hide_as_much():
+    rng = np.random.default_rng(5)
+    t = 7.0 * np.arange(12)
+    y = 0.2 * t + rng.normal(size=12)
+    line = trend(y, t, cycle=365.25, robust=False)
+    alone = trend(y, t, robust=False)
+    assert line.season_p > 0.05 > line.p_value == alone.p_value
+    # A rectangular distribution as wide as the slope on either side.
+    assert line.u_slope == pytest.approx(np.hypot(alone.u_slope, line.slope / np.sqrt(3.0)))
+    assert line.slope_interval[0] < 0.0 < line.slope_interval[1]
+    later = np.array([t[-1], t[-1] + 28.0])
+    (_, now, _), (_, before, _) = predict(line, later), predict(alone, later)
+    assert now[0] == before[0]
+    assert now[1] == pytest.approx(np.hypot(before[1], 28.0 * line.slope / np.sqrt(3.0)))

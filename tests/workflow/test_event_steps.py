@@ -1,17 +1,22 @@
 """Steps at recorded events: size, uncertainty and p-value by other people's t test, rates over many machines, words."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from monitor.cli.trend_output import _event_step
+from monitor.reporting.health.sentences import SteppedAtEvent
+from monitor.reporting.lacks import Undecided
 from monitor.store import MachineEvent
 from monitor.workflow.history.changes import ChangeSearch
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
+from monitor.workflow.trend.answer import StepAtEvent
 
 START = datetime(2026, 3, 2, 8, tzinfo=UTC)
 REPAIR = MachineEvent(START + timedelta(days=2.5), "repair", "zero of B reset")
@@ -151,3 +156,28 @@ def test_false_steps_by_days_hold_their_rate_whatever_the_days_do(day_sd):
     )
     # Nominal 5 % of machines; three standard deviations of 300.
     assert stated / machines < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / machines)
+
+
+def test_a_step_of_one_of_many_after_one_day_is_named_and_not_decided():
+    """Without the event the search calls such a step; with it the report said nothing, and `trend` of a day more said
+    that it stepped."""
+    rng = np.random.default_rng(12)
+    past = {f"E{k}": _past(f"E{k}", _runs(rng, 3, 1, 0.0, 0.0)) for k in range(1, 13)}
+    means = np.array([-1.5, 0.0, 1.5, 9.0])
+    past["E0"] = _past("E0", means[:, np.newaxis] + 0.3 * np.array([-1.0, 1.0, -1.0, 1.0]))
+    event = MachineEvent(START + timedelta(days=2.5), "repair", "zero set")
+    (step,) = event_steps(past, [event])
+    assert (step.parameter, step.decided, step.undecided) == ("E0", False, Undecided.FEW_DAYS)
+    assert 0.05 / 13 < step.p_value < 0.05
+
+
+def test_trend_says_a_step_in_the_words_of_the_report():
+    step = StepAtEvent(
+        "2026-03-05T00:00:00+00:00", "repair", "zero set", 15.1, 0.74, "µrad", 3e-4, "days", True
+    )
+    words = str(SteppedAtEvent("EB0C", "zero set", 15.1, 0.74, "µrad", None))
+    assert words == "EB0C stepped by +15.10 µrad at the event 'zero set' (u = 0.74 µrad)"
+    assert words in _event_step("EB0C", step)
+    unsure = replace(step, decided=False, why_not_decided=Undecided.FEW_DAYS)
+    words = str(SteppedAtEvent("EB0C", "zero set", 15.1, 0.74, "µrad", Undecided.FEW_DAYS))
+    assert words in _event_step("EB0C", unsure)

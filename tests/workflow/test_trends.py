@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ from monitor.cli import main
 from monitor.cli.trend_output import out_of_tolerance
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.readers import read_campaign
+from monitor.reporting.messages import attention_words
 from monitor.statistics import find_changes
 from monitor.store import (
     Database,
@@ -29,7 +31,11 @@ from monitor.store import (
 )
 from monitor.store.past.campaign_runs import gather_runs
 from monitor.store.past.identified_values import gather_values
+from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.history.changes import search_changes
+from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.forecast import drift_forecast
+from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.history.series import Series
 from monitor.workflow.run_statistics.columns import group_labels
 from monitor.workflow.run_statistics.request import StatisticsRequest
@@ -38,6 +44,7 @@ from monitor.workflow.selections.request import SelectionRequest, SideBySideRequ
 from monitor.workflow.selections.select import select
 from monitor.workflow.selections.side_by_side import side_by_side
 from monitor.workflow.trend.figures import headline
+from monitor.workflow.trend.parameter import drift_statement
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
@@ -449,9 +456,36 @@ def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None
     step = SimpleNamespace(size=12345.6, u=950.0, unit="µrad", at="2026-03-05T08:00:00")
     line = headline("EB0C", SimpleNamespace(changes=[step]))
     assert line == "EB0C: changed by +12350 µrad (u = 950 µrad) on 2026-03-05"
-    drift = SimpleNamespace(slope_per_year=-2960.0, u_slope=166.0, p_value=0.5)
+    drift = SimpleNamespace(slope_per_year=-2960.0, u_slope=166.0, p_value=0.5, verdict=None)
     slope = SimpleNamespace(changes=[], drift=drift, unit="µm")
     assert headline("EXX", slope) == "EXX: −2960 µm a year (u = 170 µm a year), no drift seen"
+
+
+def test_a_steep_slope_of_two_months_is_told_and_not_called_a_drift(tmp_path: Path) -> None:
+    """Sixty days, thirty scatters: whatever it is, it is said by trend, figure, report and fleet, and forecast."""
+    rng = np.random.default_rng(3)
+    t = np.arange(60.0)
+    steady = np.zeros(60, dtype=np.bool_)
+    values = 0.5 * t + rng.normal(size=60)
+    series = Series("EXX", "µm", values, np.ones(60), t, np.arange(60), np.zeros(60), steady, timedelta())
+    piece = PieceDrift(series, -np.inf)
+    said = drift_statement(piece)
+    assert said.verdict is SlopeVerdict.DRIFT_OR_SEASON
+    assert said.p_value < 1e-6
+    assert said.season_p > 0.05
+    assert said.slope_interval[0] < 0.0
+    title = headline("EXX", SimpleNamespace(changes=[], drift=said, unit="µm"))
+    assert title.endswith("; drift or season cannot be told apart")
+    drift = stated_drift(piece, drift_forecast(piece, 40.0))
+    assert drift.season_not_told
+    assert drift.crosses_at is not None
+    row = "drifts out of tolerance within a year"
+    assert attention_words(row, None) == row
+    assert "drifts" not in attention_words(row, True)
+    assert attention_words("as usual", True) == "as usual"
+    # A recorded temperature that has nothing to do with it answers for the season.
+    warm = replace(series, temperature=rng.normal(size=60), thermometer="ambient_degC")
+    assert drift_statement(PieceDrift(warm, -np.inf)).verdict is SlopeVerdict.DRIFT
 
 
 def test_parameters_that_were_measured_together_share_one_search(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
+from monitor.reporting.messages import attention_words
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
@@ -79,7 +80,8 @@ def run(options: Namespace) -> int:
 
 def _cells(row: FleetTableRow) -> list[str]:
     return [
-        str(row.rank), row.machine, row.parameter, row.attention, row.refers_to or "", row.unit,
+        str(row.rank), row.machine, row.parameter, attention_words(row.attention, row.season_not_told),
+        row.refers_to or "", row.unit,
         _three(row.latest), _three(row.mean),
         "-" if row.sd_pooled is None else output.two_digits(row.sd_pooled),
         "-" if row.between_days is None else output.two_digits(row.between_days),

@@ -11,6 +11,7 @@ from enum import Enum
 
 from monitor.exceptions import DataError
 from monitor.reporting.health.words import in_words
+from monitor.reporting.messages import DRIFT_OR_SEASON
 from monitor.reporting.numbers import round_result
 
 OVER_WORKSPACE = "What the model leaves, mean over the runs, over the workspace"
@@ -159,13 +160,17 @@ def parameter_changed(name: str, size: float, u: float, unit: str, day: str) -> 
     return f"{name}: changed by {estimate} {unit} (u = {uncertainty} {unit}) on {day}"
 
 
-def parameter_drifts(name: str, slope: float | None, u: float | None, unit: str, *, moving: bool) -> str:
+def parameter_drifts(
+    name: str, slope: float | None, u: float | None, unit: str, *, moving: bool, season_not_told: bool = False
+) -> str:
     """Return the title of a parameter's history without a change: its drift a year."""
     if slope is None or u is None:
         return f"{name}: too little history for a drift"
     estimate, uncertainty = in_words(slope, u, sign=True)
     sentence = f"{name}: {estimate} {unit} a year (u = {uncertainty} {unit} a year)"
-    return sentence if moving else f"{sentence}, no drift seen"
+    if not moving:
+        return f"{sentence}, no drift seen"
+    return f"{sentence}; {DRIFT_OR_SEASON}" if season_not_told else sentence
 
 
 def map_title(campaign: str, run: int, worst: tuple[float, float], rms_um: float) -> str:

@@ -18,6 +18,7 @@ from monitor.reporting.health.records import (
 )
 from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
+from monitor.reporting.messages import DRIFT_OR_SEASON
 from monitor.reporting.plain_names import plain_name
 
 #: States in which a machine wants something done; in the others nothing is wrong, or nothing is known.
@@ -195,7 +196,7 @@ def _moves(parameter: ParameterHealth, drift: Drift) -> str:
     last = parameter.history.times[-1].date()
     if verb == "grows" and drift.crosses_at is not None and drift.crosses_at > last:
         sentence += f", so that it reaches its tolerance about {drift.crosses_at}"
-    return sentence
+    return f"{sentence} ({DRIFT_OR_SEASON})" if drift.season_not_told else sentence
 
 
 def _since(health: MachineHealth) -> str:

@@ -27,6 +27,7 @@ from monitor.reporting.health.records import (
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
+from monitor.reporting.messages import DRIFT_OR_SEASON
 from monitor.reporting.numbers import round_result, written
 from monitor.reporting.svg.sparkline import sparkline
 
@@ -270,6 +271,8 @@ def _drift(parameter: ParameterHealth) -> str:
         in_words(value, u, sign=True)[0] for value in (parameter.drift.per_year, *parameter.drift.between)
     )
     sentence = f"{slope} ({low} to {high}) {parameter.unit}/year"
+    if parameter.drift.season_not_told and parameter.drift.p_value < _DRIFT_P:
+        sentence += f"; {DRIFT_OR_SEASON}"
     if parameter.drift.crosses_at is not None:
         first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""

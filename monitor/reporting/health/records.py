@@ -71,6 +71,7 @@ class Drift:
 
     ``crosses_between`` are the ends of the interval of that time, None where open. ``at_last`` is the line's value at
     the last run and ``since`` the first of the runs that it was found from; None in records of older versions.
+    ``season_not_told``: a season can be all of it, the history is too short to tell; None where it cannot.
     """
 
     per_year: float
@@ -81,6 +82,7 @@ class Drift:
     crosses_between: tuple[date | None, date | None]
     at_last: float | None = field(default=None, metadata=OMITTED)
     since: datetime | None = field(default=None, metadata=OMITTED)
+    season_not_told: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

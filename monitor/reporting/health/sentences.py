@@ -54,6 +54,14 @@ class SteppedAtEvent(Sentence):
         differs = f"{self.parameter} differs by {size} {self.unit} before and after {event}"
         return f"{differs} ({u}{by_runs}): {self.undecided}"
 
+    @property
+    def brief(self) -> str:
+        """The sentence for a cell of a table: why it is not decided stands on the machine's page."""
+        if self.undecided is None:
+            return str(self)
+        size, _ = in_words(self.size, self.u, sign=True)
+        return f"{self.parameter} may have stepped by {size} {self.unit} (not decided)"
+
 
 @dataclass(frozen=True)
 class BallMoved(Sentence):
@@ -112,7 +120,8 @@ class NewThisWeek(Sentence):
 
     def __str__(self) -> str:
         rest = [f"and {self.more} more"] if self.more else []
-        return "; ".join([*map(str, self.named), *rest, *map(str, self.lacking)]) or "nothing this week"
+        named = [what.brief if isinstance(what, SteppedAtEvent) else str(what) for what in self.named]
+        return "; ".join([*named, *rest, *map(str, self.lacking)]) or "nothing this week"
 
 
 @dataclass(frozen=True)

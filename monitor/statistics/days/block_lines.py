@@ -14,9 +14,9 @@ J. Econometrics 165 (2011) 137. Measured rates, and the price in power: docs/tri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,10 @@ CORRELATIONS = np.linspace(0.0, 0.95, 20)
 #: A cycle is fitted beside the line where the history covers this share of it (300 days of a year), where no block is
 #: longer than that share of it, and where the variance of the slope grows by no more than this factor for it.
 COVERED, LONGEST_BLOCK, WORST_INFLATION = 0.82, 0.4, 10.0
+#: Histories in which a cycle of the last three would cost too much are too short for it up to this share of it.
+ENDS_BEFORE = 1.2
+#: Level, slope and wave beside two blocks to spare.
+FEWEST_BESIDE_WAVE = 6
 #: A column that the others explain but for this share of its length is no column.
 DEPENDENT = 1e-6
 #: Series done at a time: their blocks are held at once.
@@ -66,6 +70,17 @@ class Blocks:
         return Blocks(self.weight[rows], self.time[rows], self.value[rows], self.days[rows], beside)
 
 
+class AgainstSeason(NamedTuple):
+    """Slopes (c,) beside a part of a wave of any size: Student's ``t`` without its sign, and its degrees ``dof``.
+
+    NaN where no such wave is asked of the slope: the wave is fitted, a column (the temperature) stands beside the line,
+    or no period was given. ``t`` is 0 where the blocks are too few to tell the two apart.
+    """
+
+    t: Array
+    dof: Array
+
+
 @dataclass(frozen=True)
 class BlockLines:
     """Lines of c series, all (c,) but the ``covariance`` (c, 2, 2) of their level at ``at`` and their slope.
@@ -73,7 +88,8 @@ class BlockLines:
     ``correlation`` of neighbouring blocks is as estimated, ``allowed`` with its margin; ``widening`` is how much wider
     than with independent blocks the slope's uncertainty is. ``scatter`` is the factor by which the mean square of the
     residuals, divided by the blocks less the columns, is too small. ``cyclic``: the cycle was fitted beside the line.
-    NaN where there are fewer than three blocks, or no more than columns.
+    ``seasonal`` says how the slope stands beside a wave of any size where the history is too short to fit one
+    (``AgainstSeason``, ``seasonal_slopes``). NaN where there are fewer than three blocks, or no more than columns.
     """
 
     at: Array
@@ -86,6 +102,7 @@ class BlockLines:
     scatter: Array
     blocks: npt.NDArray[np.int64]
     cyclic: npt.NDArray[np.bool_]
+    seasonal: AgainstSeason
 
     @property
     def u_slope(self) -> Array:
@@ -173,12 +190,18 @@ def fits_cycle(blocks: Blocks, cycle: float) -> npt.NDArray[np.bool_]:
     return _design(_packed(blocks), cycle)[2] if covered.any() else covered
 
 
+def _middle(blocks: Blocks) -> tuple[Array, Array]:
+    """Mean times (c,), and the times of the blocks from them (c, b)."""
+    total = blocks.weight.sum(axis=1)
+    at = np.einsum("cb,cb->c", blocks.weight, blocks.time) / np.where(total > 0.0, total, np.nan)
+    return at, np.where(blocks.weight > 0.0, blocks.time - at[:, np.newaxis], 0.0)
+
+
 def _design(blocks: Blocks, cycle: float | None) -> tuple[_Design, Array, npt.NDArray[np.bool_]]:
     """Return the columns of the fit, the mean times (c,), and whether the cycle is among them (c,)."""
     weight, time = blocks.weight, blocks.time
     total = weight.sum(axis=1)
-    at = np.einsum("cb,cb->c", weight, time) / np.where(total > 0.0, total, np.nan)
-    away = np.where(weight > 0.0, time - at[:, np.newaxis], 0.0)
+    at, away = _middle(blocks)
     root, ones = np.sqrt(weight), np.ones_like(time)
     beside = [] if blocks.beside is None else list(np.moveaxis(np.nan_to_num(blocks.beside), 2, 0))
     basis, shares = _orthonormal(root, [ones, *beside, away])
@@ -301,9 +324,53 @@ def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
     c = len(blocks.days)
     if c > CHUNK:
         parts = [block_lines(blocks.part(slice(i, i + CHUNK)), cycle=cycle) for i in range(0, c, CHUNK)]
-        return BlockLines(*(np.concatenate(columns) for columns in zip(*map(_columns, parts), strict=True)))
+        seasonal = AgainstSeason(*map(np.concatenate, zip(*(part.seasonal for part in parts), strict=True)))
+        names = [name for name in BlockLines.__dataclass_fields__ if name != "seasonal"]
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+        }
+        return BlockLines(**columns, seasonal=seasonal)
     blocks = _packed(blocks)
     design, at, cyclic = _design(blocks, cycle)
+    lines = _lines(blocks, design, at, cyclic)
+    if cycle is None:
+        return lines
+    return replace(lines, seasonal=_against_season(blocks, design, cyclic, cycle))
+
+
+def _against_season(
+    blocks: Blocks, design: _Design, cyclic: npt.NDArray[np.bool_], cycle: float
+) -> AgainstSeason:
+    """Slopes of the series that cannot hold the whole wave, with one of any size fitted beside them."""
+    c = len(blocks.days)
+    is_beside = np.zeros(c, dtype=np.bool_)
+    if blocks.beside is not None:
+        is_beside = (np.abs(design.basis[:, :, 1:-1]).max(axis=1) > 0.0).any(axis=1) & ~cyclic
+    full = blocks.weight > 0.0
+    span = np.where(full, blocks.time, -np.inf).max(axis=1) - np.where(full, blocks.time, np.inf).min(axis=1)
+    # Longer histories, whose slope would suffer too much from the wave, end before a second one begins; those of a few
+    # days scatter about their line as much as the season moves them.
+    share = np.where(full.sum(axis=1) >= FEWEST_BESIDE_WAVE, ENDS_BEFORE, COVERED)
+    open_ = ~cyclic & ~is_beside & (span < share * cycle)
+    t, dof = np.full(c, np.nan), np.full(c, np.nan)
+    if open_.any():
+        some = Blocks(blocks.weight[open_], blocks.time[open_], blocks.value[open_], blocks.days[open_])
+        at, away = _middle(some)
+        phase = 2.0 * np.pi / cycle * away
+        basis, shares = _orthonormal(
+            np.sqrt(some.weight), [np.ones_like(away), np.cos(phase), np.sin(phase), away]
+        )
+        wide = _Design(basis, shares, np.sqrt(some.weight.sum(axis=1)))
+        lines = _lines(some, wide, at, np.ones(len(at), dtype=np.bool_))
+        enough = (lines.blocks >= FEWEST_BESIDE_WAVE) & (lines.u_slope > 0.0)
+        t[open_] = np.where(enough, np.abs(lines.slope) / np.where(enough, lines.u_slope, 1.0), 0.0)
+        dof[open_] = np.where(enough, lines.dof, 1.0)
+    return AgainstSeason(t, dof)
+
+
+def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bool_]) -> BlockLines:
+    """The lines of packed blocks for their columns."""
+    c = len(blocks.days)
     basis, line = design.basis, design.line
     count = np.asarray((blocks.weight > 0.0).sum(axis=1))
     rank = (np.abs(basis).max(axis=1) > 0.0).sum(axis=1)
@@ -348,11 +415,8 @@ def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
         scatter=scatter,
         blocks=count,
         cyclic=cyclic,
+        seasonal=AgainstSeason(np.full(c, np.nan), np.full(c, np.nan)),
     )
-
-
-def _columns(lines: BlockLines) -> list[npt.NDArray[np.generic]]:
-    return [getattr(lines, name) for name in BlockLines.__dataclass_fields__]
 
 
 def _correlation(row: npt.NDArray[np.intp], share: Array) -> Array:

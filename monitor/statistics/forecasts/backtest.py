@@ -19,7 +19,14 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
-from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of, fits_cycle
+from monitor.statistics.days.block_lines import (
+    Blocks,
+    block_count,
+    block_lines,
+    block_of,
+    fits_cycle,
+)
+from monitor.statistics.days.seasonal_slopes import SeasonAhead, beside_season
 from monitor.statistics.mixed import LARGEST, STEPS
 from monitor.statistics.sums import label_groups
 
@@ -49,7 +56,8 @@ class Backtest:
 
 class _Days(NamedTuple):
     """d days in the order of time: weight, mean, time (d,); sums over the days up to each (d,) of runs, of squares
-    within the days and of the squared uncertainties of the runs; ``first`` (d,), the first run of each."""
+    within the days and of the squared uncertainties of the runs; ``first`` (d,), the first run of each, ``latest``
+    (d,) its last time; the time of the ``earliest`` run."""
 
     weight: Array
     mean: Array
@@ -58,6 +66,8 @@ class _Days(NamedTuple):
     within: Array
     u_squared: Array
     first: npt.NDArray[np.intp]
+    latest: Array
+    earliest: float
 
 
 def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) -> _Days:
@@ -68,6 +78,8 @@ def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) ->
     rank = np.argsort(order)[index]
     weight = np.ones_like(y) if u is None else 1.0 / u**2
     total = np.bincount(rank, weight)
+    latest = np.full(count, -np.inf)
+    np.maximum.at(latest, rank, t)
     mean = np.bincount(rank, weight * y) / total
     square = np.ones_like(y) if u is None else u**2
     return _Days(
@@ -78,6 +90,8 @@ def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) ->
         within=np.cumsum(np.bincount(rank, weight * (y - mean[rank]) ** 2)),
         u_squared=np.cumsum(np.bincount(rank, square)),
         first=np.unique(rank, return_index=True)[1],
+        latest=latest,
+        earliest=float(t.min()),
     )
 
 
@@ -212,6 +226,12 @@ def _forecasts(
     away, from_blocks = t - lines.at, t - judged.at
     c = judged.covariance
     of_line = c[:, 0, 0] + 2.0 * from_blocks * c[:, 0, 1] + from_blocks**2 * c[:, 1, 1]
+    # What the season may be of the slope turns the line from the last run on, as in ``predict``.
+    widened = beside_season(lines.slope, judged.u_slope, judged.dof, judged.seasonal).u
+    if cycle is not None:
+        season_u = np.sqrt(np.maximum(widened**2 - c[:, 1, 1], 0.0))
+        ends = np.maximum.accumulate(days.latest)[last]
+        of_line += SeasonAhead(season_u, days.earliest, ends, cycle).at(t) ** 2
     spread = of_line + run_variance + variance * unit * judged.scatter + lines.of_wave
     return lines.level + lines.slope * away, np.sqrt(spread), judged.dof
 

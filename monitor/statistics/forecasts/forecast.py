@@ -57,10 +57,14 @@ class Forecast:
 
 
 def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
-    """Line (m,), standard uncertainty of the line (m,), and of one run on a day of its own (m,)."""
+    """Line (m,), standard uncertainty of the line (m,), and of one run on a day of its own (m,).
+
+    What a season may be of the slope counts from the last run on: up to there it was seen.
+    """
     t = np.asarray(times, dtype=np.float64) - line.at
     c = line.covariance
-    of_line = np.sqrt(np.maximum(c[0, 0] + 2.0 * t * c[0, 1] + t * t * c[1, 1], 0.0))
+    of_season = 0.0 if line.season_ahead is None else line.season_ahead.at(times)
+    of_line = np.hypot(np.sqrt(np.maximum(c[0, 0] + 2.0 * t * c[0, 1] + t * t * c[1, 1], 0.0)), of_season)
     return line.level_at + line.slope * t, of_line, np.hypot(of_line, line.run_sd)
 
 

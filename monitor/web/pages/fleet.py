@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
+from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
 from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
@@ -38,6 +39,7 @@ class MachineRow:
     plant: str
     urgency: Urgency
     attention: str
+    season_not_told: bool | None
     worst: FleetTableRow
     how_far: str
     since: str
@@ -57,6 +59,7 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
             plant=plants.get(machine, ""),
             urgency=URGENCIES[of_machine[0].attention],
             attention=of_machine[0].attention,
+            season_not_told=of_machine[0].season_not_told,
             worst=of_machine[0],
             how_far=how_far(of_machine[0]),
             since=since(of_machine[0]),
@@ -128,7 +131,7 @@ def routes() -> APIRouter:
             empty=not machines.rows, waiting=waiting,
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
-            tally=_tally(rows),
+            tally=_tally(rows), attention_words=attention_words,
             states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
+from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.desk import Ticket
@@ -58,7 +59,7 @@ def routes() -> APIRouter:
             request, "machine.html",
             name=name, parameter=shown, parameters=names, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
-            waiting=trends.waiting,
+            waiting=trends.waiting, season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,

@@ -14,8 +14,9 @@ from monitor.workflow.fleet.attention import Attention
 class FleetTableRow:
     """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day.
 
-    ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``refers_to`` says in
-    words what the parameter is stated relative to, where it is an error of the chain.
+    ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``season_not_told``: a
+    yearly season can be all of the slope, the history is too short to tell. ``refers_to`` says in words what the
+    parameter is stated relative to, where it is an error of the chain.
     """
 
     rank: int
@@ -46,6 +47,7 @@ class FleetTableRow:
     limit: float | None
     years_to_limit: float | None
     temperature: str | None = field(default=None, metadata=OMITTED)
+    season_not_told: bool | None = field(default=None, metadata=OMITTED)
     refers_to: str | None = field(default=None, metadata=OMITTED)
 
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
+from monitor.statistics.days.seasonal_slopes import REFUTED
 from monitor.statistics.sufficient import CellDrift, CellTests
 from monitor.store import (
     Database,
@@ -86,6 +87,7 @@ class _Cells:
             limit=_number(self.limit[index]),
             years_to_limit=_number(self.years[index]) if self.kind[index] == 1 else None,
             temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
+            season_not_told=True if self.drift.season_p[index] >= REFUTED else None,
         )
 
 

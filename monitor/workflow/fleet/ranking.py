@@ -79,7 +79,7 @@ def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
     mean = sums.sum_t / sums.groups
     spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
     short = spread < SHORTEST_DAYS / np.sqrt(12.0)
-    columns = (drift.slope, drift.u, drift.p_value, drift.widening)
+    columns = (drift.slope, drift.u, drift.p_value, drift.widening, drift.season_p, drift.steepness)
     return CellDrift(*(np.where(short, np.nan, values) for values in columns))
 
 
@@ -111,13 +111,12 @@ def ranked(
         sd = np.sqrt(variance + np.nan_to_num(cells.sd_pooled) ** 2 * np.maximum(fewer, 0.0))
         z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
         ratio = cells.between / cells.sd_pooled
-        steepness = np.abs(drift.slope / drift.u)
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
     kind = np.where(sums.groups < 2.0, 6, 5)
     measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
     for number, holds, size in (
         (4, ratio > DAYS_OVER_RUNS, ratio),
-        (3, drifting, steepness),
+        (3, drifting, drift.steepness),
         (2, z > STANDS_OUT, z),
         (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
         (0, share >= 1.0, share),

@@ -26,7 +26,6 @@ from monitor.reporting.health.sentences import (
     ParameterChanged,
     SteppedAtEvent,
 )
-from monitor.reporting.lacks import Undecided
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
@@ -143,14 +142,13 @@ def event_noted(event: MachineEvent, week: Week) -> Change:
 
 def _stepped(step: EventStep) -> SteppedAtEvent:
     """What a parameter stepped by at an event, and why that may be no step."""
-    undecided = Undecided.DAYS_MAY_DO if step.by_days else Undecided.ONE_DAY_EACH
     return SteppedAtEvent(
         step.parameter,
         step.event.description,
         step.size,
         step.u,
         step.unit,
-        None if step.decided else undecided,
+        step.undecided,
     )
 
 

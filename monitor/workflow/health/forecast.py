@@ -12,6 +12,7 @@ from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.forecast import DriftForecast, horizon_of
+from monitor.workflow.history.season import Season
 
 
 def stated_drift(drift: PieceDrift, ahead: DriftForecast | None) -> Drift | None:
@@ -36,4 +37,5 @@ def stated_drift(drift: PieceDrift, ahead: DriftForecast | None) -> Drift | None
         (day(begin), day(end)),
         at_last=float(predict(line, [drift.piece.t[-1]])[0][0]),
         since=local_time(float(drift.piece.t[0]), drift.piece.offset),
+        season_not_told=True if drift.season is Season.NOT_TOLD else None,
     )

@@ -11,8 +11,10 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Trend
+from monitor.statistics.days.seasonal_slopes import REFUTED
 from monitor.statistics.trend import trend
 from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.season import Season, SlopeVerdict
 from monitor.workflow.history.series import Series
 
 #: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by
@@ -84,6 +86,24 @@ class PieceDrift:
     def stated(self) -> Trend | None:
         """The line where the piece is long enough for a slope a year."""
         return self.line if self.span >= SHORTEST_DAYS else None
+
+    @property
+    def season(self) -> Season | None:
+        """What the stated slope says of the year; None without one, or where a temperature stands beside the line."""
+        line = self.stated
+        if line is None or not (line.resemblance.cyclic or line.resemblance.seasonal):
+            return None
+        if line.season_p is not None and line.season_p >= REFUTED:
+            return Season.NOT_TOLD
+        return Season.ALLOWED_FOR
+
+    @property
+    def verdict(self) -> SlopeVerdict | None:
+        """What the stated slope is; None where nothing is seen to move."""
+        line = self.stated
+        if line is None or not line.p_value < 1.0 - line.confidence:
+            return None
+        return SlopeVerdict.DRIFT_OR_SEASON if self.season is Season.NOT_TOLD else SlopeVerdict.DRIFT
 
     @property
     def why_not_stated(self) -> Lack | None:

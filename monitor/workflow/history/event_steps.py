@@ -15,6 +15,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Undecided
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
 from monitor.statistics.days.rival_scatter import Allowance
 from monitor.store import NOTE, MachineEvent
@@ -29,6 +30,8 @@ EVENT_FALSE_ALARM = 0.05
 #: Correlations of days that their likelihood leaves open: the level of a step of one of many parameters is low; with
 #: 0.5 machines of four parameters whose days correlate by 0.6 have one in 12 % instead of 5 %.
 REFUTED = 2.0
+#: Days of a side that say little of how days differ: what they show of one parameter is named, not called.
+FEW = 2
 #: A side may hold many campaigns: how they differ is in the scatter of its days.
 ALLOWANCE = Allowance(refuted=REFUTED, campaigns=0.0)
 
@@ -40,7 +43,8 @@ class EventStep:
     ``at`` is the time of the event (days since 1970). ``by_days`` says whether ``u`` and ``p_value`` are by the
     scatter of the means of days; otherwise by that of the runs, which knows nothing of how days differ: then the step
     is not ``decided``, for one day a side may differ as much where nothing happened. Nor is it where independent days
-    do not explain it and days that follow each other, or that scatter more on one side (``rival_scatter``), do.
+    do not explain it and days that follow each other, or that scatter more on one side (``rival_scatter``), do; nor
+    where one or two days of a side say too little of how days differ for a step among many parameters (``few_days``).
     """
 
     parameter: str
@@ -52,16 +56,27 @@ class EventStep:
     p_value: float
     by_days: bool
     decided: bool = True
+    few_days: bool = False
+
+    @property
+    def undecided(self) -> Undecided | None:
+        """Why it may be no step; None where it is decided."""
+        if self.decided:
+            return None
+        if self.few_days:
+            return Undecided.FEW_DAYS
+        return Undecided.DAYS_MAY_DO if self.by_days else Undecided.ONE_DAY_EACH
 
 
 @dataclass(frozen=True)
 class _Compared:
     """Both sides of an event compared by the means of their days (None: too few), by their runs, and the p-value of
-    days that follow each other or scatter differently on both sides."""
+    days that follow each other or scatter differently on both sides; ``days``: of the side with fewer."""
 
     step: EventStep
     by_runs: tuple[float, float] | None
     rivals: float
+    days: int
 
 
 def event_steps(
@@ -79,15 +94,22 @@ def event_steps(
     moments = {days_since_1970(event.at): event for event in events if event.kind != NOTE}
     compared = [pair for parameter in past.values() for pair in _of_parameter(parameter, moments)]
     level = false_alarm / max(len(compared), 1)
-    steps = (_stated(pair, level) for pair in compared)
+    steps = (_stated(pair, level, false_alarm) for pair in compared)
     return tuple(sorted((step for step in steps if step is not None), key=lambda step: step.at))
 
 
-def _stated(pair: _Compared, level: float) -> EventStep | None:
-    """The step as it may be stated, None where it may not: by days at ``level``; by runs where no days can."""
+def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
+    """The step as it may be stated, None where it may not: by days at ``level``; by runs where no days can.
+
+    What one or two days of a side show at the level ``alone`` of a single parameter, and runs at ``level``, is named.
+    """
     step = pair.step
+    if step.by_days and step.p_value < level:
+        return replace(step, decided=pair.rivals < level)
     if step.by_days:
-        return replace(step, decided=pair.rivals < level) if step.p_value < level else None
+        by_runs = 1.0 if pair.by_runs is None else pair.by_runs[1]
+        is_named = pair.days <= FEW and step.p_value < alone and by_runs < level
+        return replace(step, decided=False, few_days=True) if is_named else None
     if pair.by_runs is None or pair.by_runs[1] >= level:
         return None
     u, p_value = pair.by_runs
@@ -116,7 +138,7 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         u, p_value = (days.u, _p_value(size, days.u, days.dof)) if days is not None else runs or (np.nan, 1.0)
         step = EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None)
         rivals = 1.0 if days is None else max(p_value, days.p_value_of_rivals())
-        pairs[first] = _Compared(step, runs, rivals)
+        pairs[first] = _Compared(step, runs, rivals, min(before.day_count, after.day_count))
     return list(pairs.values())
 
 

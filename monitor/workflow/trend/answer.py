@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, WORDED, named
-from monitor.reporting.lacks import Lack
+from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.season import Season, SlopeVerdict
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
@@ -29,13 +29,6 @@ class RecordedEvent:
     at: str
     kind: str
     description: str
-
-
-class Season(Enum):
-    """What a slope says of the year: a wave of it was fitted beside the slope, or the history cannot tell the two."""
-
-    ALLOWED_FOR = "allowed for"
-    NOT_TOLD = "not told from the drift"
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,9 @@ class DriftStatement:
     ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
     ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for
     days that resemble each other, ``season`` whether a wave of a year is allowed for, ``temperature`` names the
-    recorded one that is fitted beside the line.
+    recorded one that is fitted beside the line. ``p_value`` says whether the values move, ``season_p`` whether a yearly
+    season of any size can be all of it (None: not asked), ``verdict`` what that comes to; where a season can, the
+    interval of the slope holds it.
     """
 
     slope_per_year: float | None = None
@@ -74,6 +69,8 @@ class DriftStatement:
     within_days: float | None = None
     resemblance: DayResemblance | None = None
     season: Season | None = None
+    season_p: float | None = field(default=None, metadata=OMITTED)
+    verdict: SlopeVerdict | None = field(default=None, metadata=OMITTED)
     temperature: str | None = field(default=None, metadata=OMITTED)
     since: str | None
     n: int
@@ -114,7 +111,8 @@ class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
-    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it.
+    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it, nor where one or
+    two days on a side say too little: ``why_not_decided`` says which.
     """
 
     at: str
@@ -126,6 +124,7 @@ class StepAtEvent:
     p_value: float
     scatter_of: str
     decided: bool
+    why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
 
 
 @dataclass(frozen=True)

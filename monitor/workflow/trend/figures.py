@@ -16,6 +16,7 @@ from monitor.statistics import predict
 from monitor.workflow.figure_files import ENDINGS, make_folder
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, days_since_1970
 from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import ParameterTrend, TrendAnswer
 
 #: Below this p-value a drift is stated as one.
@@ -29,7 +30,10 @@ def headline(name: str, parameter: ParameterTrend) -> str:
         return titles.parameter_changed(name, last.size, last.u, last.unit, (last.at or "")[:10])
     drift = parameter.drift
     moving = drift.p_value is not None and drift.p_value < MOVING
-    return titles.parameter_drifts(name, drift.slope_per_year, drift.u_slope, parameter.unit, moving=moving)
+    unsure = drift.verdict is SlopeVerdict.DRIFT_OR_SEASON
+    return titles.parameter_drifts(
+        name, drift.slope_per_year, drift.u_slope, parameter.unit, moving=moving, season_not_told=unsure
+    )
 
 
 def trend_figures(answer: TrendAnswer, past: Mapping[str, ParameterPast], folder: Path) -> tuple[str, ...]:

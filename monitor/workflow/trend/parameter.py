@@ -15,7 +15,13 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
-from monitor.statistics import Change, DependenceUnits, control_false_discoveries, dependence, warm_up
+from monitor.statistics import (
+    Change,
+    DependenceUnits,
+    control_false_discoveries,
+    dependence,
+    warm_up,
+)
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
@@ -27,7 +33,6 @@ from monitor.workflow.trend.answer import (
     DayResemblance,
     DriftStatement,
     LatestMean,
-    Season,
     WarmUp,
 )
 
@@ -73,7 +78,9 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
         resemblance=DayResemblance(
             resemblance.correlation, resemblance.allowed, resemblance.widening, resemblance.blocks
         ),
-        season=Season.ALLOWED_FOR if resemblance.cyclic else Season.NOT_TOLD,
+        season=drift.season,
+        season_p=line.season_p,
+        verdict=drift.verdict,
         temperature=drift.thermometer,
     )
 
