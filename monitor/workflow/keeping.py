@@ -125,7 +125,8 @@ def _refuse_lake(db: Database, participle: str) -> None:
 class AuditRequest:
     """How many of the last entries to list, and whether to ``check`` the chain of all.
 
-    ``containing``, words parted by spaces: only entries that hold every one of them in time (UTC), actor, action, subject or key.
+    ``containing``, words parted by spaces: only entries that hold all of them in time (UTC), actor, action, subject
+    or key.
 
     Raises InputError where ``last`` is not a whole number from 1 on, or there are more than 20 words.
     """
