@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -75,12 +76,18 @@ def last_anchor(db: Database) -> AuditAnchor:
     return AuditAnchor(*last[0]) if last else AuditAnchor(0, NO_ENTRY_BEFORE)
 
 
-def last_entries(db: Database, count: int) -> tuple[AuditEntry, ...]:
-    """Return the last ``count`` entries, the newest first."""
+def last_entries(db: Database, count: int, containing: Sequence[str] = ()) -> tuple[AuditEntry, ...]:
+    """Return the last ``count`` entries that hold every word of ``containing``, the newest first.
+
+    A word is looked for in time (as the pages write it, UTC), actor, action, subject and key, whatever its case.
+    """
+    columns = "concat_ws(' ', strftime(made_at, '%Y-%m-%d %H:%M:%S'), actor, action, subject, key)"
+    condition = " AND ".join([f"contains(lower({columns}), lower(?))"] * len(containing))
     return db.records(
         AuditEntry,
-        "SELECT entry, made_at, actor, action, subject, key, software_version FROM audit ORDER BY entry DESC LIMIT ?",
-        [count],
+        "SELECT entry, made_at, actor, action, subject, key, software_version FROM audit "
+        f"{'WHERE ' if containing else ''}{condition} ORDER BY entry DESC LIMIT ?",
+        [*containing, count],
     )
 
 

@@ -26,6 +26,9 @@ from monitor.store import (
 )
 from monitor.workflow.recomputed import recompute
 
+#: Words that entries of the audit are looked through for at once.
+_MOST_WORDS = 20
+
 
 @dataclass(frozen=True)
 class VerifyAnswer:
@@ -122,15 +125,21 @@ def _refuse_lake(db: Database, participle: str) -> None:
 class AuditRequest:
     """How many of the last entries to list, and whether to ``check`` the chain of all.
 
-    Raises InputError where ``last`` is not a whole number from 1 on.
+    ``containing``, words parted by spaces: only entries that hold all of them in time (UTC), actor, action, subject
+    or key.
+
+    Raises InputError where ``last`` is not a whole number from 1 on, or there are more than 20 words.
     """
 
     last: int
     check: bool = False
+    containing: str = ""
 
     def __post_init__(self) -> None:
         if not 0 < self.last < 2**63:
             raise InputError(f"--last {self.last}: how many entries, a whole number from 1 on")
+        if len(self.containing.split()) > _MOST_WORDS:
+            raise InputError(f"--containing: at most {_MOST_WORDS} words")
 
 
 @dataclass(frozen=True)
@@ -147,7 +156,8 @@ def audit(db: Database, request: AuditRequest) -> AuditAnswer:
     Raises InputError for a lake, which has the chains of its plants beside each other.
     """
     _refuse_lake(db, "audited")
-    return AuditAnswer(last_entries(db, request.last), chain_faults(db) if request.check else None)
+    entries = last_entries(db, request.last, request.containing.split())
+    return AuditAnswer(entries, chain_faults(db) if request.check else None)
 
 
 @dataclass(frozen=True)

@@ -16,17 +16,28 @@ def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("--last", type=int, default=20, metavar="N", help="how many entries (default 20)")
     parser.add_argument(
+        "--containing",
+        default="",
+        metavar="WORDS",
+        help="only entries with all these words in time, user, action, subject or key",
+    )
+    parser.add_argument(
         "--check", action="store_true", help="name entries that were edited, removed or put elsewhere"
     )
 
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = ask(db, keeping.audit, keeping.AuditRequest(options.last, options.check))
+        answer = ask(db, keeping.audit, keeping.AuditRequest(options.last, options.check, options.containing))
     if options.json:
         output.document(answer)
     else:
-        output.listing(answer.entries, "nothing was written yet")
+        none = (
+            f"no entry holds '{options.containing}'"
+            if options.containing.strip()
+            else "nothing was written yet"
+        )
+        output.listing(answer.entries, none)
         for fault in answer.faults or ():
             output.say(fault)
         if answer.faults == ():

@@ -25,10 +25,14 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/audit")
-    def audit(request: Request) -> Response:
-        """List who changed what and when."""
-        answer = request.app.state.asker(request.state.user, "audit", {"last": ENTRIES})
-        return page(request, "audit.html", entries=answer.entries)
+    def audit(request: Request, containing: str = "", last: int = ENTRIES) -> Response:
+        """List who changed what and when; only what holds all words of ``containing``."""
+        answer = request.app.state.asker(
+            request.state.user, "audit", {"last": last, "containing": containing}
+        )
+        # One full list may be followed by more.
+        more = 5 * last if len(answer.entries) == last else None
+        return page(request, "audit.html", entries=answer.entries, containing=containing, more=more)
 
     @router.get("/work")
     def work(request: Request) -> Response:
