@@ -3,8 +3,9 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/trial_unknown.py --seeds 3 --empties 300
 
 Prints two tables with exact intervals. ``shapes``: an error of one of twenty families outside the catalogue is hidden;
-right is an answer that names its error alone (a product of two axes: the error of either). ``empty``: nothing is hidden
-in noise that depends on its neighbours, walks, is offset by days, has heavy tails or is rounded; right is no effect.
+right is an answer that names its error alone (a product of two axes: the error of either); beside it stands in how many
+of these campaigns the likelihood-ratio test of the true curve finds it (its power), at 1 % of empty campaigns.
+``empty``: nothing is hidden in noise that depends on its neighbours, walks, is offset by days, has heavy tails or is rounded; right is no effect.
 Everything hidden stems from tests/simulator, which shares no code with the package.
 """
 
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -149,12 +151,29 @@ NOISES: dict[str, dict[str, Any]] = {
 }
 # An oracle that knows the curve and tries it on every error motion of the machine (36), at 1 %: two-sided 0.01 / 36.
 ORACLE = 3.63
+# One that knows the right error and its curve, and is asked only whether it is there: 1 % of empty campaigns.
+KNOWING = 2.576
 PLANS = {4: (2, 2), 8: (2, 4), 20: (5, 4), 60: (15, 4), 1: (1, 1), 2: (1, 2), 7: (7, 1)}
 
 
-def visible(seed: int, name: str, peak: float, runs: int) -> tuple[Any, float]:
-    """A campaign with a hidden shape, and how many standard deviations of the noise an oracle sees of it: the
-    likelihood ratio of the true curve, of which only the size is unknown, in the residual of the plain model."""
+@dataclass(frozen=True)
+class Seen:
+    """How many standard deviations of the noise an oracle sees of a hidden shape: ``size`` in this campaign,
+    ``expected`` over all that differ by their noise alone."""
+
+    size: float
+    expected: float
+
+    def power(self, limit: float) -> float:
+        """The share of such campaigns in which the likelihood-ratio test of the true curve exceeds its limit."""
+        return float(
+            scipy.stats.norm.sf(limit - self.expected) + scipy.stats.norm.cdf(-limit - self.expected)
+        )
+
+
+def visible(seed: int, name: str, peak: float, runs: int) -> tuple[Any, Seen]:
+    """A campaign with a hidden shape, and what an oracle sees of it: the likelihood ratio of the true curve, of which
+    only the size is unknown, in the residual of the plain model."""
     _, effect, curve = FAMILIES[name]
     last: list[np.ndarray] = []
 
@@ -168,20 +187,23 @@ def visible(seed: int, name: str, peak: float, runs: int) -> tuple[Any, float]:
     fitted = fit(problem_of(campaign).for_search())
     problem, term = fitted.problem, parse_term(effect.partition(":")[0], fitted.problem.context.chain)
     moved = fitted.by_error[:, :, term.joint, MOTION, term.component] * last[0][:, None] / problem.sigma
+    lengths = np.linalg.norm(moved * problem.sigma, axis=1)
     rows = problem.padded(moved).reshape(len(problem.runs), -1)
     column = np.zeros_like(fitted.white)
     column[:, : rows.shape[1]] = rows
     column = project_out(fitted.nuisance.basis, column[..., None])[..., 0]
     onto = float(np.sum(column * fitted.white)) / float(np.linalg.norm(column))
     rest = float(np.sum(fitted.white**2)) - onto**2
-    return campaign, abs(onto) / float(np.sqrt(rest / (fitted.degrees_of_freedom - 1)))
+    size = abs(onto) / float(np.sqrt(rest / (fitted.degrees_of_freedom - 1)))
+    return campaign, Seen(size, 1e-3 * peak / float(lengths.max()) * float(np.linalg.norm(column)))
 
 
 @dataclass(frozen=True)
 class Told:
-    """What an explanation named, and the seconds of processor time that it took."""
+    """What an explanation named, with the rivals of the first, and the seconds of processor time that it took."""
 
     effects: tuple[str, ...]
+    rivals: tuple[str, ...]
     seconds: float
 
 
@@ -189,17 +211,21 @@ def told(campaign: Any, seed: int) -> Told:
     """Explain a campaign."""
     begin = time.process_time()
     answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(seed))
-    return Told(tuple(effect.effect for effect in answer.missing), time.process_time() - begin)
+    rivals = tuple(rival.effect for effect in answer.missing[:1] for rival in effect.rivals)
+    return Told(tuple(effect.effect for effect in answer.missing), rivals, time.process_time() - begin)
 
 
 def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iterator[str]:
     """The rows of the table of shapes; none without seeds."""
     if not seeds:
         return
-    yield "| hidden | peak | right error alone | led by it | an oracle sees, s | seconds | else |"
-    yield "| --- | --- | --- | --- | --- | --- | --- |"
+    yield (
+        "| hidden | peak | right error alone | led by it | alone, or a rival of what is | an oracle sees, s "
+        "| finds | finds, knowing the error | seconds | else |"
+    )
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for peak in peaks:
-        all_alone, all_able, count = 0, 0, 0
+        all_alone, all_rival, all_able, count, powers = 0, 0, 0, 0, np.zeros(2)
         for name, (right, _, _) in FAMILIES.items():
             if only not in name:
                 continue
@@ -208,23 +234,36 @@ def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iter
             errors = [[text.partition(":")[0] for text in answer.effects] for answer in answers]
             alone = [bool(named) and set(named) <= set(right) for named in errors]
             led = sum(bool(named) and named[0] in right for named in errors)
-            seen = [size for _, size in campaigns]
+            rival = [
+                is_right
+                or (
+                    len(answer.effects) == 1
+                    and bool({text.partition(":")[0] for text in answer.rivals} & set(right))
+                )
+                for answer, is_right in zip(answers, alone, strict=True)
+            ]
+            seen = [oracle.size for _, oracle in campaigns]
             able = [size > ORACLE for size in seen]
+            power = sum(np.array([oracle.power(ORACLE), oracle.power(KNOWING)]) for _, oracle in campaigns)
+            powers += power
             wrong = {
                 f"{' + '.join(answer.effects) or 'nothing'} ({size:.1f})"
                 for answer, size, is_right in zip(answers, seen, alone, strict=True)
                 if not is_right
             }
             all_alone += sum(alone)
+            all_rival += sum(rival)
             all_able += sum(is_right or not is_able for is_right, is_able in zip(alone, able, strict=True))
             count += len(answers)
             seconds = float(np.median([answer.seconds for answer in answers]))
             shares = (
-                f"{sum(alone)} of {len(answers)} | {led} | {min(seen):.1f} to {max(seen):.1f} | {seconds:.1f}"
+                f"{sum(alone)} of {len(answers)} | {led} | {sum(rival)} | {min(seen):.1f} to {max(seen):.1f} "
+                f"| {power[0]:.2f} | {power[1]:.2f} | {seconds:.1f}"
             )
             yield f"| {name} | {peak:g} µm | {shares} | {'; '.join(sorted(wrong))} |"
-        yield f"| all | {peak:g} µm | {interval(all_alone, count)} | | | | |"
-        yield f"| all, right or missed by the oracle too | {peak:g} µm | {interval(all_able, count)} | | | | |"
+        found_by = f"| {powers[0]:.1f} | {powers[1]:.1f}"
+        yield f"| all | {peak:g} µm | {interval(all_alone, count)} | | {interval(all_rival, count)} | {found_by} | | |"
+        yield f"| all, right or missed by the oracle too | {peak:g} µm | {interval(all_able, count)} | | | | | | | |"
 
 
 def empties(seeds: range, runs: list[int], only: str) -> Iterator[str]:

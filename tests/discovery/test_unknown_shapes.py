@@ -6,6 +6,7 @@ All families are in tests/benchmarks/trial_unknown.py; here three of them.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
-from monitor.effects.shapes.free import Free, way_since_reversal
+from monitor.effects.shapes.free import Free, flexible_basis, way_since_reversal
 from monitor.exceptions import DataError
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
@@ -156,6 +157,43 @@ def test_a_bump_that_another_error_mimics_in_part_is_the_error_of_its_axis(
     campaign, _ = virtual_campaigns.virtual(1, [hidden], days=2, runs_per_day=4)
     (found,) = explained(campaign).missing
     assert found.effect.partition(":")[0] == "EYX"
+
+
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [
+        ("joint of two rails", 300),
+        ("wear bump", 302),
+        pytest.param("step in a scale", 301, marks=pytest.mark.slow),
+    ],
+)
+def test_a_slight_step_or_bump_is_the_error_of_its_axis(virtual_campaigns, trial, explained, family, seed):
+    """The three were told as EZY:free, EYB:harmonic2 and EBX:free: hats alone make a step of a mixture that an error of
+    another axis mimics, and a harmonic that a fifth of a bump looks like was left unquestioned."""
+    right, effect, curve = trial.FAMILIES[family]
+    hidden = simulator().Effect(effect, peak_um=3.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(seed, [hidden], days=2, runs_per_day=4)
+    (found,) = explained(campaign).missing
+    assert found.effect.partition(":")[0] in right
+
+
+def test_steps_stand_behind_all_other_parts_of_a_free_shape(virtual_campaigns):
+    """Names that are stored keep their numbers; one step lies in the middle between every two hats of linear axes."""
+    campaign, _ = virtual_campaigns.virtual(1, days=1, runs_per_day=2, noise_um=0.0)
+    context = problem_of(campaign).context
+    for joint, axis in enumerate(context.chain.joints):
+        basis = flexible_basis(context, joint)
+        position = context.places[:, joint]
+        if axis.turns or not np.ptp(position):
+            np.testing.assert_allclose(basis[:, 0], np.cos(position) / np.abs(np.cos(position)).max())
+            continue
+        nodes = np.linspace(position.min(), position.max(), 12)
+        hats, steps = basis[:, :12], basis[:, -11:]
+        for number, (left, right) in enumerate(pairwise(nodes)):
+            inside = np.abs(position - left) < 0.2 * (right - left)
+            assert np.all(hats[inside, number] > 0.0)
+            assert np.all(steps[position > right, number] > 0.9)
+            assert np.all(steps[position < left, number] < -0.9)
 
 
 def test_a_part_that_follows_a_temperature_late_has_its_time_constant(virtual_campaigns, trial, explained):

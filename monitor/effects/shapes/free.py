@@ -20,6 +20,8 @@ HATS = 12
 HARMONICS = 8
 # Play takes this part of the travel to build up.
 BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
+# A joint of two rails or a slip of a scale goes from one level to the other within this part of a hat's spacing.
+STEEPNESS = 1 / 4
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,10 @@ class Free(DescribedShape):
     """Parts of a flexible basis of one axis, numbered from 1; all of them where none is named, for a search.
 
     Linear axes: hats over the visited range, the direction of travel (alone, times the position and its square, and
-    building up with the way since the last reversal), the position times that of every other axis. Rotary axes:
-    harmonics to the eighth, the direction (alone and times cosine and sine), cosine and sine times the other axes.
-    Every part is scaled to 1 at most.
+    building up with the way since the last reversal), the position times that of every other axis, and steps in the
+    middle between two hats, behind all others: stored names keep their numbers. Rotary axes: harmonics to the eighth,
+    the direction (alone and times cosine and sine), cosine and sine times the other axes. Every part is scaled to 1 at
+    most.
     """
 
     parts: tuple[int, ...] = ()
@@ -79,9 +82,21 @@ def flexible_basis(context: Context, joint: int) -> Array:
     way = way_since_reversal(context, joint) / (2.0 * half)
     parts += [direction * np.exp(-way / length) for length in BUILD_UP]
     parts += [part * other for part in simple for other in others]
+    if not context.chain.joints[joint].turns:
+        parts += _steps(scaled)
     columns = np.column_stack(parts)
     largest = np.abs(columns).max(axis=0)
     return np.asarray(columns / np.where(largest > 0.0, largest, 1.0))
+
+
+def _steps(scaled: Array) -> list[Array]:
+    """Steps (n,) of an axis at positions from -1 to 1, one between every two hats: a joint of rails, a slip of a scale.
+
+    Twelve hats make a step of a mixture, each of which an error of another axis mimics better than the whole.
+    """
+    spacing = 2.0 / (HATS - 1)
+    middles = -1.0 + spacing * (np.arange(HATS - 1) + 0.5)
+    return [np.tanh((scaled - at) / (STEEPNESS * spacing)) for at in middles]
 
 
 def _of_other(context: Context, joint: int) -> list[Array]:
