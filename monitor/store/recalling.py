@@ -7,8 +7,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any
 
-#: Answers that are held: machines that somebody looks at now.
-MOST = 32
+#: Answers that are held, two a machine: of some thirty machines that somebody looks at now.
+MOST = 64
 
 
 class Recalled:

@@ -72,6 +72,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     app.state.asker = asker
     desk = Desk(asker)
     app.state.desk = desk
+    app.state.import_patience_s = importing.PATIENCE_S
     app.state.previews = Previews()
     app.state.presses = Presses()
     app.state.working_folder = working_folder

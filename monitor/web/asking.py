@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from functools import cache
 from pathlib import Path
@@ -54,12 +54,13 @@ class Asker:
     def __call__(
         self, user: User, question: str, document: Mapping[str, Any] | None = None,
         files: Mapping[str, Any] | None = None, tolerances: Mapping[str, Mapping[str, float]] | None = None,
-        *, storing: bool = True,
+        *, storing: bool = True, progress: Callable[[str], None] | None = None,
     ) -> Any:  # fmt: skip
         """Return the typed answer; ``files`` are paths that the server itself fills in.
 
         ``tolerances`` are limits by machine type of whoever asks (None: those of the server's configuration).
-        Without ``storing`` all that the question stores is undone once it is answered.
+        Without ``storing`` all that the question stores is undone once it is answered. ``progress`` is told what an
+        import begins with.
 
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
@@ -73,7 +74,7 @@ class Asker:
         if not storing:
             return self._tried(user, question, document or {}, files or {})
         if question not in REMEMBERED or files or tolerances is not None:
-            return self._asked(user, question, document or {}, files or {}, tolerances)
+            return self._asked(user, question, document or {}, files or {}, tolerances, progress)
         key, answer = self.freshness.recall(question, document or {})
         if answer is None:
             answer = self._asked(user, question, document or {}, {}, None)
@@ -92,7 +93,7 @@ class Asker:
 
     def _asked(
         self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any],
-        tolerances: Mapping[str, Mapping[str, float]] | None,
+        tolerances: Mapping[str, Mapping[str, float]] | None, progress: Callable[[str], None] | None = None,
     ) -> Any:  # fmt: skip
         own_files: Mapping[str, Any] = self._own_files.get(question, {})
         sent = {name: file for name, file in files.items() if file is not None}
@@ -107,7 +108,10 @@ class Asker:
             before = last_identification(session) if question in IDENTIFYING else None
             machines: set[str] | None = None
             try:
-                answer = asked.load()(session, *arguments)
+                if progress is None:
+                    answer = asked.load()(session, *arguments)
+                else:
+                    answer = asked.load()(session, *arguments, progress=progress)
                 machines = _touched_machines(session, question, request, answer)
                 return answer
             finally:

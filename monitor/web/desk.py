@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
 from dataclasses import dataclass, field
 from threading import Event, Lock
@@ -41,6 +42,8 @@ class Ticket:
     asked_at: float = field(default_factory=time.monotonic)
     #: Who took it back; empty as long as nobody did.
     taken_back_by: str = ""
+    #: What it said of how far it is, the latest last.
+    said: list[str] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -102,6 +105,9 @@ class Desk:
     def __init__(self, asker: Asker) -> None:
         self.asker = asker
         self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-desk")
+        # Who writes does not wait behind what others compute.
+        self._writers = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-writer")
+        self._written: OrderedDict[int, Ticket] = OrderedDict()
         self._tickets: dict[tuple[str, str, Stamp], Ticket] = {}
         self._lock = Lock()
         self._count = 0
@@ -130,6 +136,41 @@ class Desk:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
 
+    def begin(
+        self,
+        user: User,
+        question: str,
+        subject: Mapping[str, Any],
+        work: Callable[[Callable[[str], None]], Any],
+    ) -> Ticket:
+        """Return the ticket of work that is this user's alone, such as an import; ``work`` tells what it is at."""
+        check_role(user, question)
+        said: list[str] = []
+        stop = Event()
+
+        def stoppably() -> Any:
+            with stoppable(stop):
+                return work(said.append)
+
+        with self._lock:
+            self._count += 1
+            future = self._writers.submit(stoppably)
+            ticket = Ticket(self._count, question, subject, user, future, stop, said=said)
+            self._written[ticket.number] = ticket
+            while len(self._written) > MOST:
+                self._written.popitem(last=False)
+            return ticket
+
+    def begun(self, user: User, number: int) -> Ticket:
+        """Return the ticket of work that was begun. Raises NotFoundError for one that is gone or somebody else's."""
+        with self._lock:
+            ticket = self._written.get(number)
+        if ticket is None or not ticket.may_be_taken_back_by(user):
+            raise NotFoundError(
+                "this is not known any more, or was begun by somebody else; the page Campaigns lists what was imported"
+            )
+        return ticket
+
     def standing(self, question: str, document: Mapping[str, Any]) -> Ticket | None:
         """Return the ticket of a question that was asked since the last change, None where nobody did; asks nothing."""
         with self._lock:
@@ -157,7 +198,10 @@ class Desk:
     def under_way(self) -> list[Ticket]:
         """Return what is not answered yet, in the order of asking."""
         with self._lock:
-            return [ticket for ticket in self._tickets.values() if not ticket.future.done()]
+            every = [*self._tickets.values(), *self._written.values()]
+        return sorted(
+            (ticket for ticket in every if not ticket.future.done()), key=lambda ticket: ticket.number
+        )
 
     def take_back(self, user: User, number: int) -> None:
         """Take back a question: one that waits at once, one that is being computed at its next checkpoint.
@@ -184,4 +228,5 @@ class Desk:
 
     def close(self) -> None:
         """Wait for what is being computed, so that nothing is left half; take back what waits."""
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        for pool in (self._pool, self._writers):
+            pool.shutdown(wait=True, cancel_futures=True)

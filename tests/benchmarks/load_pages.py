@@ -39,6 +39,20 @@ CAMPAIGNS = ("five-days", "hidden-spindle-growth", "tilting-table")
 WEEKS = 100
 
 
+#: What a trend page lets one ask of a machine, pages and downloads.
+TREND_PAGES = {
+    "the page": "/machine?name={}&parameter=EB0C",
+    "no parameter": "/machine?name={}",
+    "other one": "/machine?name={}&parameter=EXX",
+    "a period": "/machine?name={}&parameter=EB0C&since=2022-01-01&until=2023-01-01",
+    "by day": "/machine?name={}&parameter=EB0C&colour=day",
+    "warm alone": "/machine?name={}&parameter=EB0C&warm_up=warm",
+    "two periods": "/machine/periods?name={}&since_1=2021-01-01&until_1=2021-12-31"
+    "&since_2=2022-01-01&until_2=2022-12-31",
+    "values.csv": "/machine/values.csv?name={}",
+}
+
+
 @contextmanager
 def served(database: Path) -> Iterator[int]:
     """A server in a process of its own; yields its port."""
@@ -73,8 +87,8 @@ class Times:
                 self.refused[f"{status} {page.partition('?')[0]}"] += 1
 
 
-def page(port: int, path: str, times: Times | None = None) -> float:
-    """Open a page; the seconds until its last byte."""
+def page(port: int, path: str, times: Times | None = None, words: str = "") -> float:
+    """Open a page; the seconds until its last byte, noted under ``words`` (else its address)."""
     begin = time.perf_counter()
     status: int | str
     try:
@@ -88,7 +102,7 @@ def page(port: int, path: str, times: Times | None = None) -> float:
         status = type(error).__name__
     seconds = time.perf_counter() - begin
     if times is not None:
-        times.note(path, seconds, status)
+        times.note(words or path, seconds, status)
     elif status != 200:
         raise SystemExit(f"{path}: {status}")
     return seconds
@@ -205,13 +219,15 @@ def large(options: argparse.Namespace, folder: Path) -> None:
         cold, fresh, again = page(port, "/machine?name=M00000"), Times(), Times()
         print(f"the first of all: {cold:.3f} s")
         for number in draw.permutation(options.machines)[: options.pages]:
-            address = f"/machine?name=M{number:05d}&parameter=EB0C"
-            page(port, address, fresh)
+            name = f"M{number:05d}"
+            page(port, f"/machine?name={name}&parameter=EB0C", fresh)
             time.sleep(options.pause)
-            page(port, address, again)
+            for words, address in TREND_PAGES.items():
+                page(port, address.format(name), again, words)
+                time.sleep(options.pause / 4.0)
         print("a machine that nobody has looked at")
         told(fresh)
-        print(f"the same a moment later (pauses of {options.pause:g} s)")
+        print(f"the same machine a moment later (pauses of {options.pause:g} s)")
         told(again)
     print(f"afterwards: {loads()}")
 

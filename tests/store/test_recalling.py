@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from monitor.store import Database, Recalled, machine_history
+from monitor.store.recalling import MOST
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
@@ -68,7 +69,7 @@ def test_what_was_read_while_somebody_wrote_is_not_held() -> None:
 
 def test_the_oldest_is_forgotten_first() -> None:
     recalled = Recalled()
-    for number in range(40):
+    for number in range(MOST + 8):
         assert recalled.answer(number, lambda number=number: number) == number
-    assert recalled.answer(39, lambda: -1) == 39
+    assert recalled.answer(MOST + 7, lambda: -1) == MOST + 7
     assert recalled.answer(0, lambda: -1) == -1

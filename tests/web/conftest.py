@@ -73,6 +73,7 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
         db = context.__enter__()
         settings = ServerSettings(database=path, users=users)
         gate = application(db, settings, folder)
+        gate._app.state.import_patience_s = 60.0  # type: ignore[attr-defined]
         client = TestClient(
             gate, base_url="http://127.0.0.1:8765", raise_server_exceptions=False, follow_redirects=False
         )

@@ -40,6 +40,12 @@ def insert_runs(db: Database, campaign_id: int) -> None:
 
 def imported_campaigns(db: Database, machine: str) -> list[tuple[int, str, str]]:
     """Return number, name and method of the campaigns of a machine in the order of import, withdrawn ones included."""
+    # Three questions of one page ask this.
+    rows = db.recall(("campaigns of machine", machine), lambda: tuple(_imported_campaigns(db, machine)))
+    return list(rows)
+
+
+def _imported_campaigns(db: Database, machine: str) -> list[tuple[int, str, str]]:
     numbers = [number for (number,) in db.rows(_CAMPAIGNS, [machine])]
     if not numbers:
         return []

@@ -134,12 +134,21 @@ def latest_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str]
 
 def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> dict[str, str]:
     """What parameters of a machine refer to, in the words of ``parameter_frame``; "or" where models differ."""
+    campaigns = list(campaigns_of_machine(db, machine))
+    # By numbers: the names and texts of all campaigns of the fleet are not looked through for those of one machine.
+    numbers = db.rows(
+        "SELECT max(identification_id) FROM identification "
+        "JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id) "
+        "GROUP BY campaign_id, model, model_version",
+        [campaigns],
+    )
+    if not numbers:
+        return {}
+    marks = ", ".join("?" * len(numbers))
     rows = db.rows(
         "SELECT parameter, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) FROM parameter_frame "
-        "JOIN (SELECT identification_id FROM identification JOIN campaign USING (campaign_id) WHERE machine = ? "
-        "QUALIFY identification_id = max(identification_id) OVER (PARTITION BY campaign_id, model, model_version)) "
-        "USING (identification_id) GROUP BY parameter",
-        [machine],
+        f"WHERE identification_id IN ({marks}) GROUP BY parameter",
+        [number for (number,) in numbers],
     )
     of_machine = dict(rows)
     return {name: of_machine[name] for name in parameters if name in of_machine}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from monitor.workflow.uncertainty.cloud import CloudAnswer
 
 #: Campaigns of the list: the latest; a machine's own stand on its page.
-MOST_LISTED = 1000
+MOST_LISTED = 200
 
 
 def routes() -> APIRouter:
@@ -28,13 +28,13 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/campaigns")
-    def campaigns(request: Request) -> Response:
-        """List the campaigns."""
+    def campaigns(request: Request, most: int = MOST_LISTED) -> Response:
+        """List the latest so many campaigns."""
         return page(
             request,
             "campaigns.html",
-            most=MOST_LISTED,
-            answer=request.app.state.asker(request.state.user, "campaigns", {"latest": MOST_LISTED}),
+            most=most,
+            answer=request.app.state.asker(request.state.user, "campaigns", {"latest": most}),
         )
 
     @router.get("/campaign")

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from monitor.workflow.certificate.answer import VerificationAnswer
 
 
+#: Campaigns that the form offers to issue a certificate of: the latest.
+OFFERED = 200
+
+
 def routes() -> APIRouter:
     """Return the routes of the list, the documents and the check."""
     router = APIRouter()
@@ -69,7 +73,9 @@ def routes() -> APIRouter:
 def _listed(request: Request, status: int = 200, **outcome: Any) -> Response:
     ask, user = request.app.state.asker, request.state.user
     answer = ask(user, "certificates")
-    campaigns = [row for row in ask(user, "campaigns").campaigns if row.rows is None]
+    # Names to choose from, not all: any other can be typed.
+    latest = ask(user, "campaigns", {"latest": OFFERED}).campaigns
+    campaigns = [row for row in reversed(latest) if row.rows is None]
     context = {"verification": None, "refusal": None, **outcome}
     return page(
         request,

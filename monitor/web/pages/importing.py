@@ -5,25 +5,30 @@ Files of instruments come with the mapping that explains their columns. What was
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
 from monitor.readers import MAPPING as FILE
 from monitor.readers.archive import UploadedFile, unpack, unpack_files
-from monitor.web.asking import Asker, check_role
+from monitor.web.asking import check_role
+from monitor.web.desk import Ticket
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
-from monitor.web.rendering import page
-from monitor.web.users import User
+from monitor.web.rendering import link, page
 
 if TYPE_CHECKING:
     from monitor.workflow.intake.importing import ImportAnswer
+
+#: An upload is answered at once if its import takes no longer; else a page shows how far it is.
+PATIENCE_S = 1.0
 
 
 def routes() -> APIRouter:
@@ -33,36 +38,81 @@ def routes() -> APIRouter:
     @router.get("/import")
     def form(request: Request) -> Response:
         """Show the form."""
-        return page(request, "import.html", answer=None, refusal=None)
+        return _shown(request, None)
 
     @router.post("/import")
     async def upload(request: Request) -> Response:
         """Import what was uploaded, or show what is wrong with it."""
+        check_role(request.state.user, "import")
         async with read_form(request) as form:
-            outcome = await run_in_threadpool(
-                _imported, request.app.state.asker, request.state.user, form, request.app.state.working_folder
-            )
-        if isinstance(outcome, Refusal):
-            return page(request, "import.html", status=outcome.status, answer=None, refusal=outcome)
-        return page(request, "import.html", answer=outcome, refusal=None)
+            ticket = await run_in_threadpool(_begun, request, form)
+        if isinstance(ticket, Refusal):
+            return _shown(request, ticket)
+        outcome = await run_in_threadpool(ticket.answer, request.app.state.import_patience_s)
+        if outcome is None:
+            return RedirectResponse(link("/import/under-way", number=ticket.number), status_code=303)
+        return _shown(request, outcome)
+
+    @router.get("/import/under-way")
+    def under_way(request: Request, number: int) -> Response:
+        """Show how far an import is, and what it led to once it is done; loaded again it shows the same."""
+        ticket = request.app.state.desk.begun(request.state.user, number)
+        return _shown(request, ticket.answer(), ticket)
 
     return router
 
 
-def _imported(asker: Asker, user: User, form: Form, working_folder: Path) -> ImportAnswer | Refusal:
-    check_role(user, "import")
-    with tempfile.TemporaryDirectory(dir=working_folder) as folder:
+def _shown(
+    request: Request, outcome: ImportAnswer | Refusal | None, ticket: Ticket | None = None
+) -> Response:
+    """The form, below what an import led to or how far it is."""
+    refusal = outcome if isinstance(outcome, Refusal) else None
+    waiting = None if ticket is None or ticket.is_done else ticket
+    return page(
+        request, "import.html", status=refusal.status if refusal else 200,
+        answer=None if refusal else outcome, refusal=refusal, waiting=waiting,
+    )  # fmt: skip
+
+
+def _begun(request: Request, form: Form) -> Ticket | Refusal:
+    """Begin to import what came with a form; the files are unpacked before, since they go with the form."""
+    state, user = request.app.state, request.state.user
+    folder = Path(tempfile.mkdtemp(dir=state.working_folder))
+    try:
+        document = {"dry_run": True} if form.texts.get("button") == "look" else {}
+        document |= form.filled("campaign")
+        files = _sent_files(form, folder)
+    except MonitorError as error:
+        shutil.rmtree(folder)
+        return _refusal(error, folder)
+    except BaseException:
+        shutil.rmtree(folder)
+        raise
+    # Files with their mapping are one campaign.
+    names = [FILE] if "mapping" in files else [Path(path).name for path in files["folders"]]
+
+    def work(tell: Callable[[str], None]) -> ImportAnswer | Refusal:
         try:
-            document = {"dry_run": True} if form.texts.get("button") == "look" else {}
-            answer: ImportAnswer = asker(
-                user, "import", document | form.filled("campaign"), _sent_files(form, Path(folder))
+            answer: ImportAnswer = state.asker(
+                user, "import", document, files, progress=lambda path: tell(Path(path).name)
             )
+            return answer
         except MonitorError as error:
-            labels: dict[str, str] = {}
-            for below in (f"{folder}/files", f"{folder}/mapping", folder):
-                labels |= {f"{below}/": "", below: "the upload"}
-            return refusal_of(error, labels)
-        return answer
+            return _refusal(error, folder)
+        finally:
+            shutil.rmtree(folder)
+
+    ticket: Ticket = state.desk.begin(user, "import", {"folders": names}, work)
+    # Taken back before it began, nobody else removes what was unpacked.
+    ticket.future.add_done_callback(lambda future: shutil.rmtree(folder, ignore_errors=True))
+    return ticket
+
+
+def _refusal(error: MonitorError, folder: Path) -> Refusal:
+    labels: dict[str, str] = {}
+    for below in (f"{folder}/files", f"{folder}/mapping", str(folder)):
+        labels |= {f"{below}/": "", below: "the upload"}
+    return refusal_of(error, labels)
 
 
 def _sent_files(form: Form, folder: Path) -> dict[str, Any]:

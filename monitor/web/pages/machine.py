@@ -230,9 +230,10 @@ def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> V
 
 def _most_urgent(request: Request, name: str, names: list[str]) -> str:
     """The parameter that the fleet names first, where that is computed already; else the first by name."""
-    ticket = request.app.state.desk.ask(request.state.user, "fleet", {"top": 0})
+    # Not asked here: of a large fleet that is seconds of work, beside which everybody waits for the page of a machine.
+    ticket = request.app.state.desk.standing("fleet", {"top": 0})
     try:
-        answer = ticket.answer()
+        answer = None if ticket is None else ticket.answer()
     except NotFoundError:
         answer = None
     rows = () if answer is None else answer.table
