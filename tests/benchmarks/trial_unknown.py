@@ -5,7 +5,8 @@
 Prints two tables with exact intervals. ``shapes``: an error of one of twenty families outside the catalogue is hidden;
 right is an answer that names its error alone (a product of two axes: the error of either); beside it stands in how many
 of these campaigns the likelihood-ratio test of the true curve finds it (its power), at 1 % of empty campaigns.
-``empty``: nothing is hidden in noise that depends on its neighbours, walks, is offset by days, has heavy tails or is rounded; right is no effect.
+``empty``: nothing is hidden in noise that depends on its neighbours, walks, is offset by days, has heavy tails or is
+rounded; right is no effect.
 Everything hidden stems from tests/simulator, which shares no code with the package.
 """
 
