@@ -10,6 +10,8 @@ from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 #: Lines of the budget that stand side by side.
 _ABREAST = 9
+#: Smaller parts of a micrometre, microradian or µm/m are written in nano- and pico-units.
+SMALLEST_IN_MICRO = 1e-3
 
 
 def behind(answer: UncertaintyAnswer) -> None:
@@ -37,7 +39,7 @@ def _budget(answer: UncertaintyAnswer) -> None:
             [
                 name,
                 answer.units[name],
-                *(_contribution(line.u[column]) for line in part),
+                *(_contribution(line.u[column], answer.units[name]) for line in part),
                 output.two_digits(guf.u[name]),
             ]
             for column, name in enumerate(answer.parameters)
@@ -61,8 +63,15 @@ def _budget(answer: UncertaintyAnswer) -> None:
             )
 
 
-def _contribution(u: float) -> str:
-    return "0" if abs(u) < 1e-9 else f"{'-' if u < 0.0 else ''}{output.two_digits(abs(u))}"
+def _contribution(u: float, unit: str = "") -> str:
+    """A part of u with two digits; below a thousandth of a micro-unit with the unit that it reads in."""
+    if abs(u) < 1e-9:
+        return "0"
+    sign = "-" if u < 0.0 else ""
+    if abs(u) >= SMALLEST_IN_MICRO or not unit.startswith("µ"):
+        return f"{sign}{output.two_digits(abs(u))}"
+    prefix, times = ("n", 1e3) if abs(u) >= 0.1 * SMALLEST_IN_MICRO else ("p", 1e6)
+    return f"{sign}{output.two_digits(times * abs(u))} {prefix}{unit[1:]}"
 
 
 def _days(answer: UncertaintyAnswer) -> None:
@@ -70,17 +79,17 @@ def _days(answer: UncertaintyAnswer) -> None:
     if days is None or days.runs < 2:
         return
 
-    def number(value: float) -> str:
-        return "-" if value != value else _contribution(value)
+    def number(value: float, unit: str) -> str:
+        return "-" if value != value else _contribution(value, unit)
 
     rows = [
         [
             name,
             answer.units[name],
-            number(days.within_run[name]),
-            number(days.between_runs[name]),
-            number(days.u_day[name]),
-            " to ".join(map(number, days.u_day_interval[name])),
+            number(days.within_run[name], answer.units[name]),
+            number(days.between_runs[name], answer.units[name]),
+            number(days.u_day[name], answer.units[name]),
+            " to ".join(number(end, answer.units[name]) for end in days.u_day_interval[name]),
             output.rounded(days.spread[name], answer.guf.expanded[name]),
             output.two_digits(answer.guf.expanded[name]),
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +19,15 @@ SEASON_NOT_TOLD = (
     "the history is too short to tell a drift from a part of a yearly season: slopes hold it, their intervals and the "
     "forecasts allow for a season as large as what was seen (record the temperature, or wait for 300 days)"
 )
+
+
+def joint_region_lacks(needed: int, fewest: float) -> str:
+    """Return how many degrees of freedom a joint region needs, how many there are, and what would do."""
+    more = math.ceil(needed - fewest)
+    if more < 1:
+        return f", and have {fewest:.4g} of the part with the fewest"
+    runs = "1 more run" if more == 1 else f"{more} more runs"
+    return f", at least {needed}, and have {fewest:.4g}: {runs} on days of repeated runs would do"
 
 
 def model_refuted(campaign: str, model: str, p_value: float) -> str:

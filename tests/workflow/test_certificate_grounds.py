@@ -9,6 +9,7 @@ from dataclasses import replace
 from datetime import date
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pypdf
@@ -23,10 +24,12 @@ from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import Ground, GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, StoredModel, import_campaign, load_certificate
+from monitor.uncertainty.coverage_regions.coverage import ellipsoid_factor
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
+from monitor.workflow.certificate.results import _lacking
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES, _units
@@ -339,3 +342,23 @@ def test_a_run_in_inches_speaks_against_every_certificate_by_its_unit_and_by_no_
     assert ground.size == pytest.approx(1.0 / 25.4, rel=1e-3)
     german = ground_sentence(ground, texts_of("de"))
     assert "als wäre ihre Einheit inch statt mm" in german
+
+
+@pytest.mark.parametrize(
+    ("degrees", "words"),
+    [
+        (
+            {"repeatability": 12.0, "bar": None},
+            ", at least 14, and have 12: 2 more runs on days of repeated runs would do",
+        ),
+        ({"repeatability": 13.0}, ", at least 14, and have 13: 1 more run on days of repeated runs would do"),
+        ({"bar": None}, ""),
+    ],
+)
+def test_a_joint_region_that_is_refused_says_how_many_runs_would_do(degrees: dict, words: str) -> None:
+    framework = SimpleNamespace(budget_degrees_of_freedom=degrees)
+    evaluated = SimpleNamespace(names=("E",) * 13, answer=SimpleNamespace(guf=framework))
+    assert _lacking(evaluated) == words
+    # One more than the parameters is what an ellipsoid needs, as the factor itself says.
+    assert np.isinf(ellipsoid_factor(13, 0.95, 12.0))
+    assert np.isfinite(ellipsoid_factor(13, 0.95, 14.0))

@@ -22,6 +22,7 @@ from monitor.reporting.certificate.results import (
 )
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.frames import referred
+from monitor.reporting.messages import joint_region_lacks
 from monitor.reporting.numbers import decimal_of, round_to_place, round_uncertainty, written_factor
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -114,8 +115,8 @@ def results_of(
     if not (np.isfinite(evaluated.k_p) or over_campaign):
         raise DataError(
             f"the runs behind the covariance of the readings are too few for a joint region of "
-            f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters; "
-            "a certificate needs more repeated runs"
+            f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters"
+            f"{_lacking(evaluated)}; a certificate needs more repeated runs"
         )
     answer = evaluated.answer
     estimate, covariance = evaluated.estimate, evaluated.covariance
@@ -195,6 +196,16 @@ def _single_factor(evaluated: StatedUncertainty) -> float:
     from monitor.uncertainty.coverage_regions.coverage import single_factor
 
     return single_factor(evaluated.answer.p, evaluated.fewest_dof)
+
+
+def _lacking(evaluated: StatedUncertainty) -> str:
+    """What the runs have, and how many more of the same days would do; empty where that is not known."""
+    estimated = [
+        freedom
+        for freedom in (evaluated.answer.guf.budget_degrees_of_freedom or {}).values()
+        if freedom is not None
+    ]
+    return joint_region_lacks(len(evaluated.names) + 1, min(estimated)) if estimated else ""
 
 
 def _budget(answer: UncertaintyAnswer) -> Budget | None:
