@@ -149,7 +149,6 @@ if TYPE_CHECKING:
         machine_runs as machine_runs,
         parameter_frames as parameter_frames,
         probing_counts as probing_counts,
-        runs_with_residuals as runs_with_residuals,
     )
     from monitor.store.recalling import Recalled as Recalled
     from monitor.store.results import (
@@ -220,7 +219,7 @@ else:
             "past.history": "MachineHistory latest_tolerances machine_history tolerance_types",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
-            "probing_counts runs_with_residuals",
+            "probing_counts",
             "recalling": "Recalled",
             "results": "StoredIdentification StoredRun",
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",

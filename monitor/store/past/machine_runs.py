@@ -121,12 +121,6 @@ def probing_counts(db: Database, campaign: str) -> dict[int, int]:
     return {int(run): int(count) for run, count in rows}
 
 
-def runs_with_residuals(db: Database, campaign: str) -> int:
-    """The number of runs of a campaign whose readings are here and were fitted."""
-    ((count,),) = db.rows("SELECT count(DISTINCT run) FROM v_residuals WHERE campaign = ?", [campaign])
-    return int(count)
-
-
 def latest_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str], str]:
     """What the parameters of machines refer to, by machine and parameter, as the latest identification of each says."""
     rows = db.rows(

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from monitor.exceptions import MonitorError
 from monitor.records import CurveCampaign
-from monitor.store import Database, runs_with_residuals
+from monitor.store import Database, probing_counts
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve_for
 
@@ -31,7 +31,7 @@ def refuted_model(db: Database, campaign: str, model: str | None) -> RefutedMode
     Nothing tells where no two runs follow one plan, or where the model cannot be fitted: `monitor explain` says why.
     """
     # What an archive keeps of a campaign, and a copy of results, may be values without readings.
-    if runs_with_residuals(db, campaign) < 2:
+    if len(probing_counts(db, campaign)) < 2:
         return None
     # Loaded here: a page of a machine with one run needs none of it.
     from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
