@@ -30,15 +30,6 @@ def joint_region_lacks(needed: int, fewest: float) -> str:
     return f", at least {needed}, and have {fewest:.4g}: {runs} on days of repeated runs would do"
 
 
-def model_refuted(campaign: str, model: str, p_value: float) -> str:
-    """Return that the readings of a campaign refute its model, and what to type."""
-    p = "p < 0.0001" if p_value < 1e-4 else f"p = {p_value:.4f}"
-    return (
-        f"the readings of {campaign} refute the model {model} beyond noise (lack of fit, {p}): the values hold what it "
-        f"lacks and may step or drift with it; type `monitor explain {campaign}`"
-    )
-
-
 def attention_words(attention: str, season_not_told: bool | None) -> str:
     """Return the class of a parameter of the fleet; of a slope that may be a season not that it drifts."""
     return _MOVES.get(attention, attention) if season_not_told else attention

@@ -61,8 +61,6 @@ _BLIND_SHOWN = 4
 _CHANGES_SHOWN = 12
 #: Poses of the rotary axes named for the volumetric error, the worst first.
 _POSES_SHOWN = 3
-#: Below this p-value of lack of fit the readings refute the model.
-_REFUTED_P = 1e-3
 #: A drift is set in bold below this probability of seeing it where there is none.
 _DRIFT_P = 0.001
 
@@ -298,8 +296,6 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
         lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
-        if model.lack_of_fit_p < _REFUTED_P:
-            lines.append(("refuted", f"monitor explain {model.campaign} names what the model lacks"))
     return tuple(lines)
 
 

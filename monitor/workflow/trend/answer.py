@@ -15,7 +15,6 @@ from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.season import Season, SlopeVerdict
-from monitor.workflow.trend.refuted import RefutedModel
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
@@ -372,7 +371,6 @@ class TrendAnswer:
 
     ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated;
     ``refers_to`` says in words what the parameters are relative to, those that are errors of the chain.
-    ``model_refuted``: the readings of the latest campaign refute the model that the values come from.
     """
 
     machine: str
@@ -393,4 +391,3 @@ class TrendAnswer:
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     refers_to: Mapping[str, str] = field(default_factory=dict)
-    model_refuted: RefutedModel | None = field(default=None, metadata=OMITTED)

@@ -50,7 +50,6 @@ from monitor.workflow.trend.parameter import (
     number,
     warming,
 )
-from monitor.workflow.trend.refuted import RefutedModel, refuted_model
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
 
@@ -130,8 +129,6 @@ def _answer(
     events: list[MachineEvent],
     past: Mapping[str, ParameterPast],
 ) -> TrendAnswer:
-    # Of the latest campaign alone: each costs a fit.
-    refuted = refuted_model(db, str(history.campaign[-1]), request.model) if past else None
     head = TrendAnswer(
         machine=request.machine,
         since=None if request.since is None else request.since.isoformat(),
@@ -143,18 +140,12 @@ def _answer(
             RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
             for event in events
         ),
-        notes=(
-            *map(str, same_hours(history)),
-            *_not_followed(history),
-            *_limits_of_type(db, history),
-            *_refuted(refuted),
-        ),
+        notes=(*map(str, same_hours(history)), *_not_followed(history), *_limits_of_type(db, history)),
         false_alarm=FALSE_ALARM,
         seed=SEED,
         why=None if past else _why_none(request),
         parameters={},
         refers_to=parameter_frames(db, request.machine, tuple(past)),
-        model_refuted=refuted,
     )
     if not past:
         return head
@@ -191,13 +182,6 @@ def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
     if name is None:
         return ()
     return (messages.limits_of_type(name),)
-
-
-def _refuted(refuted: RefutedModel | None) -> tuple[str, ...]:
-    """That the model of the latest campaign is refuted, and what names what it lacks."""
-    return (
-        () if refuted is None else (messages.model_refuted(refuted.campaign, refuted.model, refuted.p_value),)
-    )
 
 
 def _not_followed(history: MachineHistory) -> list[str]:
