@@ -116,11 +116,18 @@ def find_suspects(
         return replace(earlier, bad={**earlier.bad, **{point.row: point for point in bad_poses(under)}})
     suspects = earlier
     current = under
+    # What varies is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads,
+    # and once nothing single is left, not after each of some forty bad points.
+    varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
+    weighed_under = current
     while len(suspects.bad) < MOST_BAD_POINTS:
         before = suspects
         single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
         single.sort(key=lambda suspect: -suspect.chi_square)
-        varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
+        leads = not single or (varying is not None and varying.gain > single[0].chi_square)
+        if leads and weighed_under is not current:
+            varying = most_varying(current, variants, None) if len(suspects.varying) < MOST_VARYING else None
+            weighed_under = current
         if varying is not None and (not single or varying.gain > single[0].chi_square):
             suspects = replace(suspects, varying=(*suspects.varying, varying.effect))
         elif not single:
@@ -133,5 +140,4 @@ def find_suspects(
         except (DataError, np.linalg.LinAlgError):
             # What cannot be fitted is no suspect; those before it remain.
             return before
-        scene = None
     return suspects
