@@ -48,5 +48,6 @@ def score_beside(
 
 def _is_power(candidate: ChainCandidate) -> bool:
     effect = candidate.effect
-    plain = isinstance(effect, ChainEffect) and isinstance(effect.driver, Always)
-    return plain and candidate.visible and isinstance(effect.shape, Poly)
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+        return False
+    return candidate.visible and isinstance(effect.shape, Poly)
