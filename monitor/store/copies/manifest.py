@@ -15,6 +15,7 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import utc_now
+from monitor.store.kept_blocks import ENDING
 
 _MANIFEST_END = ".manifest.json"
 
@@ -105,7 +106,8 @@ def list_backups(folder: str | Path) -> tuple[Backup, ...]:
 
 def remove_partial(partial: Path) -> None:
     """Remove what was not finished: the file, its log and its manifest."""
-    for path in (partial, partial.with_name(partial.name + ".wal"), manifest_of(partial)):
+    beside = (partial.with_name(partial.name + ending) for ending in (".wal", ENDING))
+    for path in (partial, *beside, manifest_of(partial)):
         path.unlink(missing_ok=True)
 
 
