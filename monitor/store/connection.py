@@ -27,7 +27,15 @@ from monitor.stopping import checkpoint
 from monitor.store import bound_values, migrations
 from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import close_written, connect, damaged, is_missing, make, make_empty, prepare_commit
+from monitor.store.opening import (
+    close_written,
+    connect,
+    damaged,
+    is_missing,
+    make,
+    make_empty,
+    prepare_commit,
+)
 from monitor.store.recalling import Recalled
 from monitor.store.turns import Patience
 
@@ -286,7 +294,9 @@ class Database:
         """Bring the schema to the present one; refuse a database that does not fit this software."""
         try:
             if not self.read_only:
-                migrations.migrate(connection, self._available, before_commit=lambda: prepare_commit(self.path))
+                migrations.migrate(
+                    connection, self._available, before_commit=lambda: prepare_commit(self.path)
+                )
                 return
             waiting = migrations.pending(connection, self._available)
         except StoreError as fault:

@@ -42,9 +42,9 @@ ENDING = ".blocks"
 #: A header and a block begin with the checksum of their rest.
 _HEADER, _CHECKSUM = 4096, 8
 _HEADERS = 3 * _HEADER
-#: Of the second and third header: iteration, first block of the catalogue, list of free blocks, number and size of blocks.
+#: Of the second and third header: iteration, first of the catalogue, list of free blocks, number and size of blocks.
 _STATE = struct.Struct("<5Q")
-#: A pointer into the metadata: the lower 56 bits are the block, the upper 8 which of its 64 parts (metadata_manager.cpp).
+#: A pointer into the metadata: the lower 56 bits are the block, the upper 8 its part of 64 (metadata_manager.cpp).
 _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
@@ -99,7 +99,9 @@ def settle_blocks(path: str) -> int:
                 os.pwrite(file, whole, offset)
             os.fsync(file)
         except OSError as fault:
-            raise StoreError(f"{path}: a block that half a write damaged could not be put back: {fault}") from fault
+            raise StoreError(
+                f"{path}: a block that half a write damaged could not be put back: {fault}"
+            ) from fault
         _remove(path)
     return len(torn)
 
