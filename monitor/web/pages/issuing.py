@@ -37,8 +37,8 @@ GONE = Refusal(
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What a button of the form led to: a certificate's ``number``, a ``preview`` (PDF; ``has_preview`` once it is held),
-    or a ``refusal`` with what is wrong at each box."""
+    """What a button of the form led to: a certificate's ``number``, a ``preview`` (PDF; ``has_preview`` once it is
+    held), or a ``refusal`` with what is wrong at each box."""
 
     number: str = ""
     preview: bytes = b""
