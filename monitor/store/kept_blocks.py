@@ -25,6 +25,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import BinaryIO
 
 from monitor.exceptions import StoreError
 
@@ -72,7 +73,8 @@ def keep_blocks(path: str) -> None:
     if file is None:
         return
     headers = os.pread(file, _HEADERS, 0)
-    if _has_headers(path, headers):
+    # One with these headers was made in this session: what an earlier one left was removed at its opening.
+    if _kept_headers(path) == headers:
         return
     blocks = {number: _block(file, headers, number) for number in metadata_blocks(file)}
     content = headers + b"".join(struct.pack("<Q", number) + block for number, block in blocks.items())
@@ -194,9 +196,11 @@ def _is_whole(content: bytes) -> bool:
 
 def _torn(path: str, file: int) -> dict[int, bytes]:
     """Return what half a write damaged: by position in the file, the bytes that were there before."""
-    kept = _read(path)
     headers = os.pread(file, _HEADERS, 0)
-    if kept is None or _state(headers) != _state(kept.headers):
+    if _state(headers) != _state(_kept_headers(path)):
+        return {}
+    kept = _read(path)
+    if kept is None:
         return {}
     before = {begin: kept.headers[begin : begin + _HEADER] for begin in (_HEADER, 2 * _HEADER)}
     before |= {_offset(headers, number): block for number, block in kept.blocks.items()}
@@ -210,8 +214,8 @@ def _torn(path: str, file: int) -> dict[int, bytes]:
 def _read(path: str) -> _Copy | None:
     """Return the copy; None for one that was not finished, before which no checkpoint began."""
     try:
-        with open(os.open(path + ENDING, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            content = file.read() if stat.S_ISREG(os.fstat(file.fileno()).st_mode) else b""
+        with _opened_copy(path) as file:
+            content = file.read()
     except OSError:
         return None
     begin = len(_BEGIN) + hashlib.sha256().digest_size
@@ -224,12 +228,21 @@ def _read(path: str) -> _Copy | None:
     return _Copy(headers, {struct.unpack_from("<Q", piece)[0]: piece[8:] for piece in pieces})
 
 
-def _has_headers(path: str, headers: bytes) -> bool:
-    """Whether the copy is one of these headers: made in this session, since an older one is removed before it."""
-    with contextlib.suppress(OSError), open(path + ENDING, "rb") as file:
+def _opened_copy(path: str) -> BinaryIO:
+    """Open the copy; OSError where there is none, or something else has its name."""
+    file = os.open(path + ENDING, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise OSError(f"{path}{ENDING} is no file")
+    return open(file, "rb")
+
+
+def _kept_headers(path: str) -> bytes:
+    """Return the headers of the copy, unchecked; nothing where there is none."""
+    with contextlib.suppress(OSError), _opened_copy(path) as file:
         file.seek(len(_BEGIN) + hashlib.sha256().digest_size)
-        return file.read(_HEADERS) == headers
-    return False
+        return file.read(_HEADERS)
+    return b""
 
 
 def _write(path: str, content: bytes) -> None:
