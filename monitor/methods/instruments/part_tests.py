@@ -59,8 +59,8 @@ def _features(part: Part, mine: npt.NDArray[np.int64]) -> Iterator[PartFeature]:
     assert isinstance(part.reading, Point)
     read_there, guess = part.rows.measured[mine], part.rows.guess[:, :12]
     if read_there.shape[1] == 2 and not part.reading.holds("frame"):
-        here = np.tile(np.concatenate([np.eye(3).reshape(-1), np.zeros(3)]), (len(part.rows), 1))
-        on_work = seen_points(part.rows, here, np.array(part.reading.places))[mine]
+        identity = np.tile(np.concatenate([np.eye(3).reshape(-1), np.zeros(3)]), (len(part.rows), 1))
+        on_work = seen_points(part.rows, identity, np.array(part.reading.places))[mine]
         nominal = _laid_flat(on_work, _normal(on_work, part.rows.target[mine]), read_there)
     else:
         nominal = seen_points(part.rows, guess, np.array(part.reading.places))[mine]
