@@ -16,7 +16,7 @@ from monitor.exceptions import InputError
 <<<<<<< HEAD
 from monitor.reporting.signature.signer import Signer
 =======
-from monitor.reporting.certificate.record import Signer
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.long_term import LongTermMaterial, material_in
 >>>>>>> pap
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
