@@ -13,12 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-<<<<<<< HEAD
-from monitor.reporting.signature.signer import Signer
-=======
-from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.long_term import LongTermMaterial, material_in
->>>>>>> pap
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.
