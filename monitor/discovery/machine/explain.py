@@ -28,6 +28,7 @@ from monitor.discovery.machine.shapes.variants import (
     reversals_of_unknown_width,
     that_lag,
     variants_of,
+    without_aliases,
     without_part_periods,
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
@@ -81,6 +82,7 @@ def variants_of_campaign(
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
     shown = filter(problem.can_show, effects)
     variants = [variant for effect in shown for variant in variants_of(effect)]
+    variants = without_aliases(variants, problem.context, pitches)
     variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
