@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +119,11 @@ def test_a_lead_that_the_positions_take_for_a_bend_is_never_found(tmp_path: Path
 def test_a_plate_without_errors_of_shape_shows_none(tmp_path: Path) -> None:
     nothing = [missing(plate(tmp_path, seed, lambda x: np.zeros((len(x), 2)))) for seed in range(10)]
     assert nothing == [[]] * 10
+
+
+def test_an_axis_that_stands_still_shows_no_lead(tmp_path: Path) -> None:
+    campaign = read_campaign(plate(tmp_path, 0, bow, count=5))
+    context = campaign_method(campaign).problem_of(campaign).context
+    lead = Variant("EXX:cyclic12mm", parse_effect("EXX:cyclic12mm", context.chain))
+    still = replace(context, positions=np.zeros_like(context.positions))
+    assert [variant.odds for variant in without_aliases([lead], still, {})] == [NEVER_FOUND]

@@ -177,11 +177,11 @@ def without_aliases(
 def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     """Whether a cycle repeats at positions of which ``shortest`` is the shortest pitch that they show, twice their step
     on a grid."""
-    if shortest == 0.0:
-        return pitch <= travel
+    if not 0.0 < shortest < float("inf"):
+        return shortest == 0.0 and pitch <= travel
     frequency, steps = 1.0 / pitch, 2.0 / shortest
     seen = abs(frequency - steps * np.round(frequency / steps))
-    return bool(np.isfinite(shortest) and seen * travel >= FEWEST_PERIODS)
+    return bool(seen * travel >= FEWEST_PERIODS)
 
 
 def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
