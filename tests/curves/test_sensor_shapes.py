@@ -87,5 +87,7 @@ def test_the_direction_is_that_of_the_last_change() -> None:
 
 def test_a_knee_may_lie_at_zero_and_a_loop_has_no_number() -> None:
     assert parse_curve_effect("load_N:knee~0").text == "load_N:knee~0"
-    with pytest.raises(EffectError, match=r"'load_N:loop3' is no effect of a curve.*load_N:knee, load_N:loop"):
+    with pytest.raises(
+        EffectError, match=r"'load_N:loop3' is no effect of a curve.*load_N:knee, load_N:loop"
+    ):
         parse_curve_effect("load_N:loop3")

@@ -25,7 +25,13 @@ ARCSECOND = np.pi / 648000.0
 LATITUDE = np.deg2rad(35.0)
 #: Every mount has these, arcseconds; the model has them too.
 GEOMETRY = {"IH": 100.0, "ID": -60.0, "CH": -80.0, "NP": 30.0, "ME": 90.0, "MA": -70.0}
-SKY = '\n[[setups]]\nid = "sky"\nreading = "direction"\nstandard_uncertainty_urad = 5.0\ntool_direction = [1.0, 0.0, 0.0]\n'
+SKY = """
+[[setups]]
+id = "sky"
+reading = "direction"
+standard_uncertainty_urad = 5.0
+tool_direction = [1.0, 0.0, 0.0]
+"""
 
 
 def corrections(h: np.ndarray, d: np.ndarray, terms: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:

@@ -60,11 +60,13 @@ def plate(
     target.mkdir()
     (target / "campaign.toml").write_text(TOML.format(name=target.name), encoding="utf-8")
     (target / "runs.csv").write_text(
-        "run,started_at,day,warm_up,ambient_degC\n1,2025-02-01T08:00:00+00:00,1,false,20.0\n", encoding="utf-8"
+        "run,started_at,day,warm_up,ambient_degC\n1,2025-02-01T08:00:00+00:00,1,false,20.0\n",
+        encoding="utf-8",
     )
     lines = ["run,sequence,time_s,setup,x_mm,y_mm,point_x_mm,point_y_mm"]
     lines += [
-        f"1,{n + 1},{10.0 * n},plate,{x[n]:.4f},{y[n]:.4f},{seen[n, 0]:.5f},{seen[n, 1]:.5f}" for n in range(len(x))
+        f"1,{n + 1},{10.0 * n},plate,{x[n]:.4f},{y[n]:.4f},{seen[n, 0]:.5f},{seen[n, 1]:.5f}"
+        for n in range(len(x))
     ]
     (target / "probings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return target

@@ -181,8 +181,8 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         return _remainder(fit.problem.curve.measured[rows], columns)
 
     def _is_a_bend(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
-        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential, a step or a knee: then
-        it is the simpler answer and has its turn."""
+        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential, a step or
+        a knee: then it is the simpler answer and has its turn."""
         effect = candidate.effect
         if effect.shape not in SEARCHED:
             return False

@@ -16,7 +16,15 @@
 """
 
 from monitor.effects.curve.coefficients import coefficient_names, coefficient_unit, curve_columns
-from monitor.effects.curve.effect import PLACED, SEARCHED, SEQUENCE, CurveEffect, Inputs, group_names, inputs_of
+from monitor.effects.curve.effect import (
+    PLACED,
+    SEARCHED,
+    SEQUENCE,
+    CurveEffect,
+    Inputs,
+    group_names,
+    inputs_of,
+)
 from monitor.effects.curve.language import parse_base, parse_curve_effect
 
 __all__ = [

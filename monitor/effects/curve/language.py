@@ -14,7 +14,10 @@ _TEXT = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?))?",
     re.ASCII,
 )
-EXAMPLES = "load_N:poly2, date:drift, month:sin12, month:sin, time_s:exp, load_N:step, load_N:knee, load_N:loop, probe:group"
+EXAMPLES = (
+    "load_N:poly2, date:drift, month:sin12, month:sin, time_s:exp, load_N:step, load_N:knee, load_N:loop, "
+    "probe:group"
+)
 #: What stands before a + that is the sign of a number or of its exponent.
 SIGN_OF_NUMBER = re.compile(r"([\d.][eE]|(sin|exp|step|knee)~?)$")
 

@@ -28,7 +28,8 @@ LAGS_S = TIME_CONSTANTS_S[:5]
 # grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
 
-# Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and some to spare.
+# Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
+# some to spare.
 GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.1, 6
 # A wave of fewer periods over the travel, as the positions show it, is a bend.
 FEWEST_PERIODS = 2.0
@@ -61,7 +62,9 @@ def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> 
     frame of an axis, each with a coefficient of its own. About an axis that lies level flexure and refraction bend so,
     too; about any other one they depend on the other axes as well, and poses tell them apart.
     """
-    return [replace(variant, odds=variant.odds * _odds_of_a_bend(variant.effect, context)) for variant in variants]
+    return [
+        replace(variant, odds=variant.odds * _odds_of_a_bend(variant.effect, context)) for variant in variants
+    ]
 
 
 def _odds_of_a_bend(effect: MachineEffect, context: Context) -> float:

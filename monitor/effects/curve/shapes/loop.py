@@ -28,7 +28,7 @@ class Loop:
     def described(self, subject: Subject) -> Description:
         name = subject.effect.column
         return Description(
-            f"{subject.response} depends on whether {name} rose or fell before: a loop that closes at both ends of {name}",
+            f"{subject.response} depends on whether {name} rose or fell before: a loop that closes at both ends",
             "hysteresis of an elastic body, a magnet, a seal or a joint with friction",
             f"calibrate rising and falling {name} separately, or count half of the loop's width as an uncertainty",
             FIT,
