@@ -142,7 +142,9 @@ def drivers_of(context: Context) -> tuple[str, ...]:
         and len(recorded := values[np.isfinite(values)])
         and recorded.min() < recorded.max()
     ]
-    return ("warmup", "run_time", *channels)
+    # Where every run is the first of its day, what begins with the run and what begins with the day are the same.
+    restarts = ("settling",) if np.any(context.day_time > context.time) else ()
+    return ("warmup", "run_time", *restarts, *channels)
 
 
 def catalogue(

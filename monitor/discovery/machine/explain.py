@@ -25,6 +25,7 @@ from monitor.discovery.machine.separation.aliases import taken_for_machine
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
+    reversals_of_unknown_width,
     that_lag,
     variants_of,
     without_aliases,
@@ -85,7 +86,8 @@ def variants_of_campaign(
     variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
-    return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]
+    unknown = [*resolvable(cycles_of_unknown_pitch(chain), problem.context)]
+    return [*variants, *unknown, *reversals_of_unknown_width(problem.context)]
 
 
 def explain(

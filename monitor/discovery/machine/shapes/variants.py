@@ -11,7 +11,16 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
-from monitor.effects.drivers import Always, EachRun, LaggedTemperature, SettlingDriver, parse_driver
+from monitor.effects.drivers import (
+    Always,
+    Driver,
+    EachRun,
+    LaggedTemperature,
+    Settling,
+    SettlingDriver,
+    WarmUp,
+    parse_driver,
+)
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
 from monitor.effects.shapes.poly import Poly
@@ -24,9 +33,14 @@ from monitor.records import Array
 TIME_CONSTANTS_S = tuple(600.0 * 2.0**step for step in range(7))
 # A part follows its sensor in ten minutes to some hours; what is slower hardly moves within a shift.
 LAGS_S = TIME_CONSTANTS_S[:5]
+# What settles within every run does so in minutes; what takes longer than the run is a line in its time.
+PAUSES_S = tuple(300.0 * 2.0**step for step in range(4))
 # Pitches searched for an unknown cycle, from fine screw leads up to a third of a small machine's stroke. The
 # grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
+
+# Widths over which a reversal builds up, from what a long screw gives way to that of covers that drag.
+WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
 
 # Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
 # some to spare.
@@ -41,8 +55,12 @@ ODDS_OF_A_DRIVER = 400.0
 
 # Odds against a cube: over positions of one sign it bends as a square does, which leads where both do as well.
 ODDS_OF_A_CUBE = 20.0
-# Odds against a temperature that is followed late: one that is followed at once does where both do as well.
+# Odds against a temperature that is followed late, and against what settles anew in every run: one that is followed at
+# once, and a line in the time of the run, do where both do as well.
 ODDS_OF_A_LAG = 20.0
+
+# Odds against a reversal that builds up over a width: a play leads where it does as well.
+ODDS_OF_A_WIDTH = 20.0
 
 # Odds against what is named beside a finding and never found itself; any evidence of a campaign is smaller.
 NEVER_FOUND = 1e300
@@ -115,9 +133,8 @@ def bends_of(effect: MachineEffect) -> list[ChainVariant]:
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     """The effect itself, or one variant for every time constant where it has none of its own."""
     if isinstance(effect.driver, SettlingDriver) and effect.driver.time_constant_s is None:
-        late = isinstance(effect.driver, LaggedTemperature)
-        constants = LAGS_S if late else TIME_CONSTANTS_S
-        odds = ODDS_OF_A_LAG if late else 1.0
+        constants = constants_of(effect.driver)
+        odds = 1.0 if isinstance(effect.driver, WarmUp) else ODDS_OF_A_LAG
         return [
             Variant(effect.text, with_time_constant(effect, tau), len(constants), odds) for tau in constants
         ]
@@ -129,6 +146,15 @@ def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     if isinstance(effect, ChainEffect) and isinstance(effect.shape, Poly) and effect.shape.order > 2:
         odds = ODDS_OF_A_CUBE
     return [Variant(effect.text, effect, odds=odds)]
+
+
+def constants_of(driver: Driver) -> tuple[float, ...]:
+    """The time constants in s that are searched of a driver; none where it has none to search."""
+    if not isinstance(driver, SettlingDriver) or driver.time_constant_s is not None:
+        return ()
+    if isinstance(driver, LaggedTemperature):
+        return LAGS_S
+    return PAUSES_S if isinstance(driver, Settling) else TIME_CONSTANTS_S
 
 
 @lru_cache(maxsize=16)
@@ -144,6 +170,21 @@ def cycles_of_unknown_pitch(chain: Chain) -> tuple[ChainVariant, ...]:
             text = f"{term}:cyclic{pitch:.6g}mm"
             variants.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
     return tuple(variants)
+
+
+def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
+    """Positioning errors of every linear axis that build up after a reversal, with every width within its travel."""
+    variants: list[ChainVariant] = []
+    for index, joint in enumerate(context.chain.joints):
+        if joint.kind == "linear":
+            term = f"E{COMPONENTS[joint.main]}{joint.name}"
+            travel = float(np.ptp(context.positions[:, index]))
+            texts = [f"{term}:windup{width:g}mm" for width in WIDTHS_MM if width < travel]
+            variants += [
+                Variant(f"{term}:windup", parse_effect(text, context.chain), len(texts), ODDS_OF_A_WIDTH)
+                for text in texts
+            ]
+    return variants
 
 
 def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
