@@ -20,14 +20,14 @@ from collections import Counter
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from datetime import date
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from dying import KILLED, Effort, drawn, forked, loaded
 
 import monitor.workflow.certificate.issue as issuing
 from monitor.cli import main as verb
-from monitor.store import Database, list_backups, verify_audit
+from monitor.store import Database, list_backups, schema, verify_audit
 from monitor.store.entries import SOURCES
 from monitor.store.lake.reading import LakeDatabase
 from monitor.workflow.contract import QUESTIONS
@@ -149,7 +149,7 @@ def faults_after(name: str, room: Path, reader: list[str]) -> list[str]:
     left = sorted(
         path.name
         for path in room.rglob("*")
-        if path.name.endswith((".part", ".partial", ".new"))
+        if path.name.endswith((".part", ".partial", ".new", ".blocks"))
         # A transaction that changed nothing leaves an empty log, which is none.
         or (path.name.endswith(".wal") and path.stat().st_size)
     )
@@ -243,6 +243,9 @@ def compute_once(folder: Path) -> None:
         for name in names:
             module, _, attribute = name.rpartition(".")
             setattr(importlib.import_module(module), attribute, function)
+    # What each look at a database compares its schema with.
+    expected = computed_once("monitor.store.schema._expected", schema._expected.__wrapped__)
+    schema._expected = cache(expected)
 
 
 @dataclass
