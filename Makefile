@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: dcc-reader newest-duckdb growth supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: dcc-reader newest-duckdb growth soak supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -91,6 +91,9 @@ concurrency: setup  ## eight importers and twenty readers at one database for te
 
 kills: setup  ## thirteen verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+soak: setup  ## a shop for an hour: imports, reports, pages, publishing and kills together (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/soak.py $(ARGS)
 
 growth: setup  ## bytes a campaign over simulated years, backups, archive, compaction (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/growth.py $(ARGS)

@@ -12,6 +12,7 @@ import duckdb
 
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
+from monitor.store.kept_blocks import ENDING, has_torn_blocks, keep_blocks, settle_blocks
 from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
@@ -51,10 +52,21 @@ def connect(
             holder = writer_at_work(path)
             if holder is not None:
                 continue
+        if not read_only:
+            settle_blocks(path)
+        elif has_torn_blocks(path):
+            raise UnfinishedLogError(
+                f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is "
+                f"put back by the next verb of somebody who may write: `monitor --db {path} verify`"
+            )
         try:
             connection = duckdb.connect(path, read_only=read_only, config=config)
             # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
             connection.execute("SET enable_progress_bar = false")
+            if not read_only and _has_log(path):
+                # What it replayed is written into the file when it is closed, whether or not anything is added.
+                with contextlib.suppress(StoreError):
+                    keep_blocks(path)
             return connection
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
@@ -137,11 +149,28 @@ def make_empty(path: str) -> None:
         file.write(content)
 
 
+def prepare_commit(path: str) -> None:
+    """Make what lies beside a file that is written: its log, and a copy of the blocks that half a write may damage.
+
+    Called before each commit by whoever has the turn to write. Raises StoreError where the copy cannot be written.
+    """
+    make_log(path)
+    keep_blocks(path)
+
+
+def close_written(connection: duckdb.DuckDBPyConnection, path: str) -> None:
+    """Close a connection that may write, and remove the copy of its blocks once its checkpoint is through."""
+    connection.close()
+    # What cannot be put back now stays beside the file for the next who opens it.
+    with contextlib.suppress(StoreError):
+        settle_blocks(path)
+
+
 def make_log(path: str) -> None:
     """Make the log that DuckDB writes beside a file, so that those may read it who may read the file, and no others.
 
-    DuckDB would make it with the mode that the process gives all its files. Called before each commit by whoever has
-    the turn to write; DuckDB opens the empty log as one that it made (1.5.5). One that is there already stays.
+    DuckDB would make it with the mode that the process gives all its files; it opens the empty log as one that it made
+    (1.5.5). One that is there already stays.
     """
     if path == ":memory:":
         return
@@ -165,7 +194,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _remove(partial: str) -> None:
-    for name in (partial, partial + ".wal"):
+    for name in (partial, partial + ".wal", partial + ENDING):
         Path(name).unlink(missing_ok=True)
 
 
@@ -181,6 +210,12 @@ def _refuse_what_is_no_file(path: str) -> None:
         raise StoreError(f"{path} is a folder; name a file")
     if not stat.S_ISREG(status.st_mode):
         raise StoreError(f"{path} is a pipe or device, not a file; name a file")
+
+
+def _has_log(path: str) -> bool:
+    with contextlib.suppress(OSError, ValueError):
+        return os.stat(path + ".wal").st_size > 0
+    return False
 
 
 def _is_open_here(message: str) -> bool:

@@ -10,7 +10,7 @@ import json
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking, wait
 from dataclasses import dataclass, field
 from threading import Event, Lock
 from typing import Any
@@ -90,6 +90,10 @@ class Ticket:
             return self.future.result(timeout=max(patience - self.seconds, 0.0))
         except (StillWorking, CancelledError, StoppedError):
             return None
+
+    def wait(self, patience: float) -> None:
+        """Wait until there is an answer or a refusal, at most so many seconds after it was asked first."""
+        wait([self.future], timeout=max(patience - self.seconds, 0.0))
 
     def outcome(self) -> tuple[Any, str]:
         """Return the answer and why there is none; None and nothing while it is computed."""

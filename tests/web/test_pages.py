@@ -251,9 +251,7 @@ def test_a_certificate_is_refused_at_its_boxes(local: Any) -> None:
         "authorised_by.0.name",
     ]
     form = {"proof": local.proof(), "campaign": CAMPAIGN, "run": "20", **texts}
-    answer = local.client.post(
-        "/certificate/new", data={**form, **dict.fromkeys(open_boxes, ""), "button": "issue"}
-    )
+    answer = local.sent("/certificate/new", data={**form, **dict.fromkeys(open_boxes, ""), "button": "issue"})
     assert answer.status_code == 400
     assert "5 items are missing" in answer.text
     for box in open_boxes:
@@ -276,25 +274,25 @@ def test_a_certificate_is_issued_amended_and_withdrawn_by_form(
     texts = texts_of_file((EXAMPLES / "laboratory.toml").read_bytes())
     form = {"proof": served.proof(), "campaign": CAMPAIGN, "run": "20", **texts}
     accepted = {"accept.lack-of-fit": "the spindle was warming up; known to the customer"}
-    preview = served.client.post("/certificate/new", data={**form, **accepted, "button": "preview"})
+    preview = served.sent("/certificate/new", data={**form, **accepted, "button": "preview"})
     if preview.status_code != 200:
         # Only a ground that is there may be accepted.
         accepted = {}
-        preview = served.client.post("/certificate/new", data={**form, "button": "preview"})
+        preview = served.sent("/certificate/new", data={**form, "button": "preview"})
     assert "nothing was issued, and nothing stored" in preview.text
     assert served.client.get("/certificate/preview.pdf").content.startswith(b"%PDF")
     assert served.ask("certificates")[1]["certificates"] == []
     assert served.ask("verify")[0] == 200
-    issued = served.client.post("/certificate/new", data={**form, **accepted, "button": "issue"})
+    issued = served.sent("/certificate/new", data={**form, **accepted, "button": "issue"})
     number = re.findall(r"Certificate (\S+) is issued", issued.text)[0]
     pdf = served.client.get(f"/certificate.pdf?number={number}")
     assert pdf.content.startswith(b"%PDF")
-    amended = served.client.post(
+    amended = served.sent(
         "/certificate/new",
         data={**form, **accepted, "button": "issue", "replaces": number, "reason": "a letter was wrong"},
     )
     successor = re.findall(r"Certificate (\S+) is issued", amended.text)[0]
-    verified = served.client.post(
+    verified = served.sent(
         "/certificates/verify", data={"proof": form["proof"]}, files={"file": ("c.pdf", pdf.content)}
     )
     assert "This file does not hold" in verified.text

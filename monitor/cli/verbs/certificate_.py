@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 from monitor.cli import output
@@ -33,11 +34,8 @@ from monitor.workflow.certificate.request import (
 from monitor.workflow.certificate.states import (
     list_certificates,
     show_certificate,
-    write_digital,
-    write_digital_page,
     write_issued,
 )
-from monitor.workflow.certificate.template import TemplateRequest, write_template
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
@@ -189,24 +187,32 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
     return 0
 
 
+def _writer(option: str) -> Callable[..., CertificateFileAnswer]:
+    """What writes the file of an option; who verifies or lists certificates waits for no digital one."""
+    if option == "--pdf":
+        return write_issued
+    from monitor.workflow.certificate.digital import write_digital, write_digital_page
+
+    return write_digital if option == "--dcc" else write_digital_page
+
+
 def _show(options: Namespace) -> int:
     files = (
-        ("--dcc", options.dcc, write_digital),
-        ("--dcc-html", options.dcc_html, write_digital_page),
-        ("--pdf", options.pdf, write_issued),
+        ("--dcc", options.dcc),
+        ("--dcc-html", options.dcc_html),
+        ("--pdf", options.pdf),
     )
-    writing = (("--remake", options.remake), *((option, path) for option, path, _ in files))
-    for option, path in writing:
+    for option, path in (("--remake", options.remake), *files):
         if path is not None and options.number is None:
             raise InputError(
                 f"{option} needs the number of a certificate; `monitor certificate show` lists them"
             )
     if options.remake is not None:
         return _remake(options)
-    for _, path, write in files:
+    for option, path in files:
         if path is not None:
             with opened(options) as db:
-                written = ask(db, write, CertificateFileRequest(options.number, path))
+                written = ask(db, _writer(option), CertificateFileRequest(options.number, path))
             output.document(written) if options.json else output.say(written.file)
             return 0
     with opened(options) as db:
@@ -300,6 +306,8 @@ def _say_checks(answer: VerificationAnswer) -> None:
 
 
 def _template(options: Namespace) -> int:
+    from monitor.workflow.certificate.template import TemplateRequest, write_template
+
     answer = write_template(
         TemplateRequest(options.out, options.language or configuration().language or "en")
     )

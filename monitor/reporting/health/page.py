@@ -302,6 +302,14 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
         lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
+    if model.refuted_p is not None:
+        lines.append(
+            (
+                "refuted",
+                f"by the readings, noise of neighbours allowed for (p {p_in_words(model.refuted_p)}): the values hold "
+                f"what the model lacks; monitor explain {model.campaign}",
+            )
+        )
     return tuple(lines)
 
 

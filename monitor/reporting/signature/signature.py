@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import Signer
 from monitor.reporting.signature.long_term import LongTermMaterial, material_in
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.

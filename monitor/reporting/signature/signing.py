@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import Signer
 from monitor.reporting.signature.long_term import fetching_context, together_with_signature
 from monitor.reporting.signature.signature import need_pyhanko, signer_in
+from monitor.reporting.signature.signer import Signer
 
 _FIELD = "Signature"
 #: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
