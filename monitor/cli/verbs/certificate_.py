@@ -13,6 +13,7 @@ from monitor.cli.database import ask, opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
+from monitor.reporting.signature.long_term import LongTermMaterial
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
     CertificatesAnswer,
@@ -259,6 +260,8 @@ def _verify(options: Namespace) -> int:
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
     if answer.stamped_at is not None:
         output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
+    if answer.long_term is not None:
+        output.say(f"           {_long_term(answer.long_term)}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"
@@ -266,6 +269,19 @@ def _verify(options: Namespace) -> int:
     if answer.verdict is Verdict.SIGNER_NOT_TRUSTED:
         output.say(f"signature intact, signer not trusted: fingerprint {answer.signer_sha256}")
     return 0 if answer.ok else 1
+
+
+def _long_term(material: LongTermMaterial) -> str:
+    """Say what a file carries for its later validation, and whether it suffices."""
+    counted = (
+        f"long-term material: {material.certificates} certificates, {material.revocation_lists} revocation lists, "
+        f"{material.answers} answers (OCSP)"
+    )
+    if material.complete is None:
+        return f"{counted}; not judged: --trust names no certificates"
+    if not material.complete:
+        return f"{counted}; it does NOT suffice: {material.why_not}"
+    return f"{counted}; by these alone signer and time stamp lead to trusted certificates in force then"
 
 
 #: What is said of a file. The database may have been rewritten as a whole, and anybody can make a key: neither
