@@ -283,7 +283,8 @@ def _can_lag(driver: str, context: Context) -> str | None:
 def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVariant]:
     """The effect multiplied by every driver, where it has none; without its driver, where it has one.
 
-    A driver must earn its place: beforehand the plain effect is the likelier one.
+    A driver must earn its place: beforehand the plain effect is the likelier one. No shape settles within the minutes
+    after a run's begin: a guideway does not bend and a table does not tilt by what stood still for a while.
     """
     if not isinstance(effect, ChainEffect) or isinstance(effect.shape, Compliance):
         return []
@@ -293,6 +294,8 @@ def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVar
     variants: list[ChainVariant] = []
     for name in drivers:
         driven = replace(effect, driver=parse_driver(name), driver_text=name)
+        if isinstance(driven.driver, Settling):
+            continue
         variants += [replace(variant, odds=ODDS_OF_A_DRIVER) for variant in variants_of(driven)]
     return variants
 
