@@ -12,6 +12,7 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
     Database,
+    LackOfFit,
     StoredIdentification,
     bookkeeping,
     clear_refusals,
@@ -63,7 +64,9 @@ def all_tables(
     db = something_of_everything
     three = make_campaign("three")
     import_campaign(db, three, ("looks like inches",))
-    identification = replace(make_identification(three), refers_to={"EA0B": "the axis C"})
+    identification = replace(
+        make_identification(three), refers_to={"EA0B": "the axis C"}, lack_of_fit=LackOfFit(0.25)
+    )
     save_identification(db, identification)
     save_analysis(db, "trend", {"a": 1}, method="guf", machine=three.machine.id)
     withdraw_campaign(db, "two", "wrong balls")
