@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import os
+import shlex
 import stat
 import tempfile
 from pathlib import Path
@@ -21,6 +24,8 @@ BLOCK_SIZE = 65536
 
 #: What a file is called while it is made: it gets its name when it is whole.
 _UNFINISHED = ".new"
+#: What manifests of backups are called, and how many are looked through for the newest.
+_MANIFESTS, _MOST_MANIFESTS = "*.manifest.json", 2000
 #: A new database is its owner's alone; whoever wants a group to use it changes the mode, and log and lock follow it.
 _MODE = 0o600
 
@@ -248,4 +253,24 @@ def damaged(path: str, message: str) -> str:
     """Return the sentence about a file that DuckDB cannot read, or not write."""
     if "Could not write" in message or "No space left" in message:
         return f"{path} could not be written, nothing was kept: {message.splitlines()[0]}"
-    return f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; restore a backup: `monitor restore`"
+    newest = _newest_backup(path)
+    known = "BACKUP" if newest is None else shlex.quote(str(newest[1]))
+    when = "" if newest is None else f" (the newest that lies near it was made at {newest[0][:19]} UTC)"
+    restored = shlex.quote(str(Path(path).with_suffix("")) + "-restored.duckdb")
+    return (
+        f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; leave it where it is, and restore a "
+        f"backup{when} under another name: `monitor --db {restored} restore {known}`"
+    )
+
+
+def _newest_backup(path: str) -> tuple[str, Path] | None:
+    """Return when the newest backup in the folder of a database, or one below it, was made, and its file."""
+    folder = Path(path).absolute().parent
+    backups = []
+    manifests = itertools.chain(folder.glob(_MANIFESTS), folder.glob(f"*/{_MANIFESTS}"))
+    for manifest in itertools.islice(manifests, _MOST_MANIFESTS):
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
+            file = manifest.with_name(manifest.name.removesuffix(_MANIFESTS[1:]))
+            if file.is_file():
+                backups.append((str(json.loads(manifest.read_text(encoding="utf-8"))["made_at"]), file))
+    return max(backups, default=None)

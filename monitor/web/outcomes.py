@@ -29,8 +29,8 @@ class Outcomes:
         """Hold what a form of a user led to; return its key, which nobody guesses."""
         key = secrets.token_urlsafe(12)
         with self._lock:
-            own = [other for other, (name, _) in self._held.items() if name == user_name]
-            for other in own[: max(len(own) - MOST_OF_USER + 1, 0)]:
+            of_user = [other for other, (name, _) in self._held.items() if name == user_name]
+            for other in of_user[: max(len(of_user) - MOST_OF_USER + 1, 0)]:
                 del self._held[other]
             self._held[key] = (user_name, outcome)
             while len(self._held) > MOST:

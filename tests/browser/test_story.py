@@ -153,7 +153,8 @@ def test_story_who_asked_for_less_motion_sees_where_it_moves_and_no_motion(site:
 def _lit(page: Any) -> list[str]:
     """Axes of the machine that are drawn thick."""
     names = page.evaluate(
-        "document.getElementById('chart-scene').data.filter((trace) => trace.meta && trace.line.width === 9)"
+        "document.getElementById('chart-scene').data"
+        ".filter((trace) => trace.meta && trace.line && trace.line.width === 9)"
         ".map((trace) => trace.meta)"
     )
     return sorted(set(map(str, names)))
@@ -230,7 +231,7 @@ def test_story_a_certificate_is_refused_at_its_box_previewed_issued_and_amended(
     with Visit(site) as visit:
         page = visit.page
         visit.open("/certificates")
-        page.locator('form[action="/certificate/new"] select').select_option("five-days")
+        page.locator('form[action="/certificate/new"] input[name="campaign"]').fill("five-days")
         page.get_by_role("button", name="fill in the form").click()
         page.locator('select[name="run"]').select_option("20")
         page.locator('input[type="file"]').set_input_files(EXAMPLES / "laboratory.toml")

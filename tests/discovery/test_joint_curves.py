@@ -146,10 +146,13 @@ def test_orders_that_are_none_are_refused(plain, orders):
 
 
 def test_a_single_line_of_a_joint_is_named_beside_the_curve_of_another(robots, tmp_path):
-    """The search beside curves looks for no lines: one of J5 was lost where J1 had two, and bent what else was found."""
+    """The search beside curves looks for no lines: one of J5 was lost where J1 had two."""
     scene = robots.Scene(
         softness={"J2": 8e-6},
-        curves={"J1": [robots.Line(1, 90e-6, 0.3), robots.Line(2, 60e-6, 1.0)], "J5": [robots.Line(100, 90e-6, 0.2)]},
+        curves={
+            "J1": [robots.Line(1, 90e-6, 0.3), robots.Line(2, 60e-6, 1.0)],
+            "J5": [robots.Line(100, 90e-6, 0.2)],
+        },
     )
     session = robots.measure(np.random.default_rng(9), scene, poses=260, fixed_every=30)
     campaign = read_campaign(robots.write_session(tmp_path / "robot", session))

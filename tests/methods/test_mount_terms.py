@@ -6,7 +6,8 @@ of the hour angle), in corrections of hour angle and declination: nothing of the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 
 from monitor.discovery import explain
 from monitor.discovery.machine.missing import ChainMissing
+from monitor.discovery.machine.mistakes.mistakes import find_mistakes
 from monitor.exceptions import EffectError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
@@ -25,7 +27,13 @@ ARCSECOND = np.pi / 648000.0
 LATITUDE = np.deg2rad(35.0)
 #: Every mount has these, arcseconds; the model has them too.
 GEOMETRY = {"IH": 100.0, "ID": -60.0, "CH": -80.0, "NP": 30.0, "ME": 90.0, "MA": -70.0}
-SKY = '\n[[setups]]\nid = "sky"\nreading = "direction"\nstandard_uncertainty_urad = 5.0\ntool_direction = [1.0, 0.0, 0.0]\n'
+SKY = """
+[[setups]]
+id = "sky"
+reading = "direction"
+standard_uncertainty_urad = 5.0
+tool_direction = [1.0, 0.0, 0.0]
+"""
 
 
 def corrections(h: np.ndarray, d: np.ndarray, terms: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -113,3 +121,40 @@ def test_a_fork_carries_an_axis_that_turns_across_it(tmp_path: Path) -> None:
         method.problem_of(campaign, Model("fork", added=("fork:HA@gravity",)))
     solved = solve_problem(method.problem_of(campaign, Model("fork", added=("fork:DEC@gravity",))))
     assert solved.common.shape == (1,)
+
+
+def with_columns(folder: Path, change: Callable[[dict[str, str]], dict[str, str]]) -> Path:
+    """Rewrite the rows of a night."""
+    with (folder / "probings.csv").open(encoding="utf-8") as file:
+        rows = [change(row) for row in csv.DictReader(file)]
+    with (folder / "probings.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda row: row | {"ha_deg": repr(float(row["ha_deg"]) / 15.0)},
+            "ha_deg was in hours (15 degrees each)",
+        ),
+        (
+            lambda row: row | {"dec_deg": repr(90.0 - float(row["dec_deg"]))},
+            "dec_deg was counted from 90 degrees (a zenith or polar distance)",
+        ),
+        (
+            lambda row: row | {"direction_y": repr(-float(row["direction_y"]))},
+            "the sign of direction_y were the other",
+        ),
+    ],
+)
+def test_angles_as_an_observatory_writes_them_are_named(
+    change: Callable[[dict[str, str]], dict[str, str]], words: str, tmp_path: Path
+) -> None:
+    """Was: did not converge, check everything."""
+    campaign = read_campaign(with_columns(night(tmp_path, 3, stars=40), change))
+    mistakes = find_mistakes(campaign, campaign_method(campaign).problem_of, None)
+    assert any(words in mistake.what for mistake in mistakes), mistakes

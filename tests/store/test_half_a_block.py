@@ -101,7 +101,11 @@ def test_a_database_with_half_a_block_is_refused_in_words_and_its_backup_restore
         assert verify_audit(db).faults == ()
         assert db.rows("SELECT count(*) FROM event") == [(0,)]
     path.write_bytes(unfinished(before, after, 0.5))
-    with pytest.raises(StoreError, match=r"may be damaged.*restore a backup"), Database(path) as db:
+    restoring = (
+        r"may be damaged.*\(the newest that lies near it was made at 20.* UTC\).*"
+        r"`monitor --db .*shop-restored\.duckdb restore .*copy\.duckdb`"
+    )
+    with pytest.raises(StoreError, match=restoring), Database(path) as db:
         verify_audit(db)
     restored = restore(tmp_path / "copy.duckdb", tmp_path / "again.duckdb")
     assert restored.faults == ()

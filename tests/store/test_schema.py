@@ -33,7 +33,9 @@ def fresh(made_anew: None) -> Iterator[Database]:
 def test_the_fingerprint_is_that_of_the_migrations(fresh: Database) -> None:
     made = fingerprint(stored_schema(fresh))
     version = duckdb.__version__
-    assert FINGERPRINTS.get(version) == made, f"FINGERPRINTS of monitor/store/schema.py: {version!r}: {made!r}"
+    assert FINGERPRINTS.get(version) == made, (
+        f"FINGERPRINTS of monitor/store/schema.py: {version!r}: {made!r}"
+    )
 
 
 @pytest.mark.parametrize("kind", CHANGES)

@@ -140,7 +140,20 @@ def test_residuals_by_driver_are_the_residuals_in_groups(local: Any, residuals: 
 def test_the_machine_is_drawn_as_its_topology_says(residuals: dict[str, Any]) -> None:
     """Every axis has a line along its direction; the arc of a rotary one lies across it, all at one distance."""
     answer = from_document(ResidualsAnswer, residuals)
-    traces = machine_traces(answer)
+    every = machine_traces(answer)
+    traces = [trace for trace in every if trace["type"] == "scatter3d"]
+    bodies = [trace for trace in every if trace["type"] == "mesh3d"]
+    # The table is what the workpiece is clamped to, and the spindle has its nose.
+    assert [body["meta"] for body in bodies] == ["C", "C1"]
+    for body in bodies:
+        axis = next(axis for axis in answer.machine if axis.name == body["meta"])
+        line = next(trace for trace in traces if trace["meta"] == axis.name)
+        points = np.array([body[name] for name in "xyz"])
+        corners = np.array([body[name] for name in "ijk"])
+        assert 0 <= corners.min() <= corners.max() == points.shape[1] - 1
+        # A surface about the axis: the middle of its corners lies on it.
+        from_line = points.mean(axis=1) - np.array([line[name][0] for name in "xyz"])
+        assert np.linalg.norm(np.cross(from_line, axis.direction)) == pytest.approx(0.0, abs=0.05)
     for axis in answer.machine:
         own = [
             np.array([trace[name] for name in "xyz"]) for trace in traces if trace.get("meta") == axis.name

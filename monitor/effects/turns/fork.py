@@ -41,7 +41,8 @@ class Fork(BuiltIn):
         if self.carried not in names:
             carried = ", ".join(names) or "none here"
             raise EffectError(
-                f"'{self.text}': {self.carried} is no turning axis across another that carries it; here these are {carried}"
+                f"'{self.text}': {self.carried} is no turning axis across another that carries it; "
+                f"here these are {carried}"
             )
         return chain.index(self.carried) - 1
 
@@ -54,8 +55,8 @@ class Fork(BuiltIn):
 
     def described(self, driven: str) -> Description:
         return Description(
-            f"what carries the axis {self.carried} bends under its own weight and turns {self.carried} about itself, in "
-            f"proportion to the component of gravity across both axes{driven}",
+            f"what carries the axis {self.carried} bends under its own weight and turns {self.carried} about "
+            f"itself, in proportion to the component of gravity across both axes{driven}",
             "the arms of a fork, or the stand that carries the axis, give way under the weight that hangs on them",
             "stiffen or balance it, or compensate by the position of the axis that it stands on",
             OWN_DOCUMENT,

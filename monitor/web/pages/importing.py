@@ -47,7 +47,7 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             ticket = await run_in_threadpool(_begun, request, form)
         # A quick one is done when its page is asked for, which then need not load itself again.
-        await run_in_threadpool(ticket.wait, request.app.state.import_patience_s)
+        await ticket.settled(request.app.state.import_patience_s)
         return RedirectResponse(link("/import/under-way", number=ticket.number), status_code=303)
 
     @router.get("/import/under-way")

@@ -42,7 +42,8 @@ SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
 # Widths over which a reversal builds up, from what a long screw gives way to that of covers that drag.
 WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
 
-# Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and some to spare.
+# Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
+# some to spare.
 GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.1, 6
 # A wave of fewer periods over the travel, as the positions show it, is a bend.
 FEWEST_PERIODS = 2.0
@@ -79,7 +80,9 @@ def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> 
     frame of an axis, each with a coefficient of its own. About an axis that lies level flexure and refraction bend so,
     too; about any other one they depend on the other axes as well, and poses tell them apart.
     """
-    return [replace(variant, odds=variant.odds * _odds_of_a_bend(variant.effect, context)) for variant in variants]
+    return [
+        replace(variant, odds=variant.odds * _odds_of_a_bend(variant.effect, context)) for variant in variants
+    ]
 
 
 def _odds_of_a_bend(effect: MachineEffect, context: Context) -> float:
@@ -218,11 +221,11 @@ def without_aliases(
 def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     """Whether a cycle repeats at positions of which ``shortest`` is the shortest pitch that they show, twice their step
     on a grid."""
-    if shortest == 0.0:
-        return pitch <= travel
+    if not 0.0 < shortest < float("inf"):
+        return shortest == 0.0 and pitch <= travel
     frequency, steps = 1.0 / pitch, 2.0 / shortest
     seen = abs(frequency - steps * np.round(frequency / steps))
-    return bool(np.isfinite(shortest) and seen * travel >= FEWEST_PERIODS)
+    return bool(seen * travel >= FEWEST_PERIODS)
 
 
 def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
@@ -280,7 +283,8 @@ def _can_lag(driver: str, context: Context) -> str | None:
 def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVariant]:
     """The effect multiplied by every driver, where it has none; without its driver, where it has one.
 
-    A driver must earn its place: beforehand the plain effect is the likelier one.
+    A driver must earn its place: beforehand the plain effect is the likelier one. No shape settles within the minutes
+    after a run's begin: a guideway does not bend and a table does not tilt by what stood still for a while.
     """
     if not isinstance(effect, ChainEffect) or isinstance(effect.shape, Compliance):
         return []
@@ -290,6 +294,8 @@ def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVar
     variants: list[ChainVariant] = []
     for name in drivers:
         driven = replace(effect, driver=parse_driver(name), driver_text=name)
+        if isinstance(driven.driver, Settling):
+            continue
         variants += [replace(variant, odds=ODDS_OF_A_DRIVER) for variant in variants_of(driven)]
     return variants
 
