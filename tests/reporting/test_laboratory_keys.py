@@ -22,7 +22,11 @@ from monitor.reporting.texts import languages, texts_of
 def test_the_key_of_a_reference(language: str, words: str, places: dict[str, str], key: str) -> None:
     texts = texts_of(language)
     name = texts(words, **places)
-    for part in (f"certificate of {name}", f"statement of certificate of {name}", f"{name}: 'tbd' says nothing"):
+    for part in (
+        f"certificate of {name}",
+        f"statement of certificate of {name}",
+        f"{name}: 'tbd' says nothing",
+    ):
         assert key_of("references", part, texts) == key
 
 

@@ -29,11 +29,11 @@ from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate.conformity import statement_of
+from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateFileRequest, CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.results import results_of
-from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import RunUncertainty
