@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from monitor.api.pictures import Pictures
-from monitor.api.tables import main_table
+from monitor.api.tables import main_table, shown
 from monitor.documents import inlined_parts, to_document
 from monitor.exceptions import InputError
 
@@ -80,10 +80,10 @@ class Answer(Generic[Content]):
 
     def _text(self) -> str:
         try:
-            rows = main_table(self.content)
+            rows = shown(main_table(self.content))
         except InputError:
             return self._sentence()
-        return f"{self._sentence()}\n{rows}".strip()
+        return f"{self._sentence()}\n{rows.to_string(max_rows=20, line_width=120)}".strip()
 
     def _repr_html_(self) -> str:
         """Return the sentence, the table and the first picture, as a notebook shows them; ``plot()`` shows all."""
@@ -91,7 +91,7 @@ class Answer(Generic[Content]):
 
         parts = [f"<p>{escape(self._sentence())}</p>"] if self._sentence() else []
         try:
-            parts.append(main_table(self.content)._repr_html_())  # type: ignore[operator]
+            parts.append(shown(main_table(self.content))._repr_html_())  # type: ignore[operator]
         except InputError:
             parts.append(f"<p>{escape(self._summary())}</p>")
         if self._draw is not None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Where the main rows of an answer are, the first that it has.
 MAIN_ROWS = (
     "missing", "table", "parameters", "versions", "models", "effects", "runs", "campaigns", "imported",
-    "selections", "certificates", "machines", "entries",
+    "selections", "certificates", "machines", "entries", "history",
 )  # fmt: skip
 SCALARS = (str, int, float, bool, date, datetime, type(None))
 
@@ -61,10 +61,22 @@ def _frame_of(rows: object) -> pd.DataFrame | None:
 
     if isinstance(rows, Mapping) and rows:
         records = {key: _scalars(record) for key, record in rows.items()}
-        return pd.DataFrame.from_dict(records, orient="index") if all(records.values()) else None
+        return (
+            _numbers_first(pd.DataFrame.from_dict(records, orient="index")) if all(records.values()) else None
+        )
     if isinstance(rows, tuple) and (not rows or dataclasses.is_dataclass(rows[0])):
         return pd.DataFrame([_scalars(record) for record in rows])
     return None
+
+
+def _numbers_first(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with the columns that say why something is not there behind all others."""
+    return frame[sorted(frame.columns, key=lambda column: str(column).startswith("why"))]
+
+
+def shown(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a table as a screen shows it: without columns of which no row has anything."""
+    return frame.dropna(axis="columns", how="all")
 
 
 def table_of(answer: TableAnswer) -> pd.DataFrame:

@@ -101,6 +101,18 @@ def test_answers_of_all_kinds_are_tables(db: mm.Database) -> None:
     assert len(db.ask("plan", campaign="five-days").to_dict()) > 0
 
 
+def test_an_answer_is_shown_with_its_numbers(db: mm.Database) -> None:
+    """In a shell every column that has something; the table itself keeps its columns."""
+    trend = db.trend("HU40-T")
+    text, columns = repr(trend), list(trend.table().columns)
+    assert "..." not in text
+    assert "latest_u" in text
+    assert columns[-1].startswith("why")
+    empty = [name for name in columns if trend.table()[name].isna().all()]
+    assert empty
+    assert not any(f" {name} " in text for name in empty)
+
+
 def test_sql_reads_and_never_writes(db: mm.Database, tmp_path: Path) -> None:
     days = db.sql(
         "SELECT day, count(*) AS n FROM v_runs WHERE campaign = 'five-days' GROUP BY day ORDER BY day"

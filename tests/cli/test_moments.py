@@ -43,9 +43,7 @@ def test_a_moment_without_offset_is_the_time_of_this_computer(text: str, read: s
     assert moment(text, "--at").isoformat() == read
 
 
-@pytest.mark.parametrize(
-    "text", ["", "soon", "20250720", "2025-W10-1", "20.07.2025"]
-)
+@pytest.mark.parametrize("text", ["", "soon", "20250720", "2025-W10-1", "20.07.2025"])
 def test_what_is_no_moment_is_refused_with_forms_that_are_read(text: str) -> None:
     with pytest.raises(InputError, match=re.escape(f"--at {text}: write a day or a time as")) as refusal:
         moment(text, "--at")

@@ -96,3 +96,13 @@ def test_one_machine_and_chosen_tables(filled: Database, tmp_path: Path) -> None
     with pytest.raises(NotFoundError, match="there is no table 'runn'; did you mean 'run'"):
         export_tables(filled, tmp_path / "no", tables=["runn"])
     assert not (tmp_path / "no").exists()
+
+
+def test_every_column_of_every_sheet_for_people_has_a_meaning(filled: Database, tmp_path: Path) -> None:
+    path = export_workbook(filled, tmp_path / "shop.xlsx")
+    about = cells(path, "about")[4:]
+    sheets = {"parameters", "parameters long", "runs", "conditions", "changes"}
+    assert {str(row[0]) for row in about} == sheets
+    assert [row for row in about if len(row) < 3 or not row[2]] == []
+    for sheet in sheets:
+        assert [row[1] for row in about if row[0] == sheet] == cells(path, sheet)[0]

@@ -55,8 +55,8 @@ class IncompleteCertificateError(InputError):
         lines += [f"  {gap}" for gap in missing]
         if any(gap.key for gap in missing):
             lines.append(
-                "the keys are those of the laboratory's file where no other is named; `monitor certificate template` writes "
-                "one with all of them"
+                "the keys are those of the laboratory's file where no other is named; "
+                "`monitor certificate template` writes one with all of them"
             )
         super().__init__("\n".join(lines))
 
@@ -67,7 +67,8 @@ def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     texts = texts_of(record.language)
     for name, (clause, element) in ITEMS.items():
         missing += [
-            MissingItem(clause, element, part, key_of(name, part, texts)) for part in _gaps(getattr(record, name))
+            MissingItem(clause, element, part, key_of(name, part, texts))
+            for part in _gaps(getattr(record, name))
         ]
     for field, clause_and_item in _STATED.items():
         missing += [

@@ -78,7 +78,9 @@ def key_of(name: str, part: str, texts: Texts) -> str:
     """
     word = re.split(r"[ :]", part)[0]
     if name == "references":
-        return next((key for kind, key in _KEY_OF_REFERENCE.items() if _names(part, texts.sentences[kind])), "")
+        return next(
+            (key for kind, key in _KEY_OF_REFERENCE.items() if _names(part, texts.sentences[kind])), ""
+        )
     if name == "conditions":
         return ARTEFACT_KEY if part.endswith(f" {texts('record.artefact')}") else ""
     section = _SECTION_OF.get(name)
@@ -92,5 +94,5 @@ def key_of(name: str, part: str, texts: Texts) -> str:
 
 def _names(part: str, template: str) -> bool:
     """Whether a part of an item names what ``template`` says with its places filled in."""
-    words = (re.escape(text) for text in re.split(r"\{\w+\}", template))
-    return re.search(f"(^| of ){'.+'.join(words)}(: |$)", part) is not None
+    escaped = (re.escape(text) for text in re.split(r"\{\w+\}", template))
+    return re.search(f"(^| of ){'.+'.join(escaped)}(: |$)", part) is not None

@@ -31,8 +31,7 @@ def shows_wide_days(support: Array) -> npt.NDArray[np.bool_]:
     # As if one parameter more had shown a usual component.
     before = np.concatenate([np.full(usual, 1.0 / usual), np.zeros(len(WIDE_DAYS))])
     p = len(support)
-    # Row i: the others of parameter i. All shares are followed at once: p loops of arrays so small would take p times as
-    # long.
+    # Row i: the others of parameter i. All shares are followed at once: p small loops take far longer.
     others = support[np.arange(p - 1) + (np.arange(p - 1) >= np.arange(p)[:, np.newaxis])]
     share = np.full(support.shape, 1.0 / support.shape[1])
     for _ in range(STEPS):

@@ -86,6 +86,18 @@ def _view(db: Database, view: str, machine: str | None, name: str | None = None)
     )
 
 
+def _comments(db: Database, view: str, columns: Sequence[str]) -> tuple[str, ...]:
+    """Return what columns of a view hold, as the database says it."""
+    comments = dict(
+        db.rows(
+            "SELECT column_name, coalesce(comment, '') FROM duckdb_columns() WHERE table_name = ? "
+            "AND database_name = current_database()",
+            [view],
+        )
+    )
+    return tuple(comments[column] for column in columns)
+
+
 def _parameters_long(db: Database, machine: str | None) -> Sheet:
     return _view(db, "v_parameters", machine, "parameters long")
 
@@ -121,7 +133,7 @@ def _parameters(db: Database, machine: str | None) -> Sheet:
         "parameters",
         tuple(f"{key} / UTC" if key == "started_at" else key for key in keys) + tuple(heads),
         tuple((*key, *row) for key, row in table.items()),
-        ("",) * len(keys) + tuple(meanings),
+        _comments(db, "v_parameters", keys) + tuple(meanings),
     )
 
 
@@ -139,7 +151,22 @@ def _conditions(db: Database, machine: str | None) -> Sheet:
     names = sorted({name for *_, conditions in recorded for name in conditions or {}})
     rows = tuple((*key, *((conditions or {}).get(name) for name in names)) for *key, conditions in recorded)
     columns = ("campaign", "machine", "run", "started_at / UTC", *map(header, names))
-    return Sheet("conditions", columns, rows, ("",) * len(keys) + ("Condition of the run",) * len(names))
+    meanings = _comments(db, "v_runs", keys) + ("Condition of the run",) * len(names)
+    return Sheet("conditions", columns, rows, meanings)
+
+
+#: Columns of the changes, and what each holds.
+_CHANGES = {
+    "machine": "Machine id",
+    "at / UTC": "When an event happened, or the first run after a change",
+    "kind": "step, bend and others: a change in a parameter; event: what somebody recorded",
+    "parameter": "Geometric error that changed, empty of an event",
+    "size": "Size of the change, empty of an event",
+    "u": "Standard uncertainty of the size",
+    "unit of size and u": "Unit of the size and of its uncertainty",
+    "p": "Probability that a series without a change shows as much",
+    "what": "Description of an event, or where a change comes from",
+}
 
 
 def _changes(db: Database, machine: str | None) -> Sheet:
@@ -162,9 +189,8 @@ def _changes(db: Database, machine: str | None) -> Sheet:
                 for kind in ("changes", "drifts")
                 for change in followed.get(kind, ())
             ]  # fmt: skip
-    columns = ("machine", "at / UTC", "kind", "parameter", "size", "u", "unit of size and u", "p", "what")
     ordered = sorted([*events, *rows], key=lambda row: (row[0], str(row[1])))
-    return Sheet("changes", columns, tuple(ordered), ("",) * len(columns))
+    return Sheet("changes", tuple(_CHANGES), tuple(ordered), tuple(_CHANGES.values()))
 
 
 #: The sheets that people ask for first, by name.
