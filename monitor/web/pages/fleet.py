@@ -154,6 +154,7 @@ def routes() -> APIRouter:
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],
             not_identified=() if answer is None else answer.not_identified,
+            refuted={} if answer is None else answer.models_refuted or {},
         )  # fmt: skip
 
     @router.post("/fleet/identify")
