@@ -73,21 +73,6 @@ def routes() -> APIRouter:
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
         )  # fmt: skip
 
-    @router.get("/machine/parameters")
-    async def parameters(
-        request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
-    ) -> Response:
-        """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
-        desk: Desk = request.app.state.desk
-        ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
-        await ticket.settled(FETCH_S)
-        if not ticket.is_done:
-            return JSONResponse({}, 202)
-        return page(
-            request, "parameters.html",
-            name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
-        )  # fmt: skip
-
     @router.get("/machine/values.csv")
     def values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
         """Send the values of a machine, a row a run, units in the column names."""
@@ -96,6 +81,7 @@ def routes() -> APIRouter:
         )
         return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
 
+    router.get("/machine/parameters")(_table_of_all)
     router.get("/machine/periods")(_two_periods)
 
     @router.post("/machine/event")
@@ -108,6 +94,21 @@ def routes() -> APIRouter:
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router
+
+
+async def _table_of_all(
+    request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
+) -> Response:
+    """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
+    desk: Desk = request.app.state.desk
+    ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
+    await ticket.settled(FETCH_S)
+    if not ticket.is_done:
+        return JSONResponse({}, 202)
+    return page(
+        request, "parameters.html",
+        name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
+    )  # fmt: skip
 
 
 class _Trends:
