@@ -23,6 +23,7 @@ from monitor.methods.chain.results import AdviceOf, identification
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.model import Model
 from monitor.methods.rehearsal import YES, Able, Rehearsal
+from monitor.methods.standard_test import StandardTestRows
 from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
@@ -152,57 +153,6 @@ class InstrumentPlan(Able):
 
 
 @dataclass(frozen=True)
-class AxisTest:
-    """A test of positioning in one setup and run: ``position`` (n,) and ``deviation`` (n,) in mm, or in rad where
-    ``angular``, in the order of measuring. ``axes`` are those that move: one, or several along a diagonal.
-
-    ``u_reading`` is the standard uncertainty of a reading, ``u_gain`` that of the instrument's unit.
-    """
-
-    setup: str
-    run: int
-    axes: tuple[str, ...]
-    position: Array
-    deviation: Array
-    u_reading: float
-    u_gain: float
-    angular: bool
-
-
-@dataclass(frozen=True)
-class CircleTest:
-    """A circular test in one setup and run: ``angle`` (n,) rad from the first axis of the ``plane`` to the second,
-    ``deviation`` (n,) mm of the length from ``radius`` mm, in the order of measuring; ``u_radius`` is NaN where the bar
-    was not calibrated."""
-
-    setup: str
-    run: int
-    plane: tuple[str, str]
-    angle: Array
-    deviation: Array
-    radius: float
-    u_reading: float
-    u_radius: float
-
-
-@dataclass(frozen=True)
-class RotationTest:
-    """An error motion of an axis of rotation in one run: ``error`` is its symbol (``EXC``), ``angle`` (n,) rad and
-    ``deviation`` (n,) mm, or rad where ``angular``, in the order of measuring. ``setup`` is that of the readings, two
-    of them for a tilt; ``about_circle`` says that what moves once a revolution is the artefact's place."""
-
-    setup: str
-    run: int
-    axis: str
-    error: str
-    angle: Array
-    deviation: Array
-    about_circle: bool
-    u_reading: float
-    angular: bool
-
-
-@dataclass(frozen=True)
 class InstrumentShare:
     """What one instrument says of the k base parameters of a run, in internal units.
 
@@ -240,7 +190,7 @@ class Instruments(Able):
 class StandardTests(Able):
     """Rows are tests that standards evaluate; ``tests`` are those of a problem."""
 
-    tests: Callable[[ChainProblem], tuple[AxisTest | CircleTest | RotationTest, ...]]
+    tests: Callable[[ChainProblem], tuple[StandardTestRows, ...]]
 
 
 @dataclass(frozen=True)

@@ -68,9 +68,15 @@ def backup_made(file: Path, tables: int, rows: int) -> str:
 def increment_made(file: Path, entries: tuple[int, int], rows: int, previous: str) -> str:
     """Return what is said of a backup of the ``entries`` of the audit since the ``previous`` one."""
     first, last = entries
-    what = f"entries {first} to {last} of the audit, {rows} rows" if last >= first else "nothing new"
-    what += f" since {previous}, which has to stay beside it"
+    what = (
+        f"entries {first} to {last} of the audit, {rows} rows since {previous}, which has to stay beside it"
+    )
     return f"{file}: {what}, checked; its manifest lies beside it"
+
+
+def nothing_to_back_up(file: Path, newest: str) -> str:
+    """Return what is said of an incremental backup that would be empty."""
+    return f"nothing is new since {newest}, the newest backup there; {file} was not made"
 
 
 def backup_restored(file: Path, made_at: str, moment: datetime | None = None) -> str:

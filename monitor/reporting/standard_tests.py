@@ -1,4 +1,4 @@
-"""What ISO 230-2, 230-4, 230-6 and 230-7 call their figures, and what is noted of a test that lacks what they ask."""
+"""What the standards of machine tools call their figures, and what is noted of a test that lacks what they ask."""
 
 from __future__ import annotations
 
@@ -43,6 +43,56 @@ def circle_figure(kind: str, plane: str, way: int = 1) -> tuple[str, str]:
 def rotation_figure(name: str, error: str, kind: str) -> tuple[str, str]:
     """Return symbol and name of a value of an error motion: symbol of the ``error`` (EXC), its ``kind`` (radial)."""
     return f"{error} {name}", f"{name} {kind} error motion value"
+
+
+#: Which rows of a test of axes that move together: symbol and name, with the direction of the readings.
+_FOLLOWED_FIGURES: Mapping[str, tuple[str, str]] = {
+    "whole": ("{direction}", "range of the deviations, {direction}"),
+    "forward": ("{direction}+", "range of the deviations, {direction}, {axis} turning up"),
+    "backward": ("{direction}-", "range of the deviations, {direction}, {axis} turning down"),
+}
+#: Kind of a figure of a part: its name, with the datum.
+_PART_FIGURES: Mapping[str, str] = {
+    "straightness": "straightness",
+    "straightness_zone": "straightness, minimum zone",
+    "perpendicularity": "perpendicularity to {datum}",
+    "parallelism": "parallelism to {datum}",
+    "angularity": "angularity to {datum}",
+    "circularity": "circularity",
+    "circularity_zone": "circularity, minimum zone",
+    "concentricity": "concentricity to {datum}, diameter of the zone",
+    "position": "position beside the first circle along {datum}, diameter of the zone",
+    "half_angle": "half apex angle of the cone with {datum}, less the programmed one",
+}
+
+
+def followed_figure(rows: str, direction: str, axis: str) -> tuple[str, str]:
+    """Return symbol and name of the range in a direction of the ``rows`` of a test of axes that move together."""
+    symbol, name = _FOLLOWED_FIGURES[rows]
+    return symbol.format(direction=direction), name.format(direction=direction, axis=axis)
+
+
+def part_figure(kind: str, element: str, datum: str) -> tuple[str, str]:
+    """Return symbol and name of a figure of an element of a part: the element itself is its symbol."""
+    return element, _PART_FIGURES[kind].format(datum=datum)
+
+
+@dataclass(frozen=True)
+class OneSenseOfTurning(Sentence):
+    """A rotary axis that linear ones follow turned in one sense."""
+
+    axis: str
+
+    def __str__(self) -> str:
+        return f"{self.axis} turned in one sense: what it loses on turning back is not in these figures"
+
+
+@dataclass(frozen=True)
+class NoDatum(Sentence):
+    """A part has circles beside each other and no straight side, so that their places have nothing to go by."""
+
+    def __str__(self) -> str:
+        return "no straight side was measured: no circle has a position beside the others"
 
 
 @dataclass(frozen=True)

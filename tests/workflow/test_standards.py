@@ -109,7 +109,7 @@ def test_the_same_seed_gives_the_same_uncertainties(db: Database) -> None:
 
 
 def test_a_setup_that_no_standard_evaluates_is_refused_and_a_wrong_name_too(db: Database) -> None:
-    with pytest.raises(DataError, match="no setup of edge is a test of ISO 230-2, -4, -6 or -7"):
+    with pytest.raises(DataError, match="no setup of edge is a test of ISO 230-2, -4, -6, -7"):
         standards(db, StandardsRequest("shop", setup="edge"))
     with pytest.raises(NotFoundError, match="has no setup 'laser'; did you mean 'laser-Y'"):
         standards(db, StandardsRequest("shop", setup="laser"))

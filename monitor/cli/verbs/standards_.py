@@ -1,4 +1,4 @@
-"""What ISO 230-2, ISO 230-4, ISO 230-6 and ISO 230-7 report of the tests of a campaign, with uncertainties."""
+"""What ISO 230-2, -4, -6, -7 and ISO 10791-6, -7 report of the tests of a campaign, with uncertainties."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _say(test: StandardTest) -> None:
         [
             figure.symbol,
             figure.name,
-            output.rounded(figure.value, figure.u),
+            output.rounded(figure.value, figure.u) + (f" {figure.unit}" if figure.unit != test.unit else ""),
             output.two_digits(figure.u),
         ]
         for figure in test.figures

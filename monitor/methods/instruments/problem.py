@@ -18,6 +18,7 @@ from monitor.methods.chain.least_squares import Linearisation, Solution, elimina
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import wrong_direction, wrong_length
+from monitor.methods.instruments.first_guess import guess_with_lines, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
@@ -87,11 +88,11 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def own_start(self) -> Array:
-        """The first guesses (R, q)."""
+        """The first guesses (R, q): zeros and slopes as a machine without errors leaves them."""
         runs = len(self.runs)
         start = np.zeros((runs, len(self.own_names)))
         for part, columns in zip(self.parts, self.own_columns, strict=True):
-            start[:, columns] = part.reading.start(runs)
+            start[:, columns] = guess_with_lines(part, runs, self._nominal)
         return start
 
     @property
@@ -320,8 +321,8 @@ class InstrumentProblem(ChainProblem):
 
     def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
         """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
-        nominal = _stance(vectors[part.at], self._nominal, part.at)
-        return replace(_stance(vectors[part.at], sides, part.at), nominal=nominal)
+        nominal = stance_at(vectors[part.at], self._nominal, part.at)
+        return replace(stance_at(vectors[part.at], sides, part.at), nominal=nominal)
 
     def _by_error(
         self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]
@@ -435,9 +436,3 @@ class InstrumentProblem(ChainProblem):
         return wrong_length(self.parts, self.sigma, vectors, travel) or wrong_direction(
             self.parts, self.sigma, vectors
         )
-
-
-def _stance(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Stance:
-    """How the sides stand at the rows of a setup."""
-    work, tool = sides.work[at], sides.tool[at]
-    return Stance(r, np.swapaxes(work, 1, 2) @ tool, work, tool)

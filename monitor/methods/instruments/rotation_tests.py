@@ -18,7 +18,7 @@ from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.component import Component
 from monitor.methods.instruments.readings.vector import VectorReading
-from monitor.methods.method import RotationTest
+from monitor.methods.standard_test import RotationTest
 from monitor.records import Array
 
 #: Joints that move by less than this stand still, mm and rad; directions agree to this part.

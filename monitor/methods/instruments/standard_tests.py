@@ -2,8 +2,9 @@
 
 A ``displacement`` along one linear axis is a test of positioning (ISO 230-2), along several at once a diagonal
 (ISO 230-6); an ``angle`` about a rotary axis that moves alone is a test of positioning too. A ``distance`` swung by two
-linear axes about a centre is a circular test (ISO 230-4); tests of axes of rotation are in ``rotation_tests``
-(ISO 230-7). All other setups have no standard's figures here.
+linear axes about a centre is a circular test (ISO 230-4). Tests of axes of rotation are in ``rotation_tests``
+(ISO 230-7), those of rotary axes that linear ones follow in ``interpolation_tests`` (ISO 10791-6), parts that the
+machine cut in ``part_tests`` (ISO 10791-7). All other setups have no standard's figures here.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ import numpy.typing as npt
 
 from monitor.machine import Joint, evaluate
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.instruments.interpolation_tests import interpolation_tests
 from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part_tests import part_tests
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, direction_of
 from monitor.methods.instruments.readings.angle import Angle
 from monitor.methods.instruments.readings.displacement import Displacement
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.rotation_tests import rotation_tests
-from monitor.methods.method import AxisTest, CircleTest, RotationTest
+from monitor.methods.standard_test import AxisTest, CircleTest, StandardTestRows
 from monitor.records import Array
 
 #: An axis that moves by less than this part of the one that moves most stands still.
@@ -32,11 +35,11 @@ STILL = 1e-3
 ALONG = 1e-2
 
 
-def standard_tests(problem: ChainProblem) -> tuple[AxisTest | CircleTest | RotationTest, ...]:
+def standard_tests(problem: ChainProblem) -> tuple[StandardTestRows, ...]:
     """The tests of every setup and run that a standard evaluates."""
     assert isinstance(problem, InstrumentProblem)
     of_setups = (test for part in problem.parts for test in _tests_of(problem, part))
-    return (*of_setups, *rotation_tests(problem))
+    return (*of_setups, *rotation_tests(problem), *interpolation_tests(problem), *part_tests(problem))
 
 
 def _tests_of(problem: InstrumentProblem, part: Part) -> Iterator[AxisTest | CircleTest]:
@@ -124,9 +127,11 @@ def _circle(measured: _Measured, reading: DistanceReading) -> CircleTest | None:
     angle = np.arctan2(arm[:, second], arm[:, first])
     bar = 0.0 if reading.holds("length") else (reading.setup.length_uncertainty or np.nan)
     plane = ("XYZ"[first], "XYZ"[second])
+    names = tuple(joint.name for joint in measured.joints)
     return CircleTest(
-        measured.part.id, measured.run, plane, angle, measured.values, reading.setup.length, measured.u, bar
-    )
+        measured.part.id, measured.run, names, False, plane, angle, measured.values, reading.setup.length,
+        measured.u, bar,
+    )  # fmt: skip
 
 
 def _moving(part: Part, mine: npt.NDArray[np.bool_]) -> list[int]:

@@ -1,17 +1,22 @@
-"""Draws the two plots that people on the shop floor know: deviations of positioning, and the polar plot of a circle."""
+"""Draws the plots that people on the shop floor know: deviations of positioning and of axes that move together, the
+polar plots of a circle and of an axis of rotation, the outline of a part."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from monitor.records import Array
 from monitor.reporting.figures.style import new_figure, style, zero_line
-from monitor.reporting.palette import BLUE, MID, ORANGE, PAGE_WIDTH_MM
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM
 
 HEIGHT_MM, CIRCLE_MM = 80.0, 110.0
 #: The largest deviation takes this part of the polar plot's radius.
 SHOWN_PART = 0.35
+#: Colours and lines of several series in one panel.
+_LOOKS = ((BLUE, "-"), (ORANGE, "--"), (INK, ":"))
 
 
 def positioning_figure(
@@ -59,6 +64,66 @@ def circle_figure(angle: Array, radial: Array, sense: Array, *, plane: tuple[str
         )
         axes.grid(color=MID, linewidth=0.3)
         axes.legend(loc="center")
+    return figure
+
+
+def rotation_figure(angle: Array, synchronous: Array, *, unit: str, title: str) -> Figure:
+    """Draw synchronous error motion (n,) at angles (n,) rad about a circle, magnified, as ISO 230-7:2015 does."""
+    largest = float(np.max(np.abs(synchronous))) or 1.0
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, CIRCLE_MM, title)
+        axes = figure.subplots(subplot_kw={"projection": "polar"})
+        around = np.linspace(0.0, 2.0 * np.pi, 361)
+        scale = SHOWN_PART / largest
+        closed = np.append(synchronous, synchronous[:1])
+        axes.plot(around, np.ones_like(around), color=MID, linewidth=0.7)
+        axes.plot(np.append(angle, angle[:1]), 1.0 + scale * closed, color=BLUE, linewidth=1.1)
+        axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
+        step = _step(largest)
+        marks = np.array([-step, 0.0, step])
+        axes.set_yticks(1.0 + scale * marks, [f"{mark:+.3g} {unit}" if mark else "" for mark in marks])
+        axes.grid(color=MID, linewidth=0.3)
+    return figure
+
+
+def followed_figure(degrees: Array, deviations: Mapping[str, Array], *, axis: str, title: str) -> Figure:
+    """Draw deviations (n,) µm by direction over the ``degrees`` (n,) of the rotary axis that others follow."""
+    names = list(deviations)
+    groups = [names[first : first + len(_LOOKS)] for first in range(0, len(names), len(_LOOKS))]
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, HEIGHT_MM * len(groups), title)
+        panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+        for panel, group in zip(panels, groups, strict=True):
+            zero_line(panel)
+            for (colour, line), name in zip(_LOOKS, group, strict=False):
+                off = deviations[name] - deviations[name].mean()
+                panel.plot(
+                    degrees, off, line, color=colour, linewidth=1.1, marker="o", markersize=2.0, label=name
+                )
+            panel.set_ylabel("deviation from the mean / µm")
+            panel.legend(loc="best")
+        panels[-1].set_xlabel(f"{axis} / °")
+    return figure
+
+
+def part_figure(elements: Sequence[tuple[str, Array, Array, Array]], *, title: str) -> Figure:
+    """Draw elements of a part, each with its name, places (n, 2) mm, directions (n, 2) across it and deviations (n,) mm
+    from its form, magnified so that the largest takes a tenth of the part's size."""
+    largest = max(float(np.max(np.abs(deviation))) for *_, deviation in elements) or 1.0
+    size = max(float(np.ptp(places, axis=0).max()) for _, places, _, _ in elements)
+    scale = 0.1 * size / largest
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, CIRCLE_MM, title)
+        axes = figure.subplots()
+        for number, (name, places, across, deviation) in enumerate(elements):
+            moved = places + scale * deviation[:, None] * across
+            axes.plot(places[:, 0], places[:, 1], color=MID, linewidth=0.7)
+            axes.plot(moved[:, 0], moved[:, 1], color=(BLUE, ORANGE)[number % 2], linewidth=1.1)
+            axes.annotate(
+                name, tuple(places.mean(axis=0) if len(elements) == 1 else places[0]), fontsize="small"
+            )
+        axes.set_aspect("equal")
+        axes.set_xlabel(f"mm; deviations magnified {scale:.0f} times")
     return figure
 
 

@@ -73,7 +73,9 @@ def circles(
     value = {name: float(values[0]) for name, values in figures.items()}
     return Circles(
         circular={way: value[f"G{way}"] for way in senses},
-        minimum_zone={way: _minimum_zone(angle[sense == way], deviation[sense == way]) for way in senses},
+        minimum_zone={
+            way: minimum_zone(_columns(angle[sense == way]), deviation[sense == way]) for way in senses
+        },
         both=value.get("G", np.nan),
         hysteresis=value.get("H", np.nan),
         largest={way: value[f"Fmax{way}"] for way in senses},
@@ -136,17 +138,18 @@ def _difference(angle: Array, centred: Array, sense: Array) -> Array:
     return np.asarray(centred[:, first] - between)
 
 
-def _minimum_zone(angle: Array, deviation: Array) -> float:
-    """The least radial separation of two concentric circles around the path: a linear programme in their centre, mean
-    radius and half the separation (the limacon approximation: deviations are small beside the radius)."""
-    columns = _columns(angle)
-    half = np.ones((len(angle), 1))
+def minimum_zone(columns: Array, deviation: Array) -> float:
+    """The least width of a zone about a form that is linear in its unknowns, given by ``columns`` (n, q): a linear
+    programme in them and half the width (ISO/TS 12181 and 12780, minimum zone). For circles the columns are 1, cos and
+    sin (the limacon approximation: deviations are small beside the radius), for a line 1 and the place along it."""
+    half = np.ones((len(deviation), 1))
     above, below = np.hstack([columns, -half]), np.hstack([-columns, -half])
-    # -h <= deviation - (r + a cos + b sin) <= h
+    # -h <= deviation - columns x <= h
+    unknowns = columns.shape[1]
     answer = scipy.optimize.linprog(
-        [0.0, 0.0, 0.0, 1.0],
+        [0.0] * unknowns + [1.0],
         A_ub=np.vstack([below, above]),
         b_ub=np.concatenate([-deviation, deviation]),
-        bounds=[(None, None)] * 3 + [(0, None)],
+        bounds=[(None, None)] * unknowns + [(0, None)],
     )
     return float(2.0 * answer.fun)

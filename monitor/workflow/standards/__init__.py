@@ -1,1 +1,1 @@
-"""What the standards of machine tools report of a campaign: ISO 230-2, ISO 230-4, ISO 230-6."""
+"""What the standards of machine tools report of a campaign: ISO 230-2, -4, -6, -7, ISO 10791-6 and -7."""

@@ -1,4 +1,4 @@
-"""What ISO 230-2, ISO 230-4, ISO 230-6 and ISO 230-7 report of the rows of a campaign, with uncertainties."""
+"""What the standards of machine tools report of the rows of a campaign, with uncertainties."""
 
 from __future__ import annotations
 
@@ -12,7 +12,15 @@ import numpy as np
 from monitor.documents import Said
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.methods import campaign_method
-from monitor.methods.method import AxisTest, CircleTest, RotationTest, StandardTests
+from monitor.methods.method import StandardTests
+from monitor.methods.standard_test import (
+    AxisTest,
+    CircleTest,
+    InterpolationTest,
+    PartTest,
+    RotationTest,
+    StandardTestRows,
+)
 from monitor.reporting.standard_tests import (
     AXIS_FIGURES,
     FewRunsEachWay,
@@ -25,12 +33,19 @@ from monitor.reporting.standard_tests import (
 )
 from monitor.statistics.standards.circles import Circles, circles
 from monitor.statistics.standards.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
-from monitor.statistics.standards.rotation import error_motion
+from monitor.statistics.standards.rotation import ErrorMotion, error_motion
 from monitor.store import Database
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.standards.answer import StandardFigure, StandardsAnswer, StandardTest, TargetFigures
+from monitor.workflow.standards.paths_and_parts import (
+    INTERPOLATION,
+    interpolation_answer,
+    interpolation_files,
+    part_answer,
+    part_files,
+)
 from monitor.workflow.standards.request import StandardsRequest
 
 #: Positions within so much are one target, in mm and rad: readings of one programmed position.
@@ -57,9 +72,10 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
     of_wanted = [test for test in ability.tests(problem) if set(test.setup.split(", ")) <= set(wanted)]
     if not of_wanted:
         raise DataError(
-            f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4, -6 or -7: a displacement along a travel, an "
-            "angle about the one axis that turns, a distance swung by two linear axes, or sensors that stand still "
-            "around the one axis that turns"
+            f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4, -6, -7 or ISO 10791-6, -7: a displacement "
+            "along a travel, an angle about the one axis that turns, a distance swung by two linear axes, sensors that "
+            "stand still around the one axis that turns, a point or a bar that linear axes keep to while a rotary one "
+            "turns, or points of a part whose targets are known"
         )
     folder = None if request.figures is None else make_folder(request.figures)
     tests: list[StandardTest] = []
@@ -79,18 +95,35 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
 
 
 def _evaluated(
-    test: AxisTest | CircleTest | RotationTest, rng: np.random.Generator, folder: Path | None
+    test: StandardTestRows, rng: np.random.Generator, folder: Path | None
 ) -> tuple[StandardTest, list[str]]:
-    """The figures of a test, and the files of its plot; an error motion has none yet."""
+    """The figures of a test, and the files of its plot where a folder is given."""
+    files: list[str] = []
     if isinstance(test, RotationTest):
-        return _rotation_answer(test, rng), []
-    if isinstance(test, AxisTest):
+        motion = error_motion(
+            test.angle, test.deviation, about_circle=test.about_circle, tolerance=ONE_TARGET_RAD,
+            u_reading=test.u_reading, rng=rng,
+        )  # fmt: skip
+        answer = _rotation_answer(test, motion)
+        files = [] if folder is None else _rotation_figure(test, motion, folder)
+    elif isinstance(test, AxisTest):
         axis = _positioning(test, rng)
         answer = _axis_answer(test, axis)
-        return answer, [] if folder is None else _axis_figure(test, axis, answer, folder)
-    circle = circles(test.angle, test.deviation, u_reading=test.u_reading, u_radius=test.u_radius, rng=rng)
-    answer = _circle_answer(test, circle)
-    return answer, [] if folder is None else _circle_figure(test, circle, answer, folder)
+        files = [] if folder is None else _axis_figure(test, axis, answer, folder)
+    elif isinstance(test, CircleTest):
+        circle = circles(
+            test.angle, test.deviation, u_reading=test.u_reading, u_radius=test.u_radius, rng=rng
+        )
+        answer = _circle_answer(test, circle)
+        files = [] if folder is None else _circle_figure(test, circle, answer, folder)
+    elif isinstance(test, InterpolationTest):
+        answer = interpolation_answer(test, rng)
+        files = [] if folder is None else interpolation_files(test, answer, folder)
+    else:
+        assert isinstance(test, PartTest)
+        answer = part_answer(test, rng)
+        files = [] if folder is None else part_files(test, folder)
+    return answer, files
 
 
 def _positioning(test: AxisTest, rng: np.random.Generator) -> Positioning:
@@ -156,12 +189,11 @@ def _lacks(evaluated: Positioning) -> Iterator[Said]:
 
 def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:
     um, plane = MICROMETRE.to_display, "".join(test.plane)
+    standard = INTERPOLATION if test.simultaneous else "ISO 230-4:2005, clause 3"
 
     def figure(kind: str, value: float, u: str, way: int = 1) -> StandardFigure:
         symbol, name = circle_figure(kind, plane, way)
-        return StandardFigure(
-            symbol, name, "ISO 230-4:2005, clause 3", um(value), um(circle.u[u]), MICROMETRE.name
-        )
+        return StandardFigure(symbol, name, standard, um(value), um(circle.u[u]), MICROMETRE.name)
 
     figures = [
         figure(kind, values[way], f"{u}{way}", way)
@@ -180,18 +212,13 @@ def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:
         notes.append(OneSenseOfRotation())
     if np.isnan(test.u_radius):
         notes.append(LengthWithoutUncertainty())
-    return StandardTest(
-        test.setup, test.run, "circle", plane, MICROMETRE.name, tuple(figures), (), tuple(notes)
-    )
+    of = " ".join(test.axes) if test.simultaneous else plane
+    return StandardTest(test.setup, test.run, "circle", of, MICROMETRE.name, tuple(figures), (), tuple(notes))
 
 
-def _rotation_answer(test: RotationTest, rng: np.random.Generator) -> StandardTest:
+def _rotation_answer(test: RotationTest, evaluated: ErrorMotion) -> StandardTest:
     unit = MICRORADIAN if test.angular else MICROMETRE
     show = unit.to_display
-    evaluated = error_motion(
-        test.angle, test.deviation, about_circle=test.about_circle, tolerance=ONE_TARGET_RAD,
-        u_reading=test.u_reading, rng=rng,
-    )  # fmt: skip
     kind = "tilt" if test.angular else "radial" if test.about_circle else "axial"
     figures = tuple(
         StandardFigure(
@@ -205,6 +232,20 @@ def _rotation_answer(test: RotationTest, rng: np.random.Generator) -> StandardTe
     )
     notes: tuple[Said, ...] = () if evaluated.revolutions > 1 else (OneRevolution(),)
     return StandardTest(test.setup, test.run, "rotation", test.axis, unit.name, figures, (), notes)
+
+
+def _rotation_figure(test: RotationTest, evaluated: ErrorMotion, folder: Path) -> list[str]:
+    from monitor.reporting.figures.standards import rotation_figure as drawn
+
+    unit = MICRORADIAN if test.angular else MICROMETRE
+    figure = drawn(
+        evaluated.angles,
+        evaluated.synchronous_at / unit.factor,
+        unit=unit.name,
+        title=f"{test.setup}, run {test.run}, {test.error}: synchronous "
+        f"{unit.to_display(evaluated.synchronous):.1f} {unit.name}",
+    )
+    return save_figure(figure, folder, f"{test.setup.replace(', ', '+')}-{test.run}-{test.error}")
 
 
 def _axis_figure(test: AxisTest, evaluated: Positioning, answer: StandardTest, folder: Path) -> list[str]:

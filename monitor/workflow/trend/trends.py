@@ -65,8 +65,10 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     """
     history = _history(db, request)
     events = machine_events(db, request.machine)
+    # Read before anything is computed: the file is let go of when nothing was asked for a moment.
+    refers_to = parameter_frames(db, request.machine, history.parameters)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-    answer = _answer(db, request, history, events, past)
+    answer = _answer(db, request, history, events, past, refers_to)
     if past and request.is_plain and not db.read_only:
         save_analysis(
             db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED,
@@ -129,6 +131,7 @@ def _answer(
     history: MachineHistory,
     events: list[MachineEvent],
     past: Mapping[str, ParameterPast],
+    refers_to: Mapping[str, str],
 ) -> TrendAnswer:
     refuted = model_refuted(history)
     head = TrendAnswer(
@@ -152,7 +155,7 @@ def _answer(
         seed=SEED,
         why=None if past else _why_none(request),
         parameters={},
-        refers_to=parameter_frames(db, request.machine, tuple(past)),
+        refers_to={name: refers_to[name] for name in past if name in refers_to},
         model_refuted=refuted,
     )
     if not past:
