@@ -21,6 +21,7 @@ from monitor.methods.instruments.contradiction import wrong_direction, wrong_len
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
+from monitor.methods.instruments.starts import stance_of, with_zeros
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -30,6 +31,9 @@ LARGEST_OUTSIDE = (5.0, 0.02)
 LARGEST_TURN = 0.35
 # What is read of an error's displacement is at least this part, else it comes from products of errors alone.
 SECOND_ORDER = 5e-3
+# A turn that moves a reading by less than this, mm/rad, is seen by rounding alone; one that turns sensors shows what
+# they read, which is some tenths of a millimetre and an error itself.
+LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
 
@@ -92,7 +96,7 @@ class InstrumentProblem(ChainProblem):
         start = np.zeros((runs, len(self.own_names)))
         for part, columns in zip(self.parts, self.own_columns, strict=True):
             start[:, columns] = part.reading.start(runs)
-        return start
+        return with_zeros(self.parts, self.own_columns, start, self._nominal)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -311,17 +315,20 @@ class InstrumentProblem(ChainProblem):
         them be, and turn with every step.
         """
         assert pose.by_error is not None
-        if shown.by_shift is None or shown.by_turn is not None:
+        if shown.by_shift is None:
             return np.ones(derivatives.shape[2:], dtype=bool)
         if setup not in self._masks:
-            moved = np.sum(pose.by_error[at] ** 2, axis=(0, 1))
-            self._masks[setup] = np.sum(derivatives**2, axis=(0, 1)) > SECOND_ORDER**2 * moved
+            turns = shown.by_turn is not None
+            moved = np.zeros(derivatives.shape[2:]) if turns else np.sum(pose.by_error[at] ** 2, axis=(0, 1))
+            least = np.where(np.arange(6) < 3, 0.0, LEAST_READ if turns else LEAST_LEVER)
+            size = np.sum(derivatives**2, axis=(0, 1))
+            self._masks[setup] = (size > SECOND_ORDER**2 * moved) & (size > least**2 * len(at))
         return self._masks[setup]
 
     def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
         """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
-        nominal = _stance(vectors[part.at], self._nominal, part.at)
-        return replace(_stance(vectors[part.at], sides, part.at), nominal=nominal)
+        nominal = stance_of(vectors[part.at], self._nominal, part.at)
+        return replace(stance_of(vectors[part.at], sides, part.at), nominal=nominal)
 
     def _by_error(
         self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]
@@ -435,9 +442,3 @@ class InstrumentProblem(ChainProblem):
         return wrong_length(self.parts, self.sigma, vectors, travel) or wrong_direction(
             self.parts, self.sigma, vectors
         )
-
-
-def _stance(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Stance:
-    """How the sides stand at the rows of a setup."""
-    work, tool = sides.work[at], sides.tool[at]
-    return Stance(r, np.swapaxes(work, 1, 2) @ tool, work, tool)
