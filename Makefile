@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: newest-duckdb growth supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: dcc-reader newest-duckdb growth soak supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -58,6 +58,10 @@ load: setup  ## 50 engineers at once while an import runs; trend pages of a larg
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py many $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py large --machines 1000 --weeks 100 $(ARGS)
 
+dcc-reader: setup  ## digital certificates read by PyDCC, which others wrote, in an environment of its own
+	@sh tests/setup/dcc_reader.sh
+	@$(PYTEST) -n 0 tests/reporting/test_pydcc.py $(ARGS)
+
 manual: setup  ## the manual as a site in manual-output/, and every block of code of its pages
 	@$(RUN) -c 'import furo, latex2mathml, myst_parser, sphinx' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt furo latex2mathml myst-parser sphinx
 	@OMP_NUM_THREADS=1 $(RUN) docs/site/build.py
@@ -87,6 +91,9 @@ concurrency: setup  ## eight importers and twenty readers at one database for te
 
 kills: setup  ## thirteen verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+soak: setup  ## a shop for an hour: imports, reports, pages, publishing and kills together (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/soak.py $(ARGS)
 
 growth: setup  ## bytes a campaign over simulated years, backups, archive, compaction (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/growth.py $(ARGS)

@@ -35,6 +35,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # angle_unit = "arcsec"            # of angles on the screen: µrad, arcsec or µm/m
 # trusted_signers = "signers.pem"  # who may sign: certificates (PEM, DER), or a SHA-256 fingerprint a line
 # timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
+# long_term = "authorities.pem"    # certificates that signer and time stamp lead to: PAdES B-LT
 
 # Tolerances by machine type ([machine] model of campaign.toml; "*" for all others): limits of absolute values in µm,
 # µrad or µm/m for trend, fleet and report, where the machine's campaign states none of its own. A certificate states
@@ -58,6 +59,7 @@ class Configuration:
     angle_unit: str | None = None
     timestamp_url: str | None = None
     trusted_signers: Path | None = None
+    long_term: Path | None = None
     tolerances: Mapping[str, Mapping[str, float]] | None = None
 
 
@@ -93,7 +95,7 @@ def read(file: Path) -> Configuration:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     paths = {
         key: file.parent / document[key]
-        for key in ("database", "laboratory", "mail", "trusted_signers")
+        for key in ("database", "laboratory", "mail", "trusted_signers", "long_term")
         if key in document
     }
     texts = {key: document[key] for key in _TEXTS if key in document}
@@ -171,4 +173,5 @@ _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "angle_unit": _angle,
     "timestamp_url": _address,
     "trusted_signers": _file,
+    "long_term": _file,
 }

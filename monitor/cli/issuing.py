@@ -83,6 +83,11 @@ def add_issuing(parser: ArgumentParser) -> None:
         "--timestamp-url", metavar="URL",
         help="put a time stamp of this authority (RFC 3161) on the signature (else that of the configuration)",
     )  # fmt: skip
+    signing.add_argument(
+        "--long-term", type=Path, metavar="FILE",
+        help="embed what proves later that the certificates of signer and time stamp were in force now (PAdES B-LT): "
+        "FILE holds the certificates (PEM, DER) that both lead to (else that of the configuration)",
+    )  # fmt: skip
     signing.add_argument("--token-label", metavar="LABEL", help="the label of the token")
     signing.add_argument("--token-slot", type=int, metavar="N", help="or its slot, counted from 0")
     signing.add_argument("--token-key", metavar="LABEL", help="the label of the key")
@@ -151,6 +156,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "accept": dict(options.accept),
         "dcc_version": options.dcc_version,
         "timestamp_url": _timestamp_url(options),
+        "long_term": _long_term(options),
     }
 
 
@@ -185,6 +191,14 @@ def _timestamp_url(options: Namespace) -> str | None:
             "a time stamp is put on a signature: --timestamp-url needs --sign or --token, which say by which key"
         )
     return str(options.timestamp_url)
+
+
+def _long_term(options: Namespace) -> Path | None:
+    """The file that was typed, else that of the configuration, which holds for what is signed with a time stamp."""
+    if options.long_term is not None:
+        return Path(options.long_term)
+    signs = options.sign is not None or options.token is not None
+    return configuration().long_term if signs and _timestamp_url(options) is not None else None
 
 
 def _key(options: Namespace) -> Key | None:

@@ -20,19 +20,19 @@ def moment(text: str, option: str) -> datetime:
     """Return the moment with its offset; a day is its beginning, without an offset it is the time of the
     configuration's zone, else of this computer.
 
-    Raises InputError, which names the forms that are read.
+    Raises InputError, which names the forms that are read, or says what no calendar or clock has.
     """
     typed = text.strip()
-    try:
-        if _MOMENT.fullmatch(typed) is None:
-            raise ValueError(typed)
-        day, _, time = typed.replace("T", " ").partition(" ")
-        hour, colon, rest = time.replace(" ", "").partition(":")
-        read = datetime.fromisoformat(f"{day}T{hour:0>2}{colon}{rest}" if time else day)
-    except ValueError as error:
+    if _MOMENT.fullmatch(typed) is None:
         raise InputError(
             f"{option} {text}: write a day or a time as 2026-03-05, 2026-03-05 07:00 or 2026-03-05T07:00:00-05:00"
-        ) from error
+        )
+    day, _, time = typed.replace("T", " ").partition(" ")
+    hour, colon, rest = time.replace(" ", "").partition(":")
+    try:
+        read = datetime.fromisoformat(f"{day}T{hour:0>2}{colon}{rest}" if time else day)
+    except ValueError as error:
+        raise InputError(f"{option} {text}: there is no such day or time, {error}") from error
     if read.tzinfo is not None:
         return read
     zone = configuration().time_zone

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
-from monitor.reporting.health.sentences import SteppedAtEvent
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import Season, SlopeVerdict
@@ -176,6 +175,9 @@ def _change(name: str, change: DatedChange) -> str:
 
 def _event_step(name: str, step: StepAtEvent) -> str:
     """The sentence of the weekly report, with the time and the probability."""
+    # Loaded here: most machines have no step at an event, and the report has two dozen kinds of sentences.
+    from monitor.reporting.health.sentences import SteppedAtEvent
+
     what = SteppedAtEvent(name, step.description, step.size, step.u, step.unit, step.why_not_decided)
     p_value = f" (p = {output.probability(step.p_value)})" if step.decided else ""
     return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"

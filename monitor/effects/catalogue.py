@@ -16,6 +16,7 @@ import numpy as np
 from monitor.effects.context import Context, InstrumentRows
 from monitor.effects.effect import ParsedEffect, parse_effect
 from monitor.effects.instrument import changes_of
+from monitor.effects.turns.fork import carried_axes
 from monitor.machine import COMPONENTS, Chain
 from monitor.units import CONDITION_SUFFIXES
 
@@ -108,15 +109,19 @@ def of_drives(chain: Chain, ratios: Mapping[str, float] | None = None) -> tuple[
 
 
 def of_sight(chain: Chain) -> tuple[str, ...]:
-    """Return the effects of what points somewhere: the tube and the axes sag, the air bends the line of sight.
+    """Return the effects of what points somewhere: tube, axes and forks sag, the air bends the line of sight, and a
+    scale may count wrongly.
 
     The first axis of a mount sags alike wherever it turns: that is its own tilt, and left out.
     """
     sagging = [joint.name for joint in chain.tool[1:] if joint.turns]
+    turning = [joint for joint in chain.tool if joint.turns]
     return (
         "flexure:tool@gravity",
         *(f"flexure:{name}@gravity" for name in sagging),
+        *(f"fork:{name}@gravity" for name in carried_axes(chain)),
         "sight:up:formula(1/tan(elevation))",
+        *(f"E{COMPONENTS[3 + joint.main]}{joint.name}:poly1" for joint in turning),
     )
 
 
@@ -137,7 +142,9 @@ def drivers_of(context: Context) -> tuple[str, ...]:
         and len(recorded := values[np.isfinite(values)])
         and recorded.min() < recorded.max()
     ]
-    return ("warmup", "run_time", *channels)
+    # Where every run is the first of its day, what begins with the run and what begins with the day are the same.
+    restarts = ("settling",) if np.any(context.day_time > context.time) else ()
+    return ("warmup", "run_time", *restarts, *channels)
 
 
 def catalogue(

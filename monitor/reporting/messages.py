@@ -30,6 +30,31 @@ def joint_region_lacks(needed: int, fewest: float) -> str:
     return f", at least {needed}, and have {fewest:.4g}: {runs} on days of repeated runs would do"
 
 
+def model_refuted(campaigns: Sequence[str], judged: int, model: str, p_value: float) -> str:
+    """Return that the readings of campaigns, the latest last, refute its model, and what to type.
+
+    ``p_value`` is that of the latest, ``judged`` how many campaigns could say so.
+    """
+    p = "p < 0.0001" if p_value < 1e-4 else f"p = {p_value:.4f}"
+    of_all = "" if judged == 1 else f"; so do {len(campaigns)} of the {judged} campaigns that can say so"
+    if len(campaigns) == 1:
+        of_all = "" if judged == 1 else f"; of {judged} campaigns that can say so no other does"
+    return (
+        f"the readings of {campaigns[-1]} refute the model {model} beyond noise (lack of fit, {p}){of_all}: the values "
+        f"hold what it lacks and may step or drift with it; type `monitor explain {campaigns[-1]}`"
+    )
+
+
+def machines_refuted(machines: Mapping[str, str], most: int) -> str:
+    """Return which ``machines`` (with their latest campaigns) have readings that refute their model."""
+    named = ", ".join(f"{machine} ({campaign})" for machine, campaign in list(machines.items())[:most])
+    more = f" and {len(machines) - most} more" if len(machines) > most else ""
+    return (
+        f"the latest readings refute the model that the values come from: {named}{more}; "
+        f"type `monitor explain {next(iter(machines.values()))}`"
+    )
+
+
 def attention_words(attention: str, season_not_told: bool | None) -> str:
     """Return the class of a parameter of the fleet; of a slope that may be a season not that it drifts."""
     return _MOVES.get(attention, attention) if season_not_told else attention
@@ -43,9 +68,15 @@ def backup_made(file: Path, tables: int, rows: int) -> str:
 def increment_made(file: Path, entries: tuple[int, int], rows: int, previous: str) -> str:
     """Return what is said of a backup of the ``entries`` of the audit since the ``previous`` one."""
     first, last = entries
-    what = f"entries {first} to {last} of the audit, {rows} rows" if last >= first else "nothing new"
-    what += f" since {previous}, which has to stay beside it"
+    what = (
+        f"entries {first} to {last} of the audit, {rows} rows since {previous}, which has to stay beside it"
+    )
     return f"{file}: {what}, checked; its manifest lies beside it"
+
+
+def nothing_to_back_up(file: Path, newest: str) -> str:
+    """Return what is said of an incremental backup that would be empty."""
+    return f"nothing is new since {newest}, the newest backup there; {file} was not made"
 
 
 def backup_restored(file: Path, made_at: str, moment: datetime | None = None) -> str:

@@ -132,10 +132,15 @@ if TYPE_CHECKING:
         fleet_sums as fleet_sums,
     )
     from monitor.store.past.history import (
+        CampaignFit as CampaignFit,
         MachineHistory as MachineHistory,
         latest_tolerances as latest_tolerances,
         machine_history as machine_history,
         tolerance_types as tolerance_types,
+    )
+    from monitor.store.past.lack_of_fit import (
+        RefutedMachine as RefutedMachine,
+        refuted_machines as refuted_machines,
     )
     from monitor.store.past.machine_runs import (
         MachineDescription as MachineDescription,
@@ -152,6 +157,7 @@ if TYPE_CHECKING:
     )
     from monitor.store.recalling import Recalled as Recalled
     from monitor.store.results import (
+        LackOfFit as LackOfFit,
         StoredIdentification as StoredIdentification,
         StoredRun as StoredRun,
     )
@@ -216,12 +222,13 @@ else:
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
             "save_model",
             "past.fleet": "BlockCut FleetSums fleet_sums",
-            "past.history": "MachineHistory latest_tolerances machine_history tolerance_types",
+            "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
+            "past.lack_of_fit": "RefutedMachine refuted_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
             "probing_counts",
             "recalling": "Recalled",
-            "results": "StoredIdentification StoredRun",
+            "results": "LackOfFit StoredIdentification StoredRun",
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",
             "sharing": "SharedDatabase one_at_a_time",
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",

@@ -3,11 +3,15 @@
 The content of a campaign, an identification or a model is hashed as what it means, so that the hash can be computed
 again by any later version. Beside it stand numbers, versions, moments and fingerprints. An entry of the audit holds the
 hash of both; entries of before this was so hold the hash of the content alone, and are compared with that.
+
+A campaign also holds the books that no entry of their own keeps: which migrations were applied before it, when and by
+which version, and when its machine was first registered.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 from monitor.store.connection import Database
 
@@ -30,12 +34,32 @@ _ROWS = {
 }
 
 
+#: Rows that entries hold since version 0.3.0, besides.
+_ROWS_OF_BEFORE = {
+    "campaign": (
+        "SELECT number, name, sha256, schema_migration.software_version, applied_at FROM schema_migration "
+        "JOIN imported_campaign ON applied_at <= imported_at WHERE campaign_id = ? ORDER BY number",
+        "SELECT registration, machine, topology, registered_at FROM registered_machine "
+        "JOIN imported_campaign USING (machine) WHERE registered_at <= imported_at AND campaign_id = ? ORDER BY ALL",
+    ),
+}
+
+
 def with_bookkeeping(db: Database, subject: str, number: int | str, content_sha256: str) -> str:
     """Return the hash of a content and of the rows that keep its books; that of the content where it has none."""
-    if subject not in _ROWS or not content_sha256:
+    return _hash(db, (*_ROWS.get(subject, ()), *_ROWS_OF_BEFORE.get(subject, ())), number, content_sha256)
+
+
+def earlier_hashes(db: Database, subject: str, number: int | str, content_sha256: str) -> tuple[str, ...]:
+    """Return the hashes that an entry of an earlier version holds: with the books of its subject alone, and without."""
+    return _hash(db, _ROWS.get(subject, ()), number, content_sha256), content_sha256
+
+
+def _hash(db: Database, queries: Sequence[str], number: int | str, content_sha256: str) -> str:
+    if not queries or not content_sha256:
         return content_sha256
     digest = hashlib.sha256(content_sha256.encode())
-    for query in _ROWS[subject]:
+    for query in queries:
         for row in db.rows(query, [number]):
             digest.update(repr(row).encode())
     return digest.hexdigest()

@@ -27,7 +27,15 @@ from monitor.stopping import checkpoint
 from monitor.store import bound_values, migrations
 from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import connect, damaged, is_missing, make, make_empty, make_log
+from monitor.store.opening import (
+    close_written,
+    connect,
+    damaged,
+    is_missing,
+    make,
+    make_empty,
+    prepare_commit,
+)
 from monitor.store.recalling import Recalled
 from monitor.store.turns import Patience
 
@@ -85,7 +93,14 @@ class Database:
         """Close the file; other processes can open it then."""
         with self._lock:
             if self._connection is not None:
-                self._connection.close()
+                if self._may_have_written():
+                    close_written(self._connection, self.path)
+                else:
+                    self._connection.close()
+
+    def _may_have_written(self) -> bool:
+        """Whether the connection that is open could write."""
+        return not self.read_only
 
     def _check_name(self) -> None:
         """Refuse a name that is none of a database."""
@@ -260,7 +275,7 @@ class Database:
                 self._in_transaction = True
                 try:
                     yield
-                    make_log(self.path)
+                    prepare_commit(self.path)
                     connection.commit()
                 except BaseException as fault:
                     _roll_back(connection)
@@ -279,7 +294,9 @@ class Database:
         """Bring the schema to the present one; refuse a database that does not fit this software."""
         try:
             if not self.read_only:
-                migrations.migrate(connection, self._available, before_commit=lambda: make_log(self.path))
+                migrations.migrate(
+                    connection, self._available, before_commit=lambda: prepare_commit(self.path)
+                )
                 return
             waiting = migrations.pending(connection, self._available)
         except StoreError as fault:

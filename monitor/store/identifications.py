@@ -18,6 +18,7 @@ from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.past import identified_values
 from monitor.store.results import (
+    LackOfFit,
     StoredIdentification,
     StoredRun,
     check_identification,
@@ -59,6 +60,7 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
             _insert_run(db, number, run)
         _insert_values(db, number, identification)
         _insert_frames(db, number, identification)
+        _insert_lack_of_fit(db, number, identification.lack_of_fit)
         identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
         content = with_bookkeeping(
@@ -125,6 +127,15 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
         _runs(db, number, len(parameters)),
         dict(
             db.rows("SELECT parameter, refers_to FROM parameter_frame WHERE identification_id = ?", [number])
+        ),
+        next(
+            (
+                LackOfFit(p_value)
+                for (p_value,) in db.rows(
+                    "SELECT p_value FROM lack_of_fit WHERE identification_id = ?", [number]
+                )
+            ),
+            None,
         ),
     )
 
@@ -193,6 +204,11 @@ def _insert_frames(db: Database, number: int, identification: StoredIdentificati
         references = np.array(list(identification.refers_to.values()), dtype=object)
         incoming = {"parameter": names, "refers_to": references}
         db.insert("INSERT INTO parameter_frame SELECT ?, * FROM incoming", incoming, [number])
+
+
+def _insert_lack_of_fit(db: Database, number: int, lack_of_fit: LackOfFit | None) -> None:
+    if lack_of_fit is not None:
+        db.execute("INSERT INTO lack_of_fit VALUES (?, ?)", [number, lack_of_fit.p_value])
 
 
 def _values(identification: StoredIdentification) -> dict[str, Any]:

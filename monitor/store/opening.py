@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import os
+import shlex
 import stat
 import tempfile
 from pathlib import Path
@@ -12,6 +15,7 @@ import duckdb
 
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
+from monitor.store.kept_blocks import ENDING, has_torn_blocks, keep_blocks, settle_blocks
 from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
@@ -20,6 +24,8 @@ BLOCK_SIZE = 65536
 
 #: What a file is called while it is made: it gets its name when it is whole.
 _UNFINISHED = ".new"
+#: What manifests of backups are called, and how many are looked through for the newest.
+_MANIFESTS, _MOST_MANIFESTS = "*.manifest.json", 2000
 #: A new database is its owner's alone; whoever wants a group to use it changes the mode, and log and lock follow it.
 _MODE = 0o600
 
@@ -51,10 +57,21 @@ def connect(
             holder = writer_at_work(path)
             if holder is not None:
                 continue
+        if not read_only:
+            settle_blocks(path)
+        elif has_torn_blocks(path):
+            raise UnfinishedLogError(
+                f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is "
+                f"put back by the next verb of somebody who may write: `monitor --db {path} verify`"
+            )
         try:
             connection = duckdb.connect(path, read_only=read_only, config=config)
             # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
             connection.execute("SET enable_progress_bar = false")
+            if not read_only and _has_log(path):
+                # What it replayed is written into the file when it is closed, whether or not anything is added.
+                with contextlib.suppress(StoreError):
+                    keep_blocks(path)
             return connection
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
@@ -137,11 +154,28 @@ def make_empty(path: str) -> None:
         file.write(content)
 
 
+def prepare_commit(path: str) -> None:
+    """Make what lies beside a file that is written: its log, and a copy of the blocks that half a write may damage.
+
+    Called before each commit by whoever has the turn to write. Raises StoreError where the copy cannot be written.
+    """
+    make_log(path)
+    keep_blocks(path)
+
+
+def close_written(connection: duckdb.DuckDBPyConnection, path: str) -> None:
+    """Close a connection that may write, and remove the copy of its blocks once its checkpoint is through."""
+    connection.close()
+    # What cannot be put back now stays beside the file for the next who opens it.
+    with contextlib.suppress(StoreError):
+        settle_blocks(path)
+
+
 def make_log(path: str) -> None:
     """Make the log that DuckDB writes beside a file, so that those may read it who may read the file, and no others.
 
-    DuckDB would make it with the mode that the process gives all its files. Called before each commit by whoever has
-    the turn to write; DuckDB opens the empty log as one that it made (1.5.5). One that is there already stays.
+    DuckDB would make it with the mode that the process gives all its files; it opens the empty log as one that it made
+    (1.5.5). One that is there already stays.
     """
     if path == ":memory:":
         return
@@ -165,7 +199,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _remove(partial: str) -> None:
-    for name in (partial, partial + ".wal"):
+    for name in (partial, partial + ".wal", partial + ENDING):
         Path(name).unlink(missing_ok=True)
 
 
@@ -181,6 +215,12 @@ def _refuse_what_is_no_file(path: str) -> None:
         raise StoreError(f"{path} is a folder; name a file")
     if not stat.S_ISREG(status.st_mode):
         raise StoreError(f"{path} is a pipe or device, not a file; name a file")
+
+
+def _has_log(path: str) -> bool:
+    with contextlib.suppress(OSError, ValueError):
+        return os.stat(path + ".wal").st_size > 0
+    return False
 
 
 def _is_open_here(message: str) -> bool:
@@ -213,4 +253,24 @@ def damaged(path: str, message: str) -> str:
     """Return the sentence about a file that DuckDB cannot read, or not write."""
     if "Could not write" in message or "No space left" in message:
         return f"{path} could not be written, nothing was kept: {message.splitlines()[0]}"
-    return f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; restore a backup: `monitor restore`"
+    newest = _newest_backup(path)
+    known = "BACKUP" if newest is None else shlex.quote(str(newest[1]))
+    when = "" if newest is None else f" (the newest that lies near it was made at {newest[0][:19]} UTC)"
+    restored = shlex.quote(str(Path(path).with_suffix("")) + "-restored.duckdb")
+    return (
+        f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; leave it where it is, and restore a "
+        f"backup{when} under another name: `monitor --db {restored} restore {known}`"
+    )
+
+
+def _newest_backup(path: str) -> tuple[str, Path] | None:
+    """Return when the newest backup in the folder of a database, or one below it, was made, and its file."""
+    folder = Path(path).absolute().parent
+    backups = []
+    manifests = itertools.chain(folder.glob(_MANIFESTS), folder.glob(f"*/{_MANIFESTS}"))
+    for manifest in itertools.islice(manifests, _MOST_MANIFESTS):
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
+            file = manifest.with_name(manifest.name.removesuffix(_MANIFESTS[1:]))
+            if file.is_file():
+                backups.append((str(json.loads(manifest.read_text(encoding="utf-8"))["made_at"]), file))
+    return max(backups, default=None)

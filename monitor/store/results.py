@@ -36,10 +36,19 @@ class StoredRun:
 
 
 @dataclass(frozen=True)
+class LackOfFit:
+    """Lack of fit of the runs of an identification over their scatter: the probability of as much where the model is
+    right, None where no two runs follow one plan and nothing can be compared."""
+
+    p_value: float | None
+
+
+@dataclass(frozen=True)
 class StoredIdentification:
     """An identification of a campaign by a version of a model: ``parameters`` and display ``units``, k each.
 
-    ``refers_to`` says in words, by name, what the errors of the chain are stated relative to.
+    ``refers_to`` says in words, by name, what the errors of the chain are stated relative to. ``lack_of_fit`` is None
+    where it was not looked for: older versions stored none.
     """
 
     campaign: str
@@ -50,6 +59,7 @@ class StoredIdentification:
     units: tuple[Unit, ...]
     runs: tuple[StoredRun, ...]
     refers_to: Mapping[str, str] = field(default_factory=dict)
+    lack_of_fit: LackOfFit | None = None
 
 
 def identification_content(
@@ -78,7 +88,16 @@ def identification_content(
         ],
         # Nothing is added for those of before frames were stored: their hashes are the old ones.
         *([sorted(identification.refers_to.items())] if identification.refers_to else []),
+        *_lack_of_fit_content(identification.lack_of_fit),
     )
+
+
+def _lack_of_fit_content(lack_of_fit: LackOfFit | None) -> list[dict[str, str | None]]:
+    """Return what is hashed of lack of fit: nothing for identifications of before it was stored."""
+    if lack_of_fit is None:
+        return []
+    p_value = lack_of_fit.p_value
+    return [{"lack of fit": None if p_value is None else float(p_value).hex()}]
 
 
 def check_identification(identification: StoredIdentification) -> None:

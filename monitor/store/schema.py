@@ -5,10 +5,20 @@ A view that was replaced shows false numbers to whoever reads it while every sto
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
 from functools import cache
 
+import duckdb
+
 from monitor.store.connection import Database
+
+#: SHA-256 of what ``_QUERIES`` answer of a database that the migrations of today have just made, by the version of
+#: DuckDB, which writes the SQL of views in its own way. A schema that has it is compared with nothing else: to make
+#: such a database takes 0.1 s, a quarter of a verification of a small one. Of any other schema every part is compared.
+#: ``tests/store/test_schema.py`` makes it anew and says what to write here after a migration.
+FINGERPRINTS = {"1.5.5": "94b99a2d7c5f54b1229293ba00cad8584b9bb3ce248d0fbc4f953924cdd66c96"}
 
 #: What is compared, each by a name and by what it is. Indexes have a check of their own (``indexes``).
 _QUERIES = {
@@ -44,8 +54,11 @@ _QUERIES = {
 
 def schema_faults(db: Database) -> Iterator[str]:
     """Yield a sentence for everything that the migrations did not make so, or that is missing."""
-    for kind, query in _QUERIES.items():
-        present, expected = dict(db.rows(query)), _expected()[kind]
+    schema = stored_schema(db)
+    if FINGERPRINTS.get(duckdb.__version__) == fingerprint(schema):
+        return
+    for kind, expected in _expected().items():
+        present = schema[kind]
         for name in sorted(present.keys() | expected.keys()):
             if name not in expected:
                 yield f"the {kind} {name} was not made by this software"
@@ -55,7 +68,17 @@ def schema_faults(db: Database) -> Iterator[str]:
                 yield f"the {kind} {name} was altered: it is not as this software makes it"
 
 
+def stored_schema(db: Database) -> dict[str, dict[str, str | None]]:
+    """Return what each name of each kind is in this database."""
+    return {kind: dict(db.rows(query)) for kind, query in _QUERIES.items()}
+
+
+def fingerprint(schema: Mapping[str, Mapping[str, str | None]]) -> str:
+    """Return the SHA-256 of a schema, whatever the order in which its names were read."""
+    return hashlib.sha256(json.dumps(schema, sort_keys=True).encode()).hexdigest()
+
+
 @cache
-def _expected() -> dict[str, dict[str, str]]:
+def _expected() -> dict[str, dict[str, str | None]]:
     with Database(":memory:", threads=1) as fresh:
-        return {kind: dict(fresh.rows(query)) for kind, query in _QUERIES.items()}
+        return stored_schema(fresh)

@@ -24,7 +24,7 @@ import duckdb
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
 from monitor.store.connection import Database
-from monitor.store.opening import busy, connect, is_missing
+from monitor.store.opening import busy, close_written, connect, is_missing
 from monitor.store.turns import Patience, turn_to_write, writer_at_work
 
 #: How long the file stays open for the next question, in s: to open it takes some 10 ms. Whoever reads keeps it longer
@@ -182,7 +182,7 @@ class SharedDatabase(Database):
             try:
                 self._fit(connection)
             except BaseException:
-                connection.close()
+                close_written(connection, self.path)
                 raise
             self._turn = turn.pop_all()
         self._writes = True
@@ -210,6 +210,9 @@ class SharedDatabase(Database):
                     self._let_go()
             finally:
                 self._lock.release()
+
+    def _may_have_written(self) -> bool:
+        return self._writes
 
     def _is_idle(self) -> bool:
         """Whether nothing was asked for so long that others may have the file."""

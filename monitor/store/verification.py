@@ -16,7 +16,7 @@ from monitor.exceptions import MonitorError
 from monitor.store import audit
 from monitor.store.analyses import analysis_contents
 from monitor.store.archiving import archived_hashes
-from monitor.store.bookkeeping import with_bookkeeping
+from monitor.store.bookkeeping import earlier_hashes, with_bookkeeping
 from monitor.store.campaigns import stored_content
 from monitor.store.certificates import certificate_faults
 from monitor.store.connection import Database
@@ -98,7 +98,8 @@ class _Content:
         return self._with_books(db, _OF_NUMBERS[self.subject](db, int(self.number), signed_zeros=True))
 
     def _with_books(self, db: Database, content: str) -> tuple[str, ...]:
-        return with_bookkeeping(db, self.subject, self.number, content), content
+        books = self.subject, self.number, content
+        return with_bookkeeping(db, *books), *earlier_hashes(db, *books)
 
 
 #: Subjects whose content is mostly numbers, and the function that hashes them.

@@ -91,6 +91,7 @@ ANSWERING_WITHOUT_FILE = frozenset({"map"})
 #: Fields of files that travel nowhere, and why.
 STAYING: Mapping[str, str] = {
     "key": "a key and what opens it stay where they are: sign beside the database, while no server has it",
+    "long_term": "a server speaks to no authority: sign beside the database, while no server has it",
     "cluster": "the server computes on its own computer",
     "incremental": "an incremental backup lies beside those that it follows: take it where the database is",
     "folder": "a campaign folder that is not imported is looked at by the command line on its computer",

@@ -20,6 +20,7 @@ from monitor.web.forms import StaleFormError
 from monitor.web.gate import Gate
 from monitor.web.interface import interface
 from monitor.web.opening import host_user_name
+from monitor.web.outcomes import Outcomes
 from monitor.web.pages import (
     campaign as campaign_page,
     certificates,
@@ -73,6 +74,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     desk = Desk(asker)
     app.state.desk = desk
     app.state.import_patience_s = importing.PATIENCE_S
+    app.state.outcomes = Outcomes()
     app.state.previews = Previews()
     app.state.presses = Presses()
     app.state.working_folder = working_folder

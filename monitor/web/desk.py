@@ -6,19 +6,22 @@ again finds the work where it is.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
 from dataclasses import dataclass, field
-from threading import Event, Lock
+from datetime import UTC, datetime
+from functools import partial
+from threading import Event, RLock
 from typing import Any
 
 from monitor.exceptions import MonitorError, NotFoundError
 from monitor.stopping import StoppedError, stoppable
 from monitor.web.asking import Asker, ForbiddenError, check_role
-from monitor.web.freshness import Stamp
+from monitor.web.freshness import Stamp, differ_by_imports
 from monitor.web.users import Role, User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
@@ -27,6 +30,11 @@ WORKERS = 2
 PATIENCE_S = 0.1
 #: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
 MOST = 200
+#: Where only imports came since, an answer stands for so many times as long as it took: while somebody imports one
+#: campaign after the other, sums over the whole fleet take a tenth of one processor and not all of it.
+REST = 10.0
+#: And no longer than this.
+LONGEST_REST_S = 60.0
 
 
 @dataclass
@@ -40,6 +48,11 @@ class Ticket:
     future: Future[Any]
     stop: Event
     asked_at: float = field(default_factory=time.monotonic)
+    asked_on: datetime = field(default_factory=lambda: datetime.now(UTC))
+    #: What had been written when it was asked.
+    stamp: Stamp = ()
+    #: How long it was computed; None while it is not.
+    took_s: float | None = None
     #: Who took it back; empty as long as nobody did.
     taken_back_by: str = ""
     #: What it said of how far it is, the latest last.
@@ -49,6 +62,11 @@ class Ticket:
     def seconds(self) -> float:
         """Return how long ago it was asked."""
         return time.monotonic() - self.asked_at
+
+    @property
+    def is_rested(self) -> bool:
+        """Whether it has stood for so long that it may be computed anew: ``REST`` times as long as it took."""
+        return self.took_s is None or self.seconds > self.took_s + min(REST * self.took_s, LONGEST_REST_S)
 
     @property
     def is_done(self) -> bool:
@@ -91,6 +109,13 @@ class Ticket:
         except (StillWorking, CancelledError, StoppedError):
             return None
 
+    async def settled(self, patience: float) -> None:
+        """Wait until there is an answer or a refusal, at most so many seconds after it was asked first.
+
+        No thread waits with it: some forty answer all pages.
+        """
+        await asyncio.wait([asyncio.wrap_future(self.future)], timeout=max(patience - self.seconds, 0.0))
+
     def outcome(self) -> tuple[Any, str]:
         """Return the answer and why there is none; None and nothing while it is computed."""
         try:
@@ -105,11 +130,15 @@ class Desk:
     def __init__(self, asker: Asker) -> None:
         self.asker = asker
         self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-desk")
+        # The trend of the one parameter that somebody looks at takes 0.1 s: it waits behind its like alone.
+        self._quick = ThreadPoolExecutor(1, thread_name_prefix="monitor-quick")
         # Who writes does not wait behind what others compute.
         self._writers = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-writer")
         self._written: OrderedDict[int, Ticket] = OrderedDict()
         self._tickets: dict[tuple[str, str, Stamp], Ticket] = {}
-        self._lock = Lock()
+        self._answered_last: dict[tuple[str, str], Ticket] = {}
+        # What is answered at once is noted by whoever asks, who holds it already.
+        self._lock = RLock()
         self._count = 0
 
     def ask(
@@ -130,11 +159,45 @@ class Desk:
                 return ticket
             self._count += 1
             stop = Event()
-            future = self._pool.submit(self._answered, stop, user, question, document, files)
-            self._tickets[key] = ticket = Ticket(self._count, question, document, user, future, stop)
+            pool = self._quick if question == "trend" and document.get("parameter") else self._pool
+            future = pool.submit(self._answered, stop, user, question, document, files)
+            self._tickets[key] = ticket = Ticket(
+                self._count, question, document, user, future, stop, stamp=key[2]
+            )
+            future.add_done_callback(partial(self._note_answer, key[:2], ticket))
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
+
+    def ask_rested(
+        self, user: User, question: str, document: Mapping[str, Any]
+    ) -> tuple[Ticket, Ticket | None]:
+        """Return the ticket of a question, and the one that was answered last (None where none was).
+
+        Where only imports came since, and it stood for less than ``REST`` times as long as it took, the two are the
+        same: an answer that is a little old, and nothing is computed.
+        """
+        last = self.answered_last(question, document)
+        if last is not None and not last.is_rested:
+            check_role(user, question)
+            if differ_by_imports(last.stamp, self.asker.freshness.stamp(question, document)):
+                return last, last
+        return self.ask(user, question, document), last
+
+    def answered_last(self, question: str, document: Mapping[str, Any]) -> Ticket | None:
+        """Return the ticket of a question that was answered last, whatever was written since; None where none was."""
+        with self._lock:
+            return self._answered_last.get(self._key(question, document)[:2])
+
+    def _note_answer(self, asked: tuple[str, str], ticket: Ticket, future: Future[Any]) -> None:
+        """Keep what was answered last, with how long that took; waiting for others is counted too."""
+        ticket.took_s = ticket.seconds
+        if future.cancelled() or future.exception() is not None:
+            return
+        with self._lock:
+            self._answered_last[asked] = ticket
+            while len(self._answered_last) > MOST:
+                del self._answered_last[next(iter(self._answered_last))]
 
     def begin(
         self,
@@ -228,5 +291,5 @@ class Desk:
 
     def close(self) -> None:
         """Wait for what is being computed, so that nothing is left half; take back what waits."""
-        for pool in (self._pool, self._writers):
+        for pool in (self._pool, self._quick, self._writers):
             pool.shutdown(wait=True, cancel_futures=True)

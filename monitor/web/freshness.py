@@ -26,6 +26,11 @@ _MOST = 256
 Stamp = tuple[int, ...]
 
 
+def differ_by_imports(earlier: Stamp, later: Stamp) -> bool:
+    """Whether nothing but imports was written between two stamps: what they say stands, and lacks the latest."""
+    return (*earlier[:1], *earlier[2:]) == (*later[:1], *later[2:])
+
+
 class Freshness:
     """Counts what was written, and holds answers as long as they are true."""
 

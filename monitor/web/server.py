@@ -6,6 +6,7 @@ import hashlib
 import importlib
 import ipaddress
 import os
+import signal
 import ssl
 import sys
 import tempfile
@@ -53,6 +54,7 @@ class _Server(uvicorn.Server):
 def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
     """Serve a database; returns when it was stopped. Raises NotFoundError, StoreError, InputError before it listens."""
     fingerprint = _checked_certificate(settings)
+    _end_in_order()
     with tempfile.TemporaryDirectory(prefix="monitor-serve-") as folder, ExitStack() as beside:
         working_folder = Path(folder).resolve()
         with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
@@ -84,6 +86,16 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
             _Server(config, listens).run()
             beside.close()
             gate.close()
+
+
+def _end_in_order() -> None:
+    """Let SIGTERM, by which services and containers are stopped, leave through every block, as Ctrl-C does.
+
+    uvicorn ends its work at the signal and then raises it anew, for whoever handled it before: that nobody did would
+    end the process with the database open, its log not brought in, and note and folder left behind.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
 
 
 def _load_ahead() -> None:

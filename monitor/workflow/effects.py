@@ -26,7 +26,7 @@ from monitor.store import Database
 from monitor.workflow.measured import load_measured
 
 # Those that every campaign has, and two channels as examples.
-DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")
+DRIVERS = ("warmup", "settling", "run_time", "ambient_degC", "x_axis_degC")
 DEFAULT_TOPOLOGY = "w C B X b Z Y (C1) t"
 
 

@@ -176,7 +176,8 @@ class BackupAnswer:
     """The copy with its hash, and how many rows it has in all tables.
 
     ``first_entry`` and ``last_entry`` are the entries of the audit that it holds, ``follows`` is the name of the backup
-    that an incremental one follows.
+    that an incremental one follows. Where nothing was new for an incremental one, none was ``made``, and the answer is
+    about the newest backup that is there.
     """
 
     file: Path
@@ -186,6 +187,7 @@ class BackupAnswer:
     first_entry: int
     last_entry: int
     follows: str | None = None
+    made: bool = True
 
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
@@ -199,20 +201,24 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     rows = sum(count for count, _ in copy.tables.values())
     span = copy.span
     assert span is not None  # of those made by this version
-    if span.previous is None:
+    made = copy.path == request.target.name
+    if not made:
+        message = messages.nothing_to_back_up(request.target, copy.path)
+    elif span.previous is None:
         message = messages.backup_made(request.target, len(copy.tables), rows)
     else:
         message = messages.increment_made(
             request.target, (span.first_entry, span.last_entry), rows, span.previous
         )
     return BackupAnswer(
-        file=request.target,
+        file=request.target.with_name(copy.path),
         sha256=copy.sha256,
         rows=rows,
         message=message,
         first_entry=span.first_entry,
         last_entry=span.last_entry,
         follows=span.previous,
+        made=made,
     )
 
 

@@ -64,7 +64,7 @@ function arrows(vectors, list, run, pose) {
 function traces(list, magnification, name, shade, visible) {
   const line = { type: "scatter3d", mode: "lines", name, legendgroup: name, visible, line: { color: shade, width: 5 }, x: [], y: [], z: [], hoverinfo: "skip" };
   const head = { type: "cone", name, legendgroup: name, visible: visible === true, x: [], y: [], z: [], u: [], v: [], w: [], text: [], anchor: "tip",
-    showscale: false, sizemode: "raw", sizeref: 0.35, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
+    showscale: false, sizemode: "raw", sizeref: 0.6, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
   for (const { target, place, vector } of list) {
     const end = place.map((number, axis) => number + magnification * vector[axis]);
     ["x", "y", "z"].forEach((axis, index) => {
@@ -94,10 +94,11 @@ function drawScene(canvas, chart) {
   const effect = scene.effect;
   // The axis whose error it is lights up.
   let data = coloured(chart.data).map((trace) => effect === null || trace.meta !== effect.axis || !trace.meta ? trace
-    : { ...trace, line: { ...trace.line, color: colour("orange"), width: 9 }, textfont: { color: colour("orange"), size: 17 } });
+    : trace.type === "mesh3d" ? { ...trace, color: colour("orange") }
+      : { ...trace, line: { ...trace.line, color: colour("orange"), width: 9 }, textfont: { color: colour("orange"), size: 17 } });
   data = data.concat(traces(arrows(vectors, vectors.residual, run, pose), step, "left by the model", colour("blue"), true));
   if (effect !== null && effect.motion) {
-    chart.data.filter((trace) => effect.motion.axes.includes(trace.meta)).forEach((trace) => data.push({
+    chart.data.filter((trace) => trace.type !== "mesh3d" && effect.motion.axes.includes(trace.meta)).forEach((trace) => data.push({
       ...trace, ...displaced(trace, effect.motion, 1), mode: "lines", text: undefined, hoverinfo: "skip", showlegend: false, meta: undefined,
       line: { color: colour("orange"), width: 4, dash: "dash" },
     }));
@@ -160,13 +161,17 @@ function swing(canvas, lines, effect) {
   scene.frame = requestAnimationFrame(step);
 }
 
+function soon() {
+  return new Promise((then) => { setTimeout(then, 500); });
+}
+
 // The arrows of an effect, asked for once; while they are computed the server is asked again.
 function explained(effect) {
   if (!scene.answers.has(effect)) {
     const address = read("scene-asked") + "&effect=" + encodeURIComponent(effect);
     const ask = () => fetch(address, { credentials: "same-origin" }).then((answer) => {
       if (answer.status === 202) {
-        return ask();
+        return soon().then(ask);
       }
       return answer.ok ? answer.json() : null;
     });
@@ -233,10 +238,42 @@ function prepareScene() {
   }
 }
 
+// The table of all parameters is asked for when somebody scrolls to it; while it is computed the server is asked again.
+function fillLater(section) {
+  const ask = () => fetch(section.dataset.later, { credentials: "same-origin" }).then((answer) => {
+    if (answer.status === 202) {
+      return soon().then(ask);
+    }
+    return answer.ok ? answer.text() : null;
+  });
+  const note = section.querySelector("p");
+  note.className = "waiting";
+  note.textContent = "◔ The table of all parameters is being computed.";
+  ask().then((table) => {
+    if (table === null) {
+      note.className = "quiet";
+      note.textContent = "The table of all parameters could not be had: load the page again.";
+    } else {
+      note.outerHTML = table;
+    }
+  });
+}
+
+function watchLater(section) {
+  const watcher = new IntersectionObserver((entries) => {
+    if (entries.some((entry) => entry.isIntersecting)) {
+      watcher.disconnect();
+      fillLater(section);
+    }
+  });
+  watcher.observe(section);
+}
+
 // A page that waits loads itself again, where one is in it; an address that ends in #scene would not be by its head alone.
 if (document.querySelector("p.waiting") !== null) {
   setTimeout(() => location.reload(), 2000);
 }
+document.querySelectorAll("[data-later]").forEach(watchLater);
 prepareScene();
 drawAll();
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);

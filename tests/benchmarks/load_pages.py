@@ -14,6 +14,7 @@ import http.client
 import io
 import os
 import re
+import shutil
 import statistics
 import subprocess
 import sys
@@ -139,17 +140,23 @@ def importing(port: int, ends: float, counts: Counter[int]) -> None:
         connection.close()
 
 
-def engineer(port: int, seed: int, machines: int, ends: float, pause: float, times: Times) -> None:
-    """Open pages as somebody does who looks for what is urgent, and then at the machine."""
+def engineer(
+    port: int, seed: int, options: argparse.Namespace, ends: float, times: Times, tables: Times
+) -> None:
+    """Open pages as somebody does who looks for what is urgent, and then at the machine; scroll down some of them."""
     draw = np.random.default_rng(seed)
     while time.monotonic() < ends:
-        time.sleep(draw.exponential(pause))
-        machine = f"M{draw.integers(machines):05d}"
+        time.sleep(draw.exponential(options.pause))
+        machine = f"M{draw.integers(options.machines):05d}"
         pages = (
             "/", f"/machine?name={machine}", f"/machine?name={machine}&parameter=EB0C",
             f"/campaign?name={draw.choice(CAMPAIGNS)}", "/campaigns", "/certificates", "/audit", "/import",
         )  # fmt: skip
-        page(port, draw.choice(pages, p=(0.2, 0.25, 0.25, 0.1, 0.05, 0.05, 0.05, 0.05)), times)
+        chosen = str(draw.choice(pages, p=(0.2, 0.25, 0.25, 0.1, 0.05, 0.05, 0.05, 0.05)))
+        page(port, chosen, times)
+        if chosen.startswith("/machine") and draw.random() < options.scrolled:
+            # The table of all parameters, which comes when it is there; it is held, so its time is no page's.
+            page(port, f"/machine/parameters?name={machine}", tables)
 
 
 def told(times: Times) -> None:
@@ -169,14 +176,23 @@ def loads() -> str:
     return f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores"
 
 
-def many(options: argparse.Namespace, folder: Path) -> None:
-    """Many engineers at once while an import runs."""
-    database = folder / "shop.duckdb"
+def _make_shop(database: Path, machines: int) -> None:
     with Database(database, threads=1) as db:
-        generate(db, options.machines, WEEKS)
+        generate(db, machines, WEEKS)
         # The made-up campaigns have no probings that an import could compare itself with.
         db.execute("INSERT INTO run_fingerprint SELECT campaign_id, run, '' FROM run")
         import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
+
+
+def many(options: argparse.Namespace, folder: Path) -> None:
+    """Many engineers at once while an import runs."""
+    database = folder / "shop.duckdb"
+    if options.file is not None and options.file.exists():
+        shutil.copyfile(options.file, database)
+    else:
+        _make_shop(database, options.machines)
+        if options.file is not None:
+            shutil.copyfile(database, options.file)
     print(
         f"{options.machines} machines, {options.machines * WEEKS * 60 / 1e6:.1f} million values; before: {loads()}"
     )
@@ -184,11 +200,11 @@ def many(options: argparse.Namespace, folder: Path) -> None:
         with served(database) as port:
             print(f"cold, turn {turn + 1}: first page {page(port, '/'):.3f} s, again {page(port, '/'):.3f} s")
     with served(database) as port:
-        times, counts = Times(), Counter[int]()
+        times, tables, counts = Times(), Times(), Counter[int]()
         page(port, "/")
         ends = time.monotonic() + options.seconds
         workers = [
-            threading.Thread(target=engineer, args=(port, seed, options.machines, ends, options.pause, times))
+            threading.Thread(target=engineer, args=(port, seed, options, ends, times, tables))
             for seed in range(options.engineers)
         ]
         workers.append(threading.Thread(target=importing, args=(port, ends, counts)))
@@ -200,6 +216,9 @@ def many(options: argparse.Namespace, folder: Path) -> None:
             f"{options.engineers} engineers, pauses of {options.pause:g} s; imports by status: {dict(counts)}"
         )
         told(times)
+        if tables.seconds:
+            print("tables of all parameters, for whoever scrolls down to them")
+            told(tables)
     print(f"afterwards: {loads()}")
 
 
@@ -242,9 +261,12 @@ def main() -> None:
     parser.add_argument("--weeks", type=int, default=52)
     parser.add_argument("--engineers", type=int, default=50)
     parser.add_argument("--pause", type=float, default=3.0)
+    parser.add_argument(
+        "--scrolled", type=float, default=0.3, help="share of machine pages that are scrolled down"
+    )
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--pages", type=int, default=100)
-    parser.add_argument("--file", type=Path)
+    parser.add_argument("--file", type=Path, help="a database of an earlier run; made there where it is not")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="monitor-load-") as folder:
         (many if options.what == "many" else large)(options, Path(folder))

@@ -36,7 +36,8 @@ from monitor.effects import parse_effect
 from monitor.effects.catalogue import catalogue
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Verdict
-from monitor.workflow.uncertainty.lack_in_budget import LEVEL, MOST_OF_THE_REST
+from monitor.workflow.history.refuted import REFUTED_P
+from monitor.workflow.uncertainty.lack_in_budget import MOST_OF_THE_REST
 
 ROOT = Path(__file__).resolve().parents[2]
 empty = load("trial_empty", ROOT / "tests" / "benchmarks" / "trial_empty.py")
@@ -121,7 +122,7 @@ class Ground:
         fit = self.with_residual(self.plan.noisy(noise), np.zeros(self.plan.fit.solution.last.residual.shape))
         p_value = beyond_neighbours(fit)
         missing = compare(fit, "", "").verdict is Verdict.SOMETHING_IS_MISSING
-        if not (missing if p_value is None else p_value < LEVEL):
+        if not (missing if p_value is None else p_value < REFUTED_P):
             return False, False
         line = model_uncertainty(fit, len(fit.problem.runs) - 1, self.variants)
         if line is None:
@@ -141,7 +142,7 @@ class Ground:
             p_value = beyond_neighbours(fit)
             # Without repeated runs the verdict of `compare` stands in.
             missing = compare(fit, "", "").verdict is Verdict.SOMETHING_IS_MISSING
-            refused = missing if p_value is None else p_value < LEVEL
+            refused = missing if p_value is None else p_value < REFUTED_P
         return refused, times, K_Q * np.sqrt(rest + extra)
 
 

@@ -55,6 +55,15 @@ def test_an_incremental_backup_and_a_moment_as_typed(typed: Any, db: Path, tmp_p
     assert typed("event", "HU40-T", "a crash", "--at", "2026-03-05", db=db).status == 0
     said = typed("backup", folder / "second.duckdb", "--incremental", db=db).out
     assert f"entries {len(before) + 1} to {len(before) + 1} of the audit, 2 rows since first.duckdb" in said
+    nothing = typed("backup", folder / "third.duckdb", "--incremental", db=db)
+    assert nothing.status == 0
+    assert (
+        f"nothing is new since second.duckdb, the newest backup there; {folder / 'third.duckdb'} was not made"
+        in (nothing.out)
+    )
+    document = typed("backup", folder / "third.duckdb", "--incremental", "--json", db=db).document
+    assert (document["made"], Path(document["file"]).name) == (False, "second.duckdb")
+    assert not (folder / "third.duckdb").exists()
     at = before[0]["made_at"]
     early = typed("restore", folder, "--at", at, "--json", db=tmp_path / "early.duckdb")
     assert (early.status, early.document["last_entry"], early.document["faults"]) == (0, len(before), [])

@@ -44,7 +44,7 @@ def test_a_moment_without_offset_is_the_time_of_this_computer(text: str, read: s
 
 
 @pytest.mark.parametrize(
-    "text", ["", "soon", "20250720", "2025-W10-1", "20.07.2025", "2025-02-30", "2025-07-20 25:00"]
+    "text", ["", "soon", "20250720", "2025-W10-1", "20.07.2025"]
 )
 def test_what_is_no_moment_is_refused_with_forms_that_are_read(text: str) -> None:
     with pytest.raises(InputError, match=re.escape(f"--at {text}: write a day or a time as")) as refusal:
@@ -53,6 +53,20 @@ def test_what_is_no_moment_is_refused_with_forms_that_are_read(text: str) -> Non
     assert len(proposed) == 3
     for form in proposed:
         assert moment(form, "--at").tzinfo is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("2025-02-30", "day"),
+        ("2025-13-01", "month"),
+        ("2025-07-20 25:00", "hour"),
+        ("2025-07-20 14:61", "minute"),
+    ],
+)
+def test_a_day_that_no_calendar_has_is_not_answered_with_the_form_that_it_has(text: str, why: str) -> None:
+    with pytest.raises(InputError, match=re.escape(f"--at {text}: there is no such day or time, {why}")):
+        moment(text, "--at")
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,23 @@ def test_a_wrong_reading_of_a_ball_is_the_one_that_is_named(virtual_campaigns, s
         assert np.abs(difference).max() < 1e-9
 
 
+@pytest.mark.parametrize("off", [0.015, 0.03])
+def test_a_touch_that_every_run_reads_off_alike_is_no_wrong_reading(virtual_campaigns, off):
+    """An error of the machine at one pose; in one run alone, or half a millimetre off in all, it is a mistake."""
+    campaign = virtual_campaigns.virtual(5, days=1, runs_per_day=4, noise_um=1.0)[0]
+    in_every_run = np.flatnonzero(campaign.probings.sequence == 29)
+    everywhere, far = campaign, campaign
+    for row in in_every_run.tolist():
+        everywhere = wrong.with_wrong_reading(everywhere, row, "X", off)
+        far = wrong.with_wrong_reading(far, row, "X", 0.5)
+    assert robust_fit(problem_of(everywhere)).gross == ()
+    assert gross_readings(problem_of(everywhere)) == ()
+    assert [reading.row for reading in robust_fit(problem_of(far)).gross] == in_every_run.tolist()
+    row = int(in_every_run[2])
+    alone = robust_fit(problem_of(wrong.with_wrong_reading(campaign, row, "X", 2.0 * off)))
+    assert [reading.row for reading in alone.gross] == [row]
+
+
 @pytest.mark.parametrize("off", [5.0, -5.0, 50.0])
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])
 def test_a_touch_that_stands_apart_is_named_by_the_reading_that_is_wrong_along_the_surface_too(axis, off):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import Fit, fit
+from monitor.discovery import Fit, explain, fit
 from monitor.discovery.machine.evidence.held_out import LeftOutBlocks, pose_blocks
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.joints.joint_curves import joint_curves
@@ -143,3 +143,25 @@ def test_rows_of_another_machine_or_target_are_not_predicted(campaign):
 def test_orders_that_are_none_are_refused(plain, orders):
     with pytest.raises(EffectError, match="must be periods a turn, above 0 and rising"):
         parse_effect(f"ECJ1:harmonics({orders})", plain.problem.context.chain)
+
+
+def test_a_single_line_of_a_joint_is_named_beside_the_curve_of_another(robots, tmp_path):
+    """The search beside curves looks for no lines: one of J5 was lost where J1 had two."""
+    scene = robots.Scene(
+        softness={"J2": 8e-6},
+        curves={
+            "J1": [robots.Line(1, 90e-6, 0.3), robots.Line(2, 60e-6, 1.0)],
+            "J5": [robots.Line(100, 90e-6, 0.2)],
+        },
+    )
+    session = robots.measure(np.random.default_rng(9), scene, poses=260, fixed_every=30)
+    campaign = read_campaign(robots.write_session(tmp_path / "robot", session))
+    answer = explain(campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(0))
+    named = [effect.effect for effect in answer.missing]
+    assert set(named) - {"EBJ2:compliance@gravity", "EBJ2:compliance@link_weights"} == {
+        "ECJ1:harmonics(1,2)",
+        "EBJ5:harmonic100",
+    }
+    assert len(named) == 3
+    (line,) = [effect for effect in answer.missing if effect.effect == "EBJ5:harmonic100"]
+    assert abs(line.amplitude - 90e-6) < 4.0 * line.u

@@ -177,18 +177,20 @@ def test_a_slight_step_or_bump_is_the_error_of_its_axis(virtual_campaigns, trial
     assert found.effect.partition(":")[0] in right
 
 
-def test_steps_stand_behind_all_other_parts_of_a_free_shape(virtual_campaigns):
-    """Names that are stored keep their numbers; one step lies in the middle between every two hats of linear axes."""
+def test_later_parts_of_a_free_shape_stand_behind_the_earlier_ones(virtual_campaigns):
+    """Names that are stored keep their numbers: behind those of the first versions come one step in the middle between
+    every two hats of linear axes, then play of three widths and the rows before an axis first moves."""
     campaign, _ = virtual_campaigns.virtual(1, days=1, runs_per_day=2, noise_um=0.0)
     context = problem_of(campaign).context
     for joint, axis in enumerate(context.chain.joints):
         basis = flexible_basis(context, joint)
         position = context.places[:, joint]
+        np.testing.assert_array_equal(basis[:, -1], context.travel[:, joint] == 0.0)
         if axis.turns or not np.ptp(position):
             np.testing.assert_allclose(basis[:, 0], np.cos(position) / np.abs(np.cos(position)).max())
             continue
         nodes = np.linspace(position.min(), position.max(), 12)
-        hats, steps = basis[:, :12], basis[:, -11:]
+        hats, steps = basis[:, :12], basis[:, -15:-4]
         for number, (left, right) in enumerate(pairwise(nodes)):
             inside = np.abs(position - left) < 0.2 * (right - left)
             assert np.all(hats[inside, number] > 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from monitor.effects import Context, context_of, parse_effect, positions_of, with_time_constant
+from monitor.effects.catalogue import drivers_of
 from monitor.exceptions import DataError, EffectError
 from monitor.machine import parse_topology
 from monitor.records import Array, Artefact, Ball, Campaign, Machine, Probe, Probings, Run
@@ -74,6 +76,24 @@ def test_warmup_without_a_constant_starts_at_one_hour(make: Callable[..., Contex
     fixed = with_time_constant(searched, 1800.0)
     assert fixed.text == "EZC1:const@warmup"
     assert fixed.basis(context).columns[0, 0] == pytest.approx(0.8646647167633873, rel=1e-14)  # type: ignore[union-attr]
+
+
+def test_settling_begins_anew_with_every_run() -> None:
+    context = context_of(small_campaign(), parse_topology(HU40))
+    expected = np.tile([0.016528546178382446, 0.16750938738839732, 0.2953119102812866], 4)
+    np.testing.assert_allclose(columns("EZC1:const@settling10min", context).ravel(), expected, rtol=1e-12)
+    searched = columns("EZC1:const@settling", context)
+    np.testing.assert_array_equal(searched, columns("EZC1:const@settling10min", context))
+    with pytest.raises(EffectError, match=re.escape("the time constant of @settling must be above 0 min")):
+        parse_effect("EZC1:const@settling0min", context.chain)
+
+
+def test_settling_is_a_driver_where_a_day_has_several_runs() -> None:
+    campaign = small_campaign()
+    assert "settling" in drivers_of(context_of(campaign, parse_topology(HU40)))
+    first = campaign.probings.rows((campaign.probings.run == 1) | (campaign.probings.run == 3))
+    alone = context_of(replace(campaign, probings=first), parse_topology(HU40))
+    assert "settling" not in drivers_of(alone)
 
 
 def test_warmup_counts_from_the_first_run_of_each_day() -> None:

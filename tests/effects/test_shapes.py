@@ -180,7 +180,7 @@ def test_names_of_the_coefficients(make: Callable[..., Context], text: str, name
         ("EXX:poly1@", "'EXX:poly1@' ends in @ without a driver; write for example EXX:poly1@warmup"),
         (
             "EXX:poly1@sunshine",
-            "there is no driver '@sunshine'; there are @warmup (or @warmup45min), @run_time",
+            "there is no driver '@sunshine'; there are @warmup (or @warmup45min), @settling, @run_time",
         ),
         ("EXX:poly1@warmup0min", "the time constant of @warmup must be above 0 min"),
         ("EXX:poly1@warmup-5min", "there is no driver '@warmup-5min'"),
@@ -192,6 +192,20 @@ def test_names_of_the_coefficients(make: Callable[..., Context], text: str, name
 def test_refusals_say_what_would_be_right(text: str, words: str) -> None:
     with pytest.raises(EffectError, match=re.escape(words)):
         parse_effect(text, CHAIN)
+
+
+def test_a_drive_that_is_wound_up_follows_once_its_width_is_used_up(make: Callable[..., Context]) -> None:
+    """A width of 20 mm, 10 mm on each side: out, back by half of it, back by the whole, on, and anew in another run."""
+    positions = [0.0, 10.0, 20.0, 15.0, 10.0, 0.0, -10.0, -5.0, 5.0]
+    context = make({"X": positions}, run=[1] * 8 + [2])
+    expected = [0.0, 1.0, 1.0, 0.5, 0.0, -1.0, -1.0, -0.5, 0.5]
+    np.testing.assert_allclose(columns("EXX:windup20mm", context).ravel(), expected, atol=1e-12)
+    with pytest.raises(
+        EffectError, match=re.escape("a width in mm belongs to a linear axis; for B write reversal")
+    ):
+        parse_effect("EBB:windup20mm", CHAIN)
+    with pytest.raises(EffectError, match=re.escape("the width of windup0mm must be above 0 mm")):
+        columns("EXX:windup0mm", context)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -11,12 +12,15 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import EffectError
+from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
-from monitor.methods.samba.method import METHOD as samba
+from monitor.methods.samba.method import METHOD as samba, problem_of
+from monitor.readers import read_campaign
 from monitor.records import Array
 from monitor.reporting.refused import refusal_sentence
 
 Distance = Callable[[Array, Array], float]
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_added_effects_are_recovered_with_the_right_covariance(
@@ -82,3 +86,19 @@ def test_a_model_names_an_effect_once(simulated: Callable[..., Any]) -> None:
     campaign = simulated(1)[1]
     with pytest.raises(EffectError, match="model twice has EA0B already; name an effect once"):
         samba.identify(campaign, Model("twice", added=("EA0B:const",)))
+
+
+def test_a_time_constant_that_no_reading_shows_is_held_and_the_effect_keeps_its_size() -> None:
+    """Where no search for a time constant settles, the size is that of the effect with the held one, to 1e-6 of its
+    standard uncertainty; before, the model could not be fitted, although `explain` may have named the effect."""
+    campaign = read_campaign(EXAMPLES / "nothing-hidden")
+    driver = "y_axis_degC"
+    searching = solve_problem(problem_of(campaign, Model("late", added=(f"EBX:const@lagged_{driver}",))))
+    assert searching.common_free.tolist() == [True, False]
+    minutes = float(np.exp(searching.common[1])) / 60.0
+    fixed = solve_problem(
+        problem_of(campaign, Model("late", added=(f"EBX:const@lagged{minutes:.6f}min_{driver}",)))
+    )
+    u = float(np.sqrt(fixed.common_covariance[0, 0]))
+    assert abs(searching.common[0] - fixed.common[0]) < 1e-6 * u
+    assert np.isclose(np.sum(searching.last.residual**2), np.sum(fixed.last.residual**2), rtol=1e-12)

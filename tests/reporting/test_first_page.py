@@ -13,6 +13,7 @@ import pytest
 
 from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
+from monitor.reporting.health.comparison import MissingEffect, ModelHealth
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -255,3 +256,61 @@ def test_a_narrow_screen_gets_one_column_with_the_names_of_the_cells() -> None:
     assert "max-width: 700px" in html
     assert 'data-name="Next check"' in html
     assert 'name="viewport"' in html
+
+
+def due(name: str = "Mitsui", parameter_name: str = "EC0Y") -> MachineHealth:
+    """Near its limit and growing: in tolerance when it was measured, and by now perhaps not."""
+    check = NextCheck(CheckKind.PASSED, parameter_name, date(2026, 3, 7), 200.0)
+    return machine(
+        name, "in tolerance", parameter(parameter_name, value=18.0), probability_out=0.01, next_check=check
+    )
+
+
+def test_a_machine_that_its_drift_may_have_taken_out_is_not_fine_but_due() -> None:
+    week, pages = fleet(GOOD, due(), AWAY)
+    sentences = {answer.kind: answer.sentence for answer in answers(week)}
+    assert sentences["worst"] == "None: no machine that was measured needs attention."
+    assert sentences["fine"] == "1 of 3 machines: Good."
+    assert sentences["do"] == (
+        "Measure again now: Mitsui (EC0Y stayed in tolerance with 95 % until 2026-03-07 only); the others as planned."
+    )
+    assert [row.machine for row in week.rows] == ["Away", "Mitsui", "Good"]
+    page = " ".join(pypdf.PdfReader(io.BytesIO(health_pdf(week, pages))).pages[0].extract_text().split())
+    assert "◔ Mitsui: due for a check" in page
+    assert "grows by 4.00 µrad a month, so that it reaches its tolerance about 2026-03-21." in page
+    assert (
+        "What to do: Measure it again now, EC0Y stayed in tolerance with 95 % until 2026-03-07 only." in page
+    )
+    # Beside a machine with which something is wrong it is named as well.
+    week, _ = fleet(DRIFTED, due(), due("Okuma"))
+    sentences = {answer.kind: answer.sentence for answer in answers(week)}
+    assert sentences["do"] == (
+        "Adjust or compensate squareness X-Y (EC0Y) and measure again now; measure again now as well: Mitsui, Okuma."
+    )
+
+
+def test_what_the_model_lacks_is_why_a_machine_may_be_out() -> None:
+    effect = MissingEffect(
+        "EXX:reversal", "positioning of X, jumping", "backlash", "Check the nut of X.", 6.0, None, None, ()
+    )
+    model = ModelHealth(
+        "c", "runs", "samba", "something is missing", "it lacks one", 2.5, 1.0, 28.0, 1e-5, (effect,), 1.0, None, None,
+        (),
+    )  # fmt: skip
+    wide = replace(parameter(value=-8.0, per_month=0.0), expanded=22.0, probability_out=0.075)
+    week, _ = fleet(machine("Makino", "may be out of tolerance", wide, probability_out=0.09, model=model))
+    sentences = {answer.kind: answer.sentence for answer in answers(week)}
+    assert sentences["why"].endswith(
+        "; the model lacks positioning of X, jumping (EXX:reversal), and its lack of fit is part of what is uncertain."
+    )
+    assert sentences["do"] == "Check the nut of X; then measure again now."
+
+
+def test_a_stated_u_wider_than_the_scatter_of_its_run_is_drawn_with_ends() -> None:
+    plain = parameter()
+    assert "with ends: U" not in trend_picture("M", plain)
+    # u holds lack of fit, which the readings of single runs do not.
+    wide = replace(plain, u=6.0, expanded=20.0)
+    drawn = trend_picture("M", wide)
+    assert "bars: scatter; with ends: U" in drawn
+    assert drawn.count("h18") == 2

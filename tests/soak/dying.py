@@ -86,6 +86,27 @@ def _arm(death: Death) -> None:
 
 def forked(function: Callable[[], tuple[int, str]], death: Death | None = None) -> tuple[int, str, Effort]:
     """Run a function in a process of its own; its status (of ``KILLED`` where it died), words and effort."""
+    return started(function, death).ended()
+
+
+@dataclass(frozen=True)
+class Child:
+    """A process that runs a function; ``reader`` is where its words come from."""
+
+    pid: int
+    reader: int
+
+    def ended(self) -> tuple[int, str, Effort]:
+        """Wait for its end; its status, words and effort."""
+        with os.fdopen(self.reader, "rb") as words_of_child:
+            numbers, _, said = words_of_child.read().decode(errors="replace").partition("\n")
+        _, status = os.waitpid(self.pid, 0)
+        calls, processor_s = numbers.split() if numbers else ("0", "0")
+        return os.waitstatus_to_exitcode(status), said, Effort(int(calls), float(processor_s))
+
+
+def started(function: Callable[[], tuple[int, str]], death: Death | None = None) -> Child:
+    """Start a function in a process of its own."""
     reader, writer = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -106,8 +127,4 @@ def forked(function: Callable[[], tuple[int, str]], death: Death | None = None) 
         os.write(writer, message[:60000])
         os._exit(status)
     os.close(writer)
-    with os.fdopen(reader, "rb") as words_of_child:
-        numbers, _, said = words_of_child.read().decode(errors="replace").partition("\n")
-    _, ended = os.waitpid(pid, 0)
-    calls, processor_s = numbers.split() if numbers else ("0", "0")
-    return os.waitstatus_to_exitcode(ended), said, Effort(int(calls), float(processor_s))
+    return Child(pid, reader)

@@ -33,7 +33,8 @@ from monitor.store import (
 )
 from monitor.store.entries import OTHERWISE, SOURCES
 from monitor.store.lake.reading import LakeDatabase
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 

@@ -6,6 +6,7 @@ import gzip
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -114,7 +115,8 @@ def test_every_backup_of_a_chain_is_the_database_of_its_moment(
     restore(folder, tmp_path / "newest.duckdb")
     with Database(tmp_path / "newest.duckdb") as db:
         assert tables(db) == states[2][1]
-        assert take_increment(db, folder / "3.duckdb").tables["audit"] == (0, "0")
+        record_event(db, "MILL 0", datetime(2026, 6, 1, tzinfo=UTC), "crash", "x")
+        assert take_increment(db, folder / "3.duckdb").tables["audit"][0] == 1
     assert sorted(path.name for path in tmp_path.glob("*.partial*")) == []
 
 
@@ -145,6 +147,32 @@ def test_an_incremental_backup_holds_only_what_is_new(
     assert {table: rows for table, (rows, _) in backup.span.totals.items()} == {
         table: len(rows) for table, rows in states[1][1].items()
     }
+
+
+def test_where_nothing_is_new_no_file_is_made_and_the_newest_backup_says_so(
+    weeks: tuple[Path, list[State]], path: Path, tmp_path: Path
+) -> None:
+    folder, states = weeks
+    before = list_backups(folder)
+    files = sorted(file.name for file in folder.iterdir())
+    with Database(path) as db:
+        backup = take_increment(db, folder / "3.duckdb")
+    moment = datetime.now(UTC)
+    assert sorted(file.name for file in folder.iterdir()) == files
+    assert replace(backup, current_at=None) == before[-1]
+    # What was so at that moment is known now, and still refused of a later one.
+    assert backup.current_at is not None
+    known = datetime.fromisoformat(backup.current_at).replace(tzinfo=UTC)
+    restored = restore(folder, tmp_path / "back.duckdb", known)
+    assert restored.faults == ()
+    with Database(tmp_path / "back.duckdb") as db:
+        assert tables(db) == states[2][1]
+    with pytest.raises(InputError, match=r"is later than the newest backup in .*, which holds all until"):
+        restore(folder, tmp_path / "later.duckdb", moment + timedelta(seconds=1))
+    # And it goes on from there.
+    with Database(path) as db:
+        record_event(db, "MILL 0", datetime(2026, 6, 1, tzinfo=UTC), "crash", "x")
+        assert take_increment(db, folder / "3.duckdb").tables["audit"][0] == 1
 
 
 def test_a_chain_that_is_not_whole_is_refused(weeks: tuple[Path, list[State]], tmp_path: Path) -> None:

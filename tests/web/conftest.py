@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -40,6 +41,12 @@ class Served:
             f"/api/v1/{question.replace(' ', '-')}", json=document or {}, headers=headers
         )
         return answer.status_code, answer.json()
+
+    def sent(self, path: str, **form: Any) -> Any:
+        """The page that a form which was sent leads to: every form is answered with its address."""
+        answer = self.client.post(path, **form)
+        assert answer.status_code == 303, answer.text[-2000:]
+        return self.client.get(answer.headers["location"])
 
     def proof(self, page: str = "/import") -> str:
         """The proof that the forms of the client's session carry."""

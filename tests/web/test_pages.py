@@ -140,7 +140,20 @@ def test_residuals_by_driver_are_the_residuals_in_groups(local: Any, residuals: 
 def test_the_machine_is_drawn_as_its_topology_says(residuals: dict[str, Any]) -> None:
     """Every axis has a line along its direction; the arc of a rotary one lies across it, all at one distance."""
     answer = from_document(ResidualsAnswer, residuals)
-    traces = machine_traces(answer)
+    every = machine_traces(answer)
+    traces = [trace for trace in every if trace["type"] == "scatter3d"]
+    bodies = [trace for trace in every if trace["type"] == "mesh3d"]
+    # The table is what the workpiece is clamped to, and the spindle has its nose.
+    assert [body["meta"] for body in bodies] == ["C", "C1"]
+    for body in bodies:
+        axis = next(axis for axis in answer.machine if axis.name == body["meta"])
+        line = next(trace for trace in traces if trace["meta"] == axis.name)
+        points = np.array([body[name] for name in "xyz"])
+        corners = np.array([body[name] for name in "ijk"])
+        assert 0 <= corners.min() <= corners.max() == points.shape[1] - 1
+        # A surface about the axis: the middle of its corners lies on it.
+        from_line = points.mean(axis=1) - np.array([line[name][0] for name in "xyz"])
+        assert np.linalg.norm(np.cross(from_line, axis.direction)) == pytest.approx(0.0, abs=0.05)
     for axis in answer.machine:
         own = [
             np.array([trace[name] for name in "xyz"]) for trace in traces if trace.get("meta") == axis.name
@@ -251,9 +264,7 @@ def test_a_certificate_is_refused_at_its_boxes(local: Any) -> None:
         "authorised_by.0.name",
     ]
     form = {"proof": local.proof(), "campaign": CAMPAIGN, "run": "20", **texts}
-    answer = local.client.post(
-        "/certificate/new", data={**form, **dict.fromkeys(open_boxes, ""), "button": "issue"}
-    )
+    answer = local.sent("/certificate/new", data={**form, **dict.fromkeys(open_boxes, ""), "button": "issue"})
     assert answer.status_code == 400
     assert "5 items are missing" in answer.text
     for box in open_boxes:
@@ -276,25 +287,25 @@ def test_a_certificate_is_issued_amended_and_withdrawn_by_form(
     texts = texts_of_file((EXAMPLES / "laboratory.toml").read_bytes())
     form = {"proof": served.proof(), "campaign": CAMPAIGN, "run": "20", **texts}
     accepted = {"accept.lack-of-fit": "the spindle was warming up; known to the customer"}
-    preview = served.client.post("/certificate/new", data={**form, **accepted, "button": "preview"})
+    preview = served.sent("/certificate/new", data={**form, **accepted, "button": "preview"})
     if preview.status_code != 200:
         # Only a ground that is there may be accepted.
         accepted = {}
-        preview = served.client.post("/certificate/new", data={**form, "button": "preview"})
+        preview = served.sent("/certificate/new", data={**form, "button": "preview"})
     assert "nothing was issued, and nothing stored" in preview.text
     assert served.client.get("/certificate/preview.pdf").content.startswith(b"%PDF")
     assert served.ask("certificates")[1]["certificates"] == []
     assert served.ask("verify")[0] == 200
-    issued = served.client.post("/certificate/new", data={**form, **accepted, "button": "issue"})
+    issued = served.sent("/certificate/new", data={**form, **accepted, "button": "issue"})
     number = re.findall(r"Certificate (\S+) is issued", issued.text)[0]
     pdf = served.client.get(f"/certificate.pdf?number={number}")
     assert pdf.content.startswith(b"%PDF")
-    amended = served.client.post(
+    amended = served.sent(
         "/certificate/new",
         data={**form, **accepted, "button": "issue", "replaces": number, "reason": "a letter was wrong"},
     )
     successor = re.findall(r"Certificate (\S+) is issued", amended.text)[0]
-    verified = served.client.post(
+    verified = served.sent(
         "/certificates/verify", data={"proof": form["proof"]}, files={"file": ("c.pdf", pdf.content)}
     )
     assert "This file does not hold" in verified.text

@@ -37,7 +37,7 @@ def test_a_workbook_of_excel_is_imported_and_refused_at_its_cells(
         files = [("file", ("campaign.xlsx", packed.getvalue()))]
         if with_toml:
             files.append(("file", ("campaign.toml", (folder / "campaign.toml").read_bytes())))
-        return served.client.post("/import", data={"proof": served.proof()}, files=files)
+        return served.sent("/import", data={"proof": served.proof()}, files=files)
 
     with (folder / "probings.csv").open(encoding="utf-8") as stream:
         column = next(csv.reader(stream)).index("x_mm") + 1
@@ -66,11 +66,11 @@ def test_an_address_that_lacks_a_part_is_refused_as_a_page(local: Any) -> None:
 def test_an_upload_is_refused_without_a_folder_of_the_server(local: Any) -> None:
     proof = {"proof": local.proof()}
     files = [("file", ("campaign.toml", (EXAMPLES / "five-days/campaign.toml").read_bytes()))]
-    lacking = local.client.post("/import", data=proof, files=files)
+    lacking = local.sent("/import", data=proof, files=files)
     assert lacking.status_code == 422
     assert "the upload was refused" in lacking.text
     assert str(lacking.text).count("tmp") == 0
-    torn = local.client.post("/import", data=proof, files=[("file", ("c.zip", b"hello"))])
+    torn = local.sent("/import", data=proof, files=[("file", ("c.zip", b"hello"))])
     assert "c.zip is no zip that can be read; pack the folder again" in torn.text
 
 
@@ -95,7 +95,7 @@ def test_files_of_instruments_are_looked_at_with_their_mapping_and_then_imported
     def sent(button: str, mapping: bytes = mapping) -> Any:
         fields = {"proof": served.proof(), "campaign": "week-12", "button": button}
         both = [*files, ("mapping", ("shop.toml", mapping))]
-        return served.client.post("/import", data=fields, files=both)
+        return served.sent("/import", data=fields, files=both)
 
     before = served.db.rows("SELECT count(*) FROM campaign")
     looked = sent("look")
@@ -116,7 +116,7 @@ def test_files_of_instruments_are_looked_at_with_their_mapping_and_then_imported
 
 
 def test_a_mapping_without_files_is_refused(local: Any) -> None:
-    answer = local.client.post(
+    answer = local.sent(
         "/import", data={"proof": local.proof()}, files=[("mapping", ("mapping.toml", _exports()[1]))]
     )
     assert answer.status_code == 400

@@ -19,7 +19,8 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_elements import DCC
-from monitor.reporting.certificate.record import CertificateRecord, Replaced, Signer
+from monitor.reporting.certificate.record import CertificateRecord, Replaced
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import SignatureFinding, check_signature
 from monitor.reporting.signature.signing import FileKey, sign

@@ -33,7 +33,7 @@ from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateFileRequest, CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.results import results_of
-from monitor.workflow.certificate.states import write_digital
+from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import RunUncertainty

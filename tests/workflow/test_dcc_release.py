@@ -16,7 +16,7 @@ from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateFileRequest, CertificateRequest, RemakeRequest
-from monitor.workflow.certificate.states import write_digital
+from monitor.workflow.certificate.digital import write_digital
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

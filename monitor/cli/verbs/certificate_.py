@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 from monitor.cli import output
@@ -12,6 +13,7 @@ from monitor.cli.database import ask, opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
+from monitor.reporting.signature.long_term import LongTermMaterial
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
     CertificatesAnswer,
@@ -32,11 +34,8 @@ from monitor.workflow.certificate.request import (
 from monitor.workflow.certificate.states import (
     list_certificates,
     show_certificate,
-    write_digital,
-    write_digital_page,
     write_issued,
 )
-from monitor.workflow.certificate.template import TemplateRequest, write_template
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
@@ -188,24 +187,32 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
     return 0
 
 
+def _writer(option: str) -> Callable[..., CertificateFileAnswer]:
+    """What writes the file of an option; who verifies or lists certificates waits for no digital one."""
+    if option == "--pdf":
+        return write_issued
+    from monitor.workflow.certificate.digital import write_digital, write_digital_page
+
+    return write_digital if option == "--dcc" else write_digital_page
+
+
 def _show(options: Namespace) -> int:
     files = (
-        ("--dcc", options.dcc, write_digital),
-        ("--dcc-html", options.dcc_html, write_digital_page),
-        ("--pdf", options.pdf, write_issued),
+        ("--dcc", options.dcc),
+        ("--dcc-html", options.dcc_html),
+        ("--pdf", options.pdf),
     )
-    writing = (("--remake", options.remake), *((option, path) for option, path, _ in files))
-    for option, path in writing:
+    for option, path in (("--remake", options.remake), *files):
         if path is not None and options.number is None:
             raise InputError(
                 f"{option} needs the number of a certificate; `monitor certificate show` lists them"
             )
     if options.remake is not None:
         return _remake(options)
-    for _, path, write in files:
+    for option, path in files:
         if path is not None:
             with opened(options) as db:
-                written = ask(db, write, CertificateFileRequest(options.number, path))
+                written = ask(db, _writer(option), CertificateFileRequest(options.number, path))
             output.document(written) if options.json else output.say(written.file)
             return 0
     with opened(options) as db:
@@ -253,6 +260,8 @@ def _verify(options: Namespace) -> int:
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
     if answer.stamped_at is not None:
         output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
+    if answer.long_term is not None:
+        output.say(f"           {_long_term(answer.long_term)}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"
@@ -260,6 +269,19 @@ def _verify(options: Namespace) -> int:
     if answer.verdict is Verdict.SIGNER_NOT_TRUSTED:
         output.say(f"signature intact, signer not trusted: fingerprint {answer.signer_sha256}")
     return 0 if answer.ok else 1
+
+
+def _long_term(material: LongTermMaterial) -> str:
+    """Say what a file carries for its later validation, and whether it suffices."""
+    counted = (
+        f"long-term material: {material.certificates} certificates, {material.revocation_lists} revocation lists, "
+        f"{material.answers} answers (OCSP)"
+    )
+    if material.complete is None:
+        return f"{counted}; not judged: --trust names no certificates"
+    if not material.complete:
+        return f"{counted}; it does NOT suffice: {material.why_not}"
+    return f"{counted}; by these alone signer and time stamp lead to trusted certificates in force then"
 
 
 #: What is said of a file. The database may have been rewritten as a whole, and anybody can make a key: neither
@@ -284,6 +306,8 @@ def _say_checks(answer: VerificationAnswer) -> None:
 
 
 def _template(options: Namespace) -> int:
+    from monitor.workflow.certificate.template import TemplateRequest, write_template
+
     answer = write_template(
         TemplateRequest(options.out, options.language or configuration().language or "en")
     )

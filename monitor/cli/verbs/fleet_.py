@@ -12,8 +12,8 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
-from monitor.reporting.messages import attention_words
-from monitor.workflow.fleet.answer import FleetTableRow
+from monitor.reporting.messages import attention_words, machines_refuted
+from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
 
@@ -60,8 +60,7 @@ def run(options: Namespace) -> int:
             "slopes allow for days that resemble each other: their intervals are up to "
             f"{widest:.2g} times as wide as with independent days"
         )
-    for machine, name in (answer.tolerances_of_type or {}).items():
-        output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
+    _say_of_machines(answer)
     if answer.weekly_looks is not None:
         from monitor.cli.trend_output import weekly_lines
 
@@ -76,6 +75,15 @@ def run(options: Namespace) -> int:
             f"type `monitor identify {answer.not_identified[0]}`"
         )
     return 0
+
+
+def _say_of_machines(answer: FleetAnswer) -> None:
+    """Say of whole machines where their limits come from, and whose readings refute their model."""
+    for machine, name in (answer.tolerances_of_type or {}).items():
+        output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
+    if answer.models_refuted:
+        latest = {machine: refuted.campaign for machine, refuted in answer.models_refuted.items()}
+        output.say(machines_refuted(latest, MOST_NAMED))
 
 
 def _cells(row: FleetTableRow) -> list[str]:

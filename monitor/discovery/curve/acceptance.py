@@ -22,6 +22,8 @@ from monitor.records import Array
 
 #: Fewer cycles than these over the range of an input can be a bend.
 MOST_BENDS = 2.0
+#: A knee has to say more than a polynomial by twice the logarithm of 20: most bends of instruments are smooth.
+KNEE_MARGIN = 6.0
 #: Two periods of one input are separated from a whole cycle over its range on (Rayleigh's criterion).
 APART = 1.0
 #: An effect that stands out of the noise by itself has to be likelier than noise alone at this level too.
@@ -179,8 +181,8 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         return _remainder(fit.problem.curve.measured[rows], columns)
 
     def _is_a_bend(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
-        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential or a step: then
-        it is the simpler answer and has its turn."""
+        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential, a step or
+        a knee: then it is the simpler answer and has its turn."""
         effect = candidate.effect
         if effect.shape not in SEARCHED:
             return False
@@ -194,7 +196,8 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
             squares, rank = self._remainder([*selected, last])
             price = (rank + (last is effect)) * np.log(count)
             criteria.append(count * np.log(max(squares, 1e-300)) + price)
-        return bool(min(criteria[1:]) <= criteria[0])
+        margin = KNEE_MARGIN if effect.shape == "knee" else 0.0
+        return bool(min(criteria[1:]) <= criteria[0] + margin)
 
     def _lowers_bic(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
         """Whether Schwarz's criterion of ordinary least squares falls: an effect that only shows in whitened rows

@@ -13,7 +13,7 @@ from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
-from monitor.effects.curve import CurveEffect, group_names
+from monitor.effects.curve import PLACED, CurveEffect, group_names
 from monitor.methods.curve.catalogue import catalogue
 from monitor.methods.curve.problem import SHORTEST_CONSTANT, CurveProblem, grid
 from monitor.records import Array
@@ -97,7 +97,7 @@ def at_best_value(scene: CurveScene, selected: Sequence[CurveCandidate], index: 
     effect = candidate.effect
     if not effect.free:
         return candidate
-    if effect.shape == "step" or effect.value is None:
+    if effect.shape in PLACED or effect.value is None:
         return _with_value(candidate, effect)
     curve, tries = scene.curve, candidate.variant.tries
     others = scene.columns(except_for(selected, index))

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from monitor.discovery.search.held_out import folds_of, held_out_rms
+from monitor.effects.curve import PLACED
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.solver import inverse_normal
 from monitor.records import Array
@@ -48,7 +49,7 @@ def allowed_for(fitted: CurveFit, noise: Assessed) -> Array:
 def inflation(fitted: CurveFit, noise: Assessed, index: int) -> float:
     """Factor by which correlated noise widens the standard uncertainty of the searched value of the effect at an
     index."""
-    free = [at for at, effect in enumerate(fitted.effects) if effect.free and effect.shape != "step"]
+    free = [at for at, effect in enumerate(fitted.effects) if effect.free and effect.shape not in PLACED]
     column = len(fitted.names) + free.index(index)
     plain = _covariance(fitted, Assessed(WHITE, 1.0))[column, column]
     return float(np.sqrt(_covariance(fitted, noise)[column, column] / plain))

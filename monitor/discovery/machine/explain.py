@@ -25,8 +25,10 @@ from monitor.discovery.machine.separation.aliases import taken_for_machine
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
+    reversals_of_unknown_width,
     that_lag,
     variants_of,
+    without_aliases,
     without_part_periods,
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
@@ -80,10 +82,12 @@ def variants_of_campaign(
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
     shown = filter(problem.can_show, effects)
     variants = [variant for effect in shown for variant in variants_of(effect)]
+    variants = without_aliases(variants, problem.context, pitches)
     variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
-    return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]
+    unknown = [*resolvable(cycles_of_unknown_pitch(chain), problem.context)]
+    return [*variants, *unknown, *reversals_of_unknown_width(problem.context)]
 
 
 def explain(

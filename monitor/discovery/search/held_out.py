@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from monitor.discovery.search.projection import inverse_above
 from monitor.records import Array
 
 #: Rows are dealt into ten folds at random, always the same way.
 FOLDS, DEAL = 10, 20261121
+#: What the other folds show of a direction of columns of length 1, at least; less is rounding.
+DETERMINED = 1e-10
 
 
 def folds_of(count: int) -> npt.NDArray[np.int64]:
@@ -33,7 +36,7 @@ def held_out_sum(residual: Array, columns: Array, row_fold: npt.NDArray[np.int64
     members = [np.flatnonzero(index == fold) for fold in range(len(folds))]
     grams = np.array([scaled[rows].T @ scaled[rows] for rows in members])
     ontos = np.array([scaled[rows].T @ residual[rows] for rows in members])
-    inverses = np.linalg.pinv(grams.sum(axis=0) - grams, rcond=1e-10, hermitian=True)
+    inverses = inverse_above(grams.sum(axis=0) - grams, DETERMINED)
     coefficients = -(inverses @ (ontos.sum(axis=0) - ontos)[..., None])[..., 0]
     remainder = residual + np.einsum("mc,mc->m", scaled, coefficients[index])
     return float(np.sum(remainder[row_fold >= 0] ** 2))

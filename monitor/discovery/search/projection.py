@@ -35,3 +35,15 @@ def without(basis: Array, columns: Array) -> Array:
         return columns
     remainder: Array = columns - basis @ (basis.T @ columns)
     return remainder
+
+
+def inverse_above(grams: Array, least: float) -> Array:
+    """The inverses (..., k, k) of products of columns, symmetric; directions with at most ``least`` are left out.
+
+    The limit is one for all: of a single column that is hardly there `pinv` would keep everything, since it compares
+    with the largest of the same matrix.
+    """
+    values, vectors = np.linalg.eigh(grams)
+    keep = values > least
+    inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    return np.asarray((vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2))

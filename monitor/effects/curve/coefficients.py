@@ -28,9 +28,11 @@ def coefficient_names(effect: CurveEffect, inputs: Inputs) -> tuple[str, ...]:
 def coefficient_unit(effect: CurveEffect, inputs: Inputs, response: str) -> str:
     """Return the unit of the coefficients: that of the response, over a power of that of the input."""
     of_input = inputs.units.get(effect.column, "")
-    if effect.column == SEQUENCE and effect.order:
+    if effect.column == SEQUENCE and (effect.order or effect.shape == "knee"):
         of_input = "row"
-    if not effect.order or not of_input:
+    # Beyond a knee the response has another slope.
+    order = 1 if effect.shape == "knee" else effect.order
+    if not order or not of_input:
         return response or "1"
-    power = {1: "", 2: "²", 3: "³"}.get(effect.order, f"^{effect.order}")
+    power = {1: "", 2: "²", 3: "³"}.get(order, f"^{order}")
     return f"{response or '1'}/{of_input}{power}"

@@ -13,7 +13,9 @@ from monitor.records import Array, CurveCampaign
 #: The input that every curve has: the number of the row, from 1.
 SEQUENCE = "sequence"
 #: Shapes with a value that can be searched, and the name of that value.
-SEARCHED = {"sin": "period", "exp": "constant", "step": "place"}
+SEARCHED = {"sin": "period", "exp": "constant", "step": "place", "knee": "place"}
+#: Those whose value is looked for between the values of the input only.
+PLACED = ("step", "knee")
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 import re
 
-from monitor.effects.curve.effect import SEARCHED, CurveEffect, Inputs
+from monitor.effects.curve.effect import PLACED, SEARCHED, CurveEffect, Inputs
 from monitor.effects.formula import Formula
 from monitor.exceptions import EffectError
 
 _TEXT = re.compile(
-    r"(?P<column>[A-Za-z]\w*)(?::(?P<shape>poly[1-9]|drift|group|(?P<searched>sin|exp|step)(?P<free>~)?"
+    r"(?P<column>[A-Za-z]\w*)(?::(?P<shape>poly[1-9]|drift|loop|group|(?P<searched>sin|exp|step|knee)(?P<free>~)?"
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?))?",
     re.ASCII,
 )
-EXAMPLES = "load_N:poly2, date:drift, month:sin12, month:sin, time_s:exp, load_N:step, probe:group"
+EXAMPLES = (
+    "load_N:poly2, date:drift, month:sin12, month:sin, time_s:exp, load_N:step, load_N:knee, load_N:loop, "
+    "probe:group"
+)
 #: What stands before a + that is the sign of a number or of its exponent.
-SIGN_OF_NUMBER = re.compile(r"([\d.][eE]|(sin|exp|step)~?)$")
+SIGN_OF_NUMBER = re.compile(r"([\d.][eE]|(sin|exp|step|knee)~?)$")
 
 
 def parse_curve_effect(text: str, inputs: Inputs | None = None) -> CurveEffect:
@@ -69,7 +72,7 @@ def _searched(text: str, match: re.Match[str]) -> CurveEffect:
             )
         return CurveEffect(column, shape, None, True)
     value = float(match["value"])
-    if not math.isfinite(value) or (shape != "step" and value == 0.0):
+    if not math.isfinite(value) or (shape not in PLACED and value == 0.0):
         raise EffectError(f"'{text}': the {SEARCHED[shape]} must be a finite number other than 0")
     if shape == "sin" and value < 0.0:
         raise EffectError(f"'{text}': a period is above 0; write {column}:sin{-value:g}")

@@ -1,7 +1,7 @@
 """The drivers, one a file; no driver means 1.
 
 ``@warmup`` without a time constant has one that is searched; with one (``@warmup45min``) it is fixed, and so for
-``@lagged_x_axis_degC``. A driver of no other name is a recorded channel.
+``@settling`` and ``@lagged_x_axis_degC``. A driver of no other name is a recorded channel.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from monitor.effects.drivers.channel import Channel
 from monitor.effects.drivers.each_run import EachRun
 from monitor.effects.drivers.lagged import LaggedTemperature
 from monitor.effects.drivers.run_time import RunTime
+from monitor.effects.drivers.settling import Settling
 from monitor.effects.drivers.warmup import WarmUp
 from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.exceptions import EffectError, did_you_mean
@@ -24,6 +25,7 @@ __all__ = [
     "EachRun",
     "LaggedTemperature",
     "RunTime",
+    "Settling",
     "SettlingDriver",
     "WarmUp",
     "parse_driver",
@@ -39,10 +41,11 @@ def parse_driver(text: str) -> Driver:
     if driver is not None:
         return driver
     if column_unit(text) is None:
-        hint = did_you_mean(text, ("warmup", "run_time", "sequence", "gravity", "each_run"))
+        hint = did_you_mean(text, ("warmup", "settling", "run_time", "sequence", "gravity", "each_run"))
         raise EffectError(
-            f"there is no driver '@{text}'; {hint}there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
-            "@each_run, @lagged_ with a recorded temperature, and every recorded channel, whose name ends in a unit "
+            f"there is no driver '@{text}'; {hint}there are @warmup (or @warmup45min), @settling, @run_time, "
+            "@sequence, @gravity, @each_run, @lagged_ with a recorded temperature, and every recorded channel, whose "
+            "name ends in a unit "
             f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)}){plug_in_patterns('monitor.drivers')}"
         )
     return Channel(text)

@@ -11,6 +11,7 @@ import numpy as np
 from monitor.effects.context import Context
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
+from monitor.effects.shapes.windup import wound_up
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
@@ -20,6 +21,8 @@ HATS = 12
 HARMONICS = 8
 # Play takes this part of the travel to build up.
 BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
+# A drive that is wound up gives way over this part of the travel before it follows; shorter moves leave it in between.
+PLAY = (1 / 16, 1 / 8, 1 / 4)
 # A joint of two rails or a slip of a scale goes from one level to the other within this part of a hat's spacing.
 STEEPNESS = 1 / 4
 
@@ -30,9 +33,10 @@ class Free(DescribedShape):
 
     Linear axes: hats over the visited range, the direction of travel (alone, times the position and its square, and
     building up with the way since the last reversal), the position times that of every other axis, and steps in the
-    middle between two hats, behind all others: stored names keep their numbers. Rotary axes: harmonics to the eighth,
-    the direction (alone and times cosine and sine), cosine and sine times the other axes. Every part is scaled to 1 at
-    most.
+    middle between two hats. Rotary axes: harmonics to the eighth, the direction (alone and times cosine and sine),
+    cosine and sine times the other axes. Behind all others, since stored names keep their numbers: the play of three
+    widths, and what the axis does until it first moves in a run, when nobody knows from which side it came. Every part
+    is scaled to 1 at most.
     """
 
     parts: tuple[int, ...] = ()
@@ -84,6 +88,8 @@ def flexible_basis(context: Context, joint: int) -> Array:
     parts += [part * other for part in simple for other in others]
     if not context.chain.joints[joint].turns:
         parts += _steps(scaled)
+    parts += [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
+    parts.append((direction == 0.0).astype(np.float64))
     columns = np.column_stack(parts)
     largest = np.abs(columns).max(axis=0)
     return np.asarray(columns / np.where(largest > 0.0, largest, 1.0))

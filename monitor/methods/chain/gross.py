@@ -12,6 +12,7 @@ points (``monitor.discovery``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -45,6 +46,10 @@ HELD = 1e3
 FEWEST_RUNS = 3
 #: Within a run two rows may be wrong alike; the second is as likely where it lowers the sum of squares as much.
 AS_LIKELY = 0.95
+#: The same touch, off by the same in so many runs and in this part of them, is an error of the machine at that pose:
+#: the runs' vectors lie within this part of their mean. What is further off than an effect may be (50 µm) is a mistake
+#: in the program of the plan, in however many runs.
+FEWEST_ALIKE, PART_ALIKE, SPREAD_ALIKE = 2, 0.5, 0.5
 
 
 @dataclass(frozen=True)
@@ -241,6 +246,47 @@ def _rows_of(problem: ChainProblem, at: Linearisation, run: int, local: Array) -
     )
 
 
+def _alike_in_all_runs(problem: ChainProblem, readings: Sequence[Deviation]) -> set[int]:
+    """The gross rows that are no mistakes: most runs read the same touch off by the same vector.
+
+    One pose where an axis was wound up, or a scale has a scratch, holds most of what a model leaves of every run.
+    """
+    if len(readings) < FEWEST_ALIKE or len(problem.runs) < FEWEST_ALIKE:
+        return set()
+    vector_of = {reading.row: reading.vector for reading in readings}
+    touches = _touches(problem)
+    alike: set[int] = set()
+    for touch in np.unique(touches[list(vector_of)]):
+        rows = [row for row in vector_of if touches[row] == touch]
+        runs = len(np.unique(problem.context.run[touches == touch]))
+        if len(rows) < max(FEWEST_ALIKE, PART_ALIKE * runs):
+            continue
+        vectors = np.array([vector_of[row] for row in rows])
+        mean = vectors.mean(axis=0)
+        apart = np.linalg.norm(vectors - mean, axis=1).max()
+        length = float(np.linalg.norm(mean))
+        if apart <= SPREAD_ALIKE * length and length <= problem.largest_effect[0]:
+            alike.update(rows)
+    return alike
+
+
+def _touches(problem: ChainProblem) -> npt.NDArray[np.int64]:
+    """The touch of the plan (n,) that every row is: the same number for the same target, pose and occurrence."""
+    context = problem.context
+    measured = problem.measured_joints
+    posed = [joint for joint in range(len(context.chain.joints)) if joint not in measured]
+    poses = np.round(context.positions[:, posed], 6) + 0.0
+    numbers: dict[tuple[object, ...], int] = {}
+    counted: dict[tuple[object, ...], int] = {}
+    touches = np.empty(len(context), dtype=np.int64)
+    for row in range(len(context)):
+        key = (str(context.target[row]), *poses[row].tolist())
+        in_run = (int(context.run[row]), *key)
+        counted[in_run] = counted.get(in_run, -1) + 1
+        touches[row] = numbers.setdefault((*key, counted[in_run]), len(numbers))
+    return touches
+
+
 def deviations(problem: ChainProblem, local: Array, common: Array) -> list[Deviation]:
     """The gross rows by the problem linearised at ``local`` (R, p) and ``common`` (c,), run by run.
 
@@ -250,11 +296,13 @@ def deviations(problem: ChainProblem, local: Array, common: Array) -> list[Devia
     at = problem.linearise(local, common)
     tests = len(problem.context)
     sigma = np.where(np.isfinite(problem.sigma), problem.sigma, 0.0)
-    return [
+    readings = [
         reading
         for run in range(len(problem.runs))
         for reading in _of_run(_rows_of(problem, at, run, local[run]), sigma, tests)
     ]
+    alike = _alike_in_all_runs(problem, readings)
+    return [reading for reading in readings if reading.row not in alike]
 
 
 def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviation]:

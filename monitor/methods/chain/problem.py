@@ -8,7 +8,7 @@ stands in ``measured.py``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Self
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import Basis, ChainEffect
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, NotConvergedError
 from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
@@ -255,8 +255,10 @@ def solve_problem(
     """The least-squares point of a problem, from ``local`` (R, p) and ``common`` (c,) or from no errors at all.
 
     A searched time constant is begun from several values and the best end is taken, since the sum of squares
-    may have more than one minimum in it. Raises DataError where no start converges, or where the readings fit
-    only another machine. ``most`` bounds the steps where nothing is searched.
+    may have more than one minimum in it. Where no start converges, because the readings show only that something
+    follows and not how late, it is held at the best of these values and is not determined. Raises DataError where
+    that does not converge either, or where the readings fit only another machine. ``most`` bounds the steps where
+    nothing is searched.
     """
     begin = problem.start if local is None else local
     first = problem.common_start if common is None else common
@@ -267,10 +269,24 @@ def solve_problem(
     def linearise(local: Array, common: Array) -> Linearisation:
         return without_held(problem.linearise(local, common), held)
 
-    if common is not None or not any(added.searched for added in problem.shared):
-        solution = _solved(problem, linearise, begin, np.where(held, 0.0, first), most)
-    else:
-        solution = _from_several_starts(problem, linearise, begin)
+    starts = [np.where(held, 0.0, first)]
+    searched = any(added.searched for added in problem.shared)
+    if common is None and searched:
+        starts = [problem.common_from(start) for start in STARTS_S]
+    elif not searched:
+        return _accepted(problem, _solved(problem, linearise, begin, starts[0], most), held)
+    try:
+        solution = _best_of(problem, linearise, begin, starts)
+    except NotConvergedError:
+        constant = _time_constants(problem)
+        solution = _best_of(
+            problem, lambda local, common: without_held(linearise(local, common), constant), begin, starts
+        )
+    return _accepted(problem, solution, held)
+
+
+def _accepted(problem: ChainProblem, solution: Solution, held: npt.NDArray[np.bool_]) -> Solution:
+    """A solution with what was held at zero; DataError where it is that of another machine."""
     solution = replace(solution, common_held=held)
     _refuse_another_machine(problem, solution)
     return solution
@@ -290,14 +306,26 @@ def _solved(
     return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 
-def _from_several_starts(
-    problem: ChainProblem, linearise: Callable[[Array, Array], Linearisation], begin: Array
+def _time_constants(problem: ChainProblem) -> npt.NDArray[np.bool_]:
+    """Which of the common unknowns (c,) are searched time constants."""
+    constant = np.zeros(len(problem.added_names), dtype=bool)
+    for added, columns in zip(problem.shared, problem.common_columns, strict=True):
+        constant[columns.stop - 1] = added.searched
+    return constant
+
+
+def _best_of(
+    problem: ChainProblem,
+    linearise: Callable[[Array, Array], Linearisation],
+    begin: Array,
+    starts: Sequence[Array],
 ) -> Solution:
+    """The best end of several starts (c,) of the common unknowns; the fault of the last where none converges."""
     solutions: list[Solution] = []
     fault: DataError | None = None
-    for start in STARTS_S:
+    for start in starts:
         try:
-            solutions.append(_solved(problem, linearise, begin, problem.common_from(start)))
+            solutions.append(_solved(problem, linearise, begin, start))
         except DataError as error:
             fault = error
     if not solutions:

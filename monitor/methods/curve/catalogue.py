@@ -20,11 +20,12 @@ def catalogue(problem: CurveProblem) -> Iterator[CurveEffect]:
     """Every effect that the columns name; those that the model has already are left out."""
     families = {effect.family for effect in problem.effects if effect.shape != "sin"}
     for name in problem.inputs.numbers:
-        if name != SEQUENCE or (_clock(problem) == SEQUENCE and not rows_are_sorted(problem)):
+        if name != SEQUENCE or (_clock(problem) == SEQUENCE and _order_is_time(problem)):
             yield from _powers(problem, name)
             yield from _calendar(problem, name)
             searched = [CurveEffect(name, shape, free=True) for shape in SEARCHED]
             yield from (effect for effect in searched if effect.family not in families)
+            yield from (effect for effect in _loop(problem, name) if effect.family not in families)
     groups = [CurveEffect(name, "group") for name in problem.inputs.groups]
     yield from (effect for effect in groups if effect.family not in families)
 
@@ -41,6 +42,16 @@ def _powers(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
             yield CurveEffect(name, "drift" if name == _clock(problem) and power == 1 else f"poly{power}")
 
 
+def _loop(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
+    """The hysteresis of an input that rises and falls, where the rows are in the order of measuring."""
+    steps = np.diff(problem.inputs.numbers[name])
+    clock = problem.inputs.numbers[_clock(problem)]
+    in_order = not rows_are_sorted(problem) and bool(np.all(np.diff(clock) >= 0.0))
+    turns_back = bool((steps > 0.0).any() and (steps < 0.0).any())
+    if name != _clock(problem) and in_order and turns_back:
+        yield CurveEffect(name, "loop")
+
+
 def _calendar(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
     """The periods that need no search: those of the calendar that the rows can show."""
     if name != _clock(problem):
@@ -52,6 +63,13 @@ def _calendar(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
         enough = (x[-1] - x[0]) / length >= FEWEST_CYCLES and len(x) >= 2 * (x[-1] - x[0]) / length
         if enough and effect.text not in texts:
             yield effect
+
+
+def _order_is_time(problem: CurveProblem) -> bool:
+    """Whether the order of the rows may say something of time that no input says: none of them only rises or falls."""
+    steps = [np.diff(values) for name, values in problem.inputs.numbers.items() if name != SEQUENCE]
+    monotone = any((step > 0.0).all() or (step < 0.0).all() for step in steps)
+    return not monotone and not rows_are_sorted(problem)
 
 
 def rows_are_sorted(problem: CurveProblem) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.effects.curve import CurveEffect
+from monitor.effects.curve import PLACED, CurveEffect
 from monitor.exceptions import DataError
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.curve.solver import inverse_normal, refined, searched, slope, solve
@@ -86,7 +86,7 @@ def fit(problem: CurveProblem) -> CurveFit:
     weighted = ~problem.left_out
     y = problem.curve.measured
     effects = _started(problem)
-    free = [index for index, effect in enumerate(effects) if effect.free and effect.shape != "step"]
+    free = [index for index, effect in enumerate(effects) if effect.free and effect.shape not in PLACED]
     iterations = 1
     if free:
         effects, iterations = refined(problem, effects, free)
@@ -123,13 +123,13 @@ def fit(problem: CurveProblem) -> CurveFit:
 
 
 def _started(problem: CurveProblem) -> list[CurveEffect]:
-    """The effects with every searched value at its best of the grid, steps last, beside all others."""
+    """The effects with every searched value at its best of the grid, steps and knees last, beside all others."""
     effects = list(problem.effects)
     for index, effect in enumerate(effects):
         if effect.free and effect.value is None:
             effects[index] = searched(problem, effects, index)
     for index, effect in enumerate(effects):
-        if effect.free and effect.shape == "step":
+        if effect.free and effect.shape in PLACED:
             effects[index] = searched(problem, effects, index)
     return effects
 

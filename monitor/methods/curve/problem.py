@@ -32,6 +32,8 @@ CONSTANT = "constant"
 FREQUENCY_STEPS = 3.0
 CONSTANTS = tuple(0.02 * 50.0 ** (step / 9.0) for step in range(10))
 FEWEST_ON_A_SIDE = 3
+#: The part of the range, about its middle, where a knee is looked for.
+KNEE_WITHIN = 0.8
 SHORTEST_CONSTANT = 1.0
 MOST_PLACES = 400
 
@@ -119,6 +121,9 @@ def grid(effect: CurveEffect, inputs: Inputs) -> Array:
     middles = (x[1:] + x[:-1]) / 2.0
     below = np.searchsorted(ordered, middles)
     inside = middles[(below >= FEWEST_ON_A_SIDE) & (len(ordered) - below >= FEWEST_ON_A_SIDE)]
+    if effect.shape == "knee":
+        # Near an end another slope is the slope of nearly all rows, or of nearly none.
+        inside = inside[np.abs(inside - (x[0] + x[-1]) / 2.0) <= KNEE_WITHIN * span / 2.0]
     if len(inside) > MOST_PLACES:
         inside = inside[np.linspace(0, len(inside) - 1, MOST_PLACES).astype(int)]
     return inside

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from monitor.effects.curve import SEARCHED, CurveEffect, coefficient_names, curve_columns
+from monitor.effects.curve import PLACED, SEARCHED, CurveEffect, coefficient_names, curve_columns
 from monitor.exceptions import EffectError
 from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.records import Array
@@ -110,7 +110,7 @@ def searched(problem: CurveProblem, effects: Sequence[CurveEffect], index: int) 
     """The effect with the value of the grid that leaves least, the other effects fitted along."""
     effect = effects[index]
     values = grid(effect, problem.inputs)
-    if effect.shape == "step" and effect.value is not None:
+    if effect.shape in PLACED and effect.value is not None:
         values = np.append(values, effect.value)
     if len(values) == 0:
         raise EffectError(

@@ -18,10 +18,10 @@ from monitor.methods.chain.least_squares import Linearisation, Solution, elimina
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import wrong_direction, wrong_length
+from monitor.methods.instruments.first_guess import guess_with_lines, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
-from monitor.methods.instruments.starts import stance_of, with_zeros
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -91,12 +91,12 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def own_start(self) -> Array:
-        """The first guesses (R, q)."""
+        """The first guesses (R, q): zeros and slopes as a machine without errors leaves them."""
         runs = len(self.runs)
         start = np.zeros((runs, len(self.own_names)))
         for part, columns in zip(self.parts, self.own_columns, strict=True):
-            start[:, columns] = part.reading.start(runs)
-        return with_zeros(self.parts, self.own_columns, start, self._nominal)
+            start[:, columns] = guess_with_lines(part, runs, self._nominal)
+        return start
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -327,8 +327,8 @@ class InstrumentProblem(ChainProblem):
 
     def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
         """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
-        nominal = stance_of(vectors[part.at], self._nominal, part.at)
-        return replace(stance_of(vectors[part.at], sides, part.at), nominal=nominal)
+        nominal = stance_at(vectors[part.at], self._nominal, part.at)
+        return replace(stance_at(vectors[part.at], sides, part.at), nominal=nominal)
 
     def _by_error(
         self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]

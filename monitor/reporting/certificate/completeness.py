@@ -14,6 +14,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory_keys import key_of
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord, Standard
 from monitor.reporting.certificate.results import ResultSet
+from monitor.reporting.texts import texts_of
 
 #: What only a certificate that replaces another has to say.
 AMENDMENT = ("7.8.8.1 and 7.8.8.3", "reference to the certificate that it replaces, with the reason")
@@ -30,7 +31,7 @@ _PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba"
 class MissingItem:
     """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty).
 
-    ``key`` is where the laboratory's file answers it, empty where another source does.
+    ``key`` is where the laboratory's file, or the campaign's, answers it; empty where what was computed does.
     """
 
     clause: str
@@ -54,7 +55,8 @@ class IncompleteCertificateError(InputError):
         lines += [f"  {gap}" for gap in missing]
         if any(gap.key for gap in missing):
             lines.append(
-                "these keys are in the laboratory's file; `monitor certificate template` writes one with all of them"
+                "the keys are those of the laboratory's file where no other is named; `monitor certificate template` writes "
+                "one with all of them"
             )
         super().__init__("\n".join(lines))
 
@@ -62,13 +64,14 @@ class IncompleteCertificateError(InputError):
 def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     """Every item that is None, empty or says nothing, and every such part of an item, in the order of the record."""
     missing: list[MissingItem] = []
+    texts = texts_of(record.language)
     for name, (clause, element) in ITEMS.items():
         missing += [
-            MissingItem(clause, element, part, key_of(name, part)) for part in _gaps(getattr(record, name))
+            MissingItem(clause, element, part, key_of(name, part, texts)) for part in _gaps(getattr(record, name))
         ]
     for field, clause_and_item in _STATED.items():
         missing += [
-            MissingItem(*clause_and_item, part, key_of(field, part))
+            MissingItem(*clause_and_item, part, key_of(field, part, texts))
             for part in _gaps(getattr(record, field))
             if getattr(record, field) is not None
         ]

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.texts import Texts
+
+if TYPE_CHECKING:
+    # A request names a release alone: it waits for nothing that a certificate states.
+    from monitor.reporting.certificate.record import CertificateRecord
 
 DCC = "https://ptb.de/dcc"
 SI = "https://ptb.de/si"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from monitor.reporting.texts import Texts
+
 #: Every section and its keys.
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "laboratory": (
@@ -58,16 +60,27 @@ _KEY_OF = {
 }
 
 
-def key_of(name: str, part: str) -> str:
+#: The words of a reference in a certificate's language, and the key that answers what is missing of it.
+_KEY_OF_REFERENCE = {
+    "record.instrument": "[traceability] instruments",
+    "record.probe": "[traceability] probe",
+    "record.bar": "[traceability] scale_bar",
+}
+#: The one item that a campaign answers and need not state.
+ARTEFACT_KEY = "[artefact] id in campaign.toml, withdraw the campaign and import the folder again"
+
+
+def key_of(name: str, part: str, texts: Texts) -> str:
     """The key of the laboratory's file that answers an item of a certificate or a ``part`` of it; empty: none does.
 
-    ``name`` is that of a field of ``CertificateRecord``: ``key_of("customer", "contact")`` is ``[customer] contact``.
+    ``name`` is that of a field of ``CertificateRecord``: ``key_of("customer", "contact", texts)`` is ``[customer]
+    contact``; a part of a reference or condition has its words in the language of ``texts``.
     """
     word = re.split(r"[ :]", part)[0]
     if name == "references":
-        if "instrument" in part:
-            return "[traceability] instruments"
-        return "[traceability] probe" if "probe" in part else "[traceability] scale_bar"
+        return next((key for kind, key in _KEY_OF_REFERENCE.items() if _names(part, texts.sentences[kind])), "")
+    if name == "conditions":
+        return ARTEFACT_KEY if part.endswith(f" {texts('record.artefact')}") else ""
     section = _SECTION_OF.get(name)
     if section is None:
         return "" if name == "method" and word != "document" else _KEY_OF.get(name, "")
@@ -75,3 +88,9 @@ def key_of(name: str, part: str) -> str:
     if not part:
         return f"{title} {', '.join(key for key in SECTIONS[section] if key in _PARTS)}"
     return f"{title} {word}" if word in SECTIONS[section] else ""
+
+
+def _names(part: str, template: str) -> bool:
+    """Whether a part of an item names what ``template`` says with its places filled in."""
+    words = (re.escape(text) for text in re.split(r"\{\w+\}", template))
+    return re.search(f"(^| of ){'.+'.join(words)}(: |$)", part) is not None

@@ -17,6 +17,7 @@ from monitor.records import AuditAnchor
 from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.texts import ENGLISH
 
 _EITHER = " or that it does not apply"
@@ -128,14 +129,6 @@ class Verdict(StrEnum):
     CONDITIONAL_PASS = "conditional pass"
     CONDITIONAL_FAIL = "conditional fail"
     UNDECIDED = "undecided"
-
-
-@dataclass(frozen=True)
-class Signer:
-    """Who signs the file electronically: the name in the signing certificate, and that one's SHA-256, hexadecimal."""
-
-    name: str
-    sha256: str
 
 
 @dataclass(frozen=True)

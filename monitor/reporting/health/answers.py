@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from monitor.reporting.health.comparison import MissingEffect
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
@@ -15,6 +16,7 @@ from monitor.reporting.health.records import (
     MachineHealth,
     ParameterHealth,
     State,
+    is_due,
 )
 from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
@@ -46,6 +48,7 @@ _QUIET_UNCERTAIN = (
     "No parameter changed, and the models explain the measurements; without uncertainties nothing is held against the "
     "tolerances."
 )
+_AS_PLANNED = "Measure again as planned."
 _UNMEASURED = "No machine was measured this week, so nothing is known of its state."
 _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
 
@@ -66,7 +69,9 @@ def answers(fleet: Fleet) -> tuple[Answer, ...]:
         Answer("worst", "Worst machine?", _worst(fleet)),
         Answer("why", "Why?", _quiet(fleet) if worst is None else reason(worst)),
         Answer("since", "Since when?", "Nothing to date." if worst is None else _since(worst)),
-        Answer("do", "What to do?", _keep_on(fleet) if worst is None else to_do(worst)),
+        Answer(
+            "do", "What to do?", _with_due(_keep_on(fleet) if worst is None else to_do(worst), fleet.rows)
+        ),
         Answer("fine", "What is fine?", _fine(fleet.rows)),
         Answer("unjudged", "Not judged?", _unjudged(fleet)),
     )
@@ -88,6 +93,11 @@ def _quiet(fleet: Fleet) -> str:
 def concern(health: MachineHealth) -> ParameterHealth | None:
     """Return the parameter that makes a machine's state, or is nearest to make it; None without parameters."""
     parameters = health.parameters
+    if is_due(health):
+        check = health.next_check
+        named = [each for each in parameters if isinstance(check, NextCheck) and each.name == check.parameter]
+        if named:
+            return named[0]
     if health.state is State.CHANGED:
         noted = [
             change.at for change in health.changes if change.kind is ChangeKind.CHANGE and change.this_week
@@ -122,7 +132,17 @@ def _out(health: MachineHealth) -> str:
             f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
             f"{plain(error_map.limit_um)} µm (beyond it with a probability of {percent(error_map.probability_out)})"
         )
+    missing = _first_missing(health)
+    if missing is not None and health.state is State.MAY_BE_OUT_OF_TOLERANCE:
+        sentences.append(
+            f"the model lacks {missing.meaning} ({missing.effect}), and its lack of fit is part of what is uncertain"
+        )
     return "; ".join(sentences)
+
+
+def _first_missing(health: MachineHealth) -> MissingEffect | None:
+    """The effect that the model of a machine lacks most; None where it lacks none."""
+    return next(iter(() if health.model is None else health.model.missing), None)
 
 
 def _not_evaluated(health: MachineHealth) -> str:
@@ -157,9 +177,10 @@ def _suspect(health: MachineHealth) -> str:
 def _nearest_limit(health: MachineHealth) -> str:
     """The parameter that drifts, where one does."""
     parameter = concern(health)
-    if parameter is None or parameter.drift is None or parameter.drift.p_value >= _DRIFT_P:
+    if parameter is None or parameter.drift is None:
         return ""
-    return f"{_stands(parameter)}{_moves(parameter, parameter.drift)}"
+    moves = _moves(parameter, parameter.drift)
+    return f"{_stands(parameter)}{moves}" if moves or is_due(health) else ""
 
 
 #: What says why a machine is in a state; of the others, what drifts.
@@ -231,13 +252,14 @@ def to_do(health: MachineHealth) -> str:
         State.SUSPECT_DATA: "look at the points that its page names and measure again",
         State.NOT_MEASURED: "measure it",
     }.get(health.state, "measure again as planned")
-    if health.state is State.MODEL_FAILS and health.model is not None:
-        missing = health.model.missing
-        action = (
-            f"{missing[0].remedy.rstrip('.')}; then measure again"
-            if missing
-            else "look at its page for where the model fails, and measure again"
-        )
+    missing = _first_missing(health)
+    if health.state in (State.MODEL_FAILS, State.MAY_BE_OUT_OF_TOLERANCE) and missing is not None:
+        # More runs would not help: what the model lacks is what is uncertain.
+        action = f"{missing.remedy.rstrip('.')}; then measure again"
+    elif health.state is State.MODEL_FAILS and health.model is not None:
+        action = "look at its page for where the model fails, and measure again"
+    elif is_due(health):
+        return _sentence(f"measure it again {_after_colon(str(health.next_check))}")
     when = (
         "now"
         if health.state in ALARMS and health.state is not State.NOT_EVALUATED
@@ -265,11 +287,22 @@ def _worst(fleet: Fleet) -> str:
 
 def _keep_on(fleet: Fleet) -> str:
     checked = next((row for row in fleet.rows if row.state in FINE), None)
-    return "Measure the machines that were not measured." if checked is None else "Measure again as planned."
+    return "Measure the machines that were not measured." if checked is None else _AS_PLANNED
+
+
+def _with_due(action: str, rows: Sequence[FleetRow]) -> str:
+    """What to do, with the machines that their drift may have taken out of tolerance since they were measured."""
+    due = [row for row in rows if is_due(row)]
+    if not due:
+        return action
+    why = f" ({_after_colon(str(due[0].next_check)).removeprefix('now, ')})" if len(due) == 1 else ""
+    if action == _AS_PLANNED:
+        return f"Measure again now: {_names(due)}{why}; the others as planned."
+    return f"{action.removesuffix('.')}; measure again now as well: {_names(due)}{why}."
 
 
 def _fine(rows: Sequence[FleetRow]) -> str:
-    fine = [row for row in rows if row.state in FINE]
+    fine = [row for row in rows if row.state in FINE and not is_due(row)]
     if not fine:
         return "No machine could be stated to be fine."
     return f"{len(fine)} of {len(rows)} machine{'s' if len(rows) != 1 else ''}: {_names(fine)}."

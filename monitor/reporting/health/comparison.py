@@ -83,6 +83,8 @@ class ModelHealth:
 
     ``where`` and ``against`` are None where nothing is missing; ``steps`` begin with the method's own model.
     ``unchanged`` are parameters that stepped between runs of the campaign and have no change in the machine's history.
+    ``refuted_p`` is the p-value of lack of fit with the noise of neighbours allowed for, where the readings of the
+    campaign refute the model; None where they do not, and where runs of the campaign are still to come.
     """
 
     campaign: str
@@ -100,3 +102,4 @@ class ModelHealth:
     against: ResidualAgainst | None
     steps: tuple[ErrorStep, ...]
     unchanged: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    refuted_p: float | None = field(default=None, metadata=OMITTED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from markupsafe import Markup
@@ -23,6 +23,7 @@ from monitor.reporting.health.records import (
     State,
     VolumetricMap,
     fleet_row,
+    is_due,
 )
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health.trend_picture import trend_picture
@@ -55,6 +56,8 @@ LOOKS = {
     State.IN_TOLERANCE: "good",
     State.NO_CHANGE_SEEN: "good",
 }
+#: How a machine is named that its drift may have taken out of tolerance since it was measured.
+_DUE_SIGN, _DUE = "◔", "due for a check"
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
 _BLIND_SHOWN = 4
 #: Changes and events named on the page, the latest first.
@@ -151,7 +154,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         ],
         "noticed": [(machine, _anchor(machine), what) for machine, what in fleet.noticed],
         "answers": answers(fleet),
-        "cards": [_card(health) for health in fleet.attention if health.state in URGENT],
+        "cards": [_card(health) for health in fleet.attention if health.state in URGENT or is_due(health)],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state is not State.NOT_MEASURED for row in fleet.rows),
@@ -159,7 +162,10 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
 
 
 def _card(health: MachineHealth) -> Card:
-    return Card(_line(fleet_row(health)), reason(health), to_do(health), _card_picture(health))
+    head = _line(fleet_row(health))
+    if is_due(health):
+        head = replace(head, sign=_DUE_SIGN, state=_DUE, look="doubtful")
+    return Card(head, reason(health), to_do(health), _card_picture(health))
 
 
 def _card_picture(health: MachineHealth) -> Markup:
@@ -296,6 +302,14 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
         lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
+    if model.refuted_p is not None:
+        lines.append(
+            (
+                "refuted",
+                f"by the readings, noise of neighbours allowed for (p {p_in_words(model.refuted_p)}): the values hold "
+                f"what the model lacks; monitor explain {model.campaign}",
+            )
+        )
     return tuple(lines)
 
 

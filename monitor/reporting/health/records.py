@@ -13,6 +13,7 @@ from enum import StrEnum
 from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
 from monitor.reporting.health.comparison import ModelHealth
+from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.svg.map_slices import Slice
 
 
@@ -280,6 +281,16 @@ def fleet_row(health: MachineHealth) -> FleetRow:
     )
 
 
-def by_urgency(row: FleetRow) -> tuple[int, float, str]:
-    """The key that sorts machines: the most urgent state, then the larger probability, then the name."""
-    return list(STATES).index(row.state), -(row.probability_out or 0.0), row.machine
+def is_due(machine: FleetRow | MachineHealth) -> bool:
+    """Return whether nothing is wrong with a machine so far, but by its drift it need not be in tolerance any more."""
+    check = machine.next_check
+    fine = machine.state in (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
+    return fine and isinstance(check, NextCheck) and check.kind is CheckKind.PASSED
+
+
+def by_urgency(row: FleetRow) -> tuple[float, float, str]:
+    """The key that sorts machines: the most urgent state (what is due for a check before all that is fine), then the
+    larger probability, then the name."""
+    states = list(STATES)
+    rank = states.index(State.IN_TOLERANCE) - 0.5 if is_due(row) else states.index(row.state)
+    return rank, -(row.probability_out or 0.0), row.machine

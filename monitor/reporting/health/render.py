@@ -11,6 +11,7 @@ from datetime import UTC
 
 from monitor.reporting.health.page import fleet_context, machine_pages
 from monitor.reporting.health.records import Fleet, MachineHealth
+from monitor.reporting.pdf.drawn_apart import drawn_apart
 from monitor.reporting.pdf.render import html_of, pdf_of, pieces_of
 
 TEMPLATE = "health.html"
@@ -40,8 +41,8 @@ def health_pdf(fleet: Fleet, machines: Sequence[MachineHealth], part: int = 1, p
     context = {**fleet_context(fleet), "pages": list(machine_pages(machines)), "part": part, "parts": parts}
     closer = {**context, "setting": "close"} if len(machines) <= _LAID_OUT_AGAIN else None
     return pdf_of(
-        html_of(TEMPLATE, {**context, "setting": ""}),
+        drawn_apart(html_of(TEMPLATE, {**context, "setting": ""})),
         identifier=f"health {fleet.week} {fleet.made_at.isoformat()} {part}",
         moment=fleet.made_at.replace(tzinfo=UTC),
-        closer=None if closer is None else html_of(TEMPLATE, closer),
+        closer=None if closer is None else drawn_apart(html_of(TEMPLATE, closer)),
     )

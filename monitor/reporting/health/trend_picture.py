@@ -19,6 +19,8 @@ WIDTH_MM, HEIGHT_MM = 104.0, 45.0
 _LEFT, _TOP, _RIGHT, _BOTTOM = 92.0, 74.0, 78.0, 52.0
 #: A forecast is drawn at most so many times the history's length ahead.
 _AHEAD = 1.0
+#: A stated U is drawn by itself where it is so many times the bar of its run.
+_WIDER = 1.15
 #: Steps between dates along the axis, in days, and in months where a month is the least.
 _DAYS = (1, 2, 7, 14)
 _MONTHS = (1, 2, 3, 6, 12, 24, 60, 120)
@@ -33,10 +35,14 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
     """
     history, drift = parameter.history, parameter.drift
     half = np.nan_to_num(np.array(history.u) * parameter.expanded / parameter.u, posinf=0.0)
+    stated = _stated_apart(parameter, float(half[-1]))
     first, last = history.times[0], _end(parameter)
     margin = max((last - first) * 0.03, timedelta(hours=12))
     low, high = value_range(
-        np.array(history.values), half, parameter.tolerance, always=parameter.reaches_soon
+        np.array([*history.values, *stated[:1]]),
+        np.array([*half, *stated[1:]]),
+        parameter.tolerance,
+        always=parameter.reaches_soon,
     )
     left_edge = max(_LEFT, tick_room((low, high), 5) + 6.0)
     limits = () if parameter.tolerance is None else (parameter.tolerance, -parameter.tolerance)
@@ -65,6 +71,8 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
             width=2.2,
         )
         on.dots("".join(f"M{x:.1f} {y:.1f}h0" for x, y, _ in middles), colour, 11.0)
+    if stated:
+        _ends(on, panel, _days(history.times[-1]), *stated)
     if drift is not None and drift.at_last is not None and drift.since is not None:
         _drift(on, panel, drift, history.times[-1], last)
     return on.svg()
@@ -82,13 +90,33 @@ def _end(parameter: ParameterHealth) -> datetime:
     return min(limit, datetime.combine(crossing, datetime.min.time()) + timedelta(days=1))
 
 
+def _stated_apart(parameter: ParameterHealth, half: float) -> tuple[float, ...]:
+    """Estimate and U as stated, where that U is wider than the bar of the last run: it has more than the scatter of
+    the readings in it, such as lack of fit; else nothing."""
+    wider = np.isfinite(parameter.expanded) and parameter.expanded > _WIDER * half
+    return (parameter.estimate, parameter.expanded) if wider else ()
+
+
+def _ends(on: Drawing, panel: Panel, at: float, estimate: float, expanded: float) -> None:
+    """Draw a stated interval with ends, so that it is told from the bars of the runs."""
+    x, top, bottom = panel.x(at), panel.y(estimate + expanded), panel.y(estimate - expanded)
+    on.path(
+        f"M{x:.1f} {top:.1f}V{bottom:.1f}M{x - 9:.1f} {top:.1f}h18M{x - 9:.1f} {bottom:.1f}h18",
+        stroke=BLUE,
+        width=2.2,
+    )
+
+
 def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
     """Write machine, parameter and unit above the panel, and below them what the line says."""
     room = int(WIDTH_MM * SCALE / (WIDE * LETTER))
     name = f"{plain_name(parameter.name)} ({parameter.name}) / {parameter.unit}"
     title = f"{_shortened(machine, room - len(name) - 2)}: {name}"
     on.text(0.0, 0.9 * LETTER, title, bold=True)
+    half = parameter.history.u[-1] * parameter.expanded / parameter.u
     legend = "bars: U; blue: this week"
+    if _stated_apart(parameter, half):
+        legend = "bars: scatter; with ends: U; blue: this week"
     if parameter.changed_at:
         legend += "; orange: a change"
     if parameter.drift is not None and parameter.drift.at_last is not None:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import Signer
+from monitor.reporting.signature.long_term import LongTermMaterial, material_in
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.
@@ -25,7 +26,8 @@ class SignatureFinding:
     """The finding about a file's signature: None for ``good`` where it carries none.
 
     ``stamped_at`` is when a time stamp authority saw it; None without a time stamp that fits the signature.
-    ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such.
+    ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such. ``long_term`` is the
+    material for later validation, None without any; what it lacks is no fault of the signature.
     """
 
     good: bool | None
@@ -33,6 +35,7 @@ class SignatureFinding:
     faults: tuple[str, ...]
     stamped_at: datetime | None = None
     signer_trusted: bool = False
+    long_term: LongTermMaterial | None = None
 
 
 def is_signed(pdf: bytes) -> bool:
@@ -61,7 +64,8 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
     logging.getLogger("pyhanko_certvalidator").setLevel(logging.CRITICAL)
     try:
-        signatures = PdfFileReader(io.BytesIO(pdf)).embedded_signatures
+        reader = PdfFileReader(io.BytesIO(pdf))
+        signatures = reader.embedded_signatures
         if not signatures:
             return _without_signature(pdf)
         (signature,) = signatures
@@ -72,6 +76,8 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
             signature.signer_cert.not_valid_after,
         )
         clean = _room_is_clean(pdf, [int(number) for number in signature.byte_range])
+        stamped_at = _time_of_stamp(status)
+        material = material_in(reader, signature, signers, stamped_at)
     except Exception as error:  # an altered file breaks the reader in as many ways as there are bytes
         message = f"the file's signature cannot be read: {_message(error)}: altered"
         return SignatureFinding(False, None, (message,))
@@ -79,15 +85,24 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     is_trusted = status.trusted or certificate.signer.sha256 in signers.fingerprints
     if trusted is not None:
         faults += _faults_of_signer(is_trusted, certificate, moment)
-    stamp, stamped_at = status.timestamp_validity, None
-    if stamp is not None and stamp.intact and stamp.valid:
-        stamped_at = stamp.timestamp
-    elif stamp is not None:
+    if status.timestamp_validity is not None and stamped_at is None:
         faults.append("the time stamp does not fit the signature")
     good = not faults
     return SignatureFinding(
-        good, certificate.signer, tuple(faults), stamped_at, good and trusted is not None and is_trusted
+        good,
+        certificate.signer,
+        tuple(faults),
+        stamped_at,
+        good and trusted is not None and is_trusted,
+        material,
     )
+
+
+def _time_of_stamp(status: Any) -> datetime | None:
+    """Return the time of a stamp that fits the signature; None without one."""
+    stamp = status.timestamp_validity
+    fits = stamp is not None and stamp.intact and stamp.valid
+    return stamp.timestamp if fits else None
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""Signs a certificate: PAdES baseline B-B, with a time stamp B-T (ETSI EN 319 142-1:2016, 6), by pyHanko, an extra.
+"""Signs a certificate: PAdES baseline B-B, with a time stamp B-T, with long-term material (``long_term``) B-LT (ETSI EN
+319 142-1:2016, 6), by pyHanko, an extra.
 
 With a ``FileKey`` (PKCS#12 file, extra ``sign``) or a ``TokenKey`` (PKCS#11: smart card, hardware module; extra
 ``token``), whose private key never leaves the token. The signature is appended to the PDF, which stays as it was below
@@ -7,18 +8,20 @@ it: PDF/A, its attachments, every byte. It certifies the document: no change is 
 
 from __future__ import annotations
 
+import asyncio
 import io
 import logging
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import Signer
+from monitor.reporting.signature.long_term import fetching_context, together_with_signature
 from monitor.reporting.signature.signature import need_pyhanko, signer_in
+from monitor.reporting.signature.signer import Signer
 
 _FIELD = "Signature"
 #: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
@@ -54,47 +57,67 @@ class TokenKey:
 Key = FileKey | TokenKey
 
 
-def sign(pdf: bytes, key: Key, timestamp_url: str | None = None) -> bytes:
+def sign(pdf: bytes, key: Key, timestamp_url: str | None = None, long_term: Path | None = None) -> bytes:
     """Return the PDF with a signature by ``key``, and a time stamp of the authority at an address (RFC 3161).
 
-    The authority gets the hash of the signature, and nothing of the document.
+    The authority gets the hash of the signature, and nothing of the document. ``long_term`` is a file of certificates
+    that signer and time stamp lead to: what their authorities say of them now is fetched and goes along.
 
-    Raises InputError where the authority gives no time stamp, where the extra is not installed, the key cannot be
-    opened, or is not there, and where its certificate is not valid today.
+    Raises InputError where an authority gives no time stamp or nothing that the certificates could be judged by, where
+    the extra is not installed, the key cannot be opened, or is not there, and where its certificate is not valid today.
     """
     need_pyhanko()
-    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-    from pyhanko.sign import fields, signers, timestamps
+    from pyhanko.sign import timestamps
+    from pyhanko.sign.general import SigningError
+    from pyhanko_certvalidator.errors import PathError, ValidationError
 
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
-    meta = signers.PdfSignatureMetadata(
-        field_name=_FIELD,
-        md_algorithm="sha256",
-        subfilter=fields.SigSeedSubFilter.PADES,
-        certify=True,
-        docmdp_permissions=fields.MDPPerm.NO_CHANGES,
-    )
-    out = io.BytesIO()
+    logging.getLogger("pyhanko_certvalidator").setLevel(logging.CRITICAL)
     with _opened(key) as signer:
         _check_in_force(signer.signing_cert)
-        stamper = (
-            None if timestamp_url is None else timestamps.HTTPTimeStamper(timestamp_url, timeout=_WAIT_S)
-        )
         try:
-            signers.sign_pdf(
-                IncrementalPdfFileWriter(io.BytesIO(pdf)),
-                meta,
-                signer=signer,
-                output=out,
-                bytes_reserved=_ROOM_BYTES,
-                timestamper=stamper,
-            )
+            return asyncio.run(_signed(pdf, signer, timestamp_url, long_term))
         except (timestamps.TimestampRequestError, OSError) as error:
             if timestamp_url is None:
                 raise
             raise InputError(
                 f"the time stamp authority {timestamp_url} gave no time stamp: {_why(error)}; nothing was issued"
             ) from error
+        except (SigningError, PathError, ValidationError) as error:
+            if long_term is None:
+                raise
+            raise InputError(
+                f"the certificates of signer and time stamp cannot be judged by {long_term} and what their authorities "
+                f"say: {_why(error.__cause__ or error)}; nothing was issued"
+            ) from error
+
+
+async def _signed(pdf: bytes, signer: Any, timestamp_url: str | None, long_term: Path | None) -> bytes:
+    """Return the signed PDF. Raises what pyHanko raises, and InputError for the file of ``long_term``."""
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign import fields, signers, timestamps
+
+    stamper = None if timestamp_url is None else timestamps.HTTPTimeStamper(timestamp_url, timeout=_WAIT_S)
+    out = io.BytesIO()
+    async with nullcontext() if long_term is None else fetching_context(long_term) as context:
+        meta = signers.PdfSignatureMetadata(
+            field_name=_FIELD,
+            md_algorithm="sha256",
+            subfilter=fields.SigSeedSubFilter.PADES,
+            certify=True,
+            docmdp_permissions=fields.MDPPerm.NO_CHANGES,
+            validation_context=context,
+            embed_validation_info=context is not None,
+            dss_settings=together_with_signature(),
+        )
+        await signers.async_sign_pdf(
+            IncrementalPdfFileWriter(io.BytesIO(pdf)),
+            meta,
+            signer=signer,
+            output=out,
+            bytes_reserved=_ROOM_BYTES,
+            timestamper=stamper,
+        )
     return out.getvalue()
 
 
@@ -175,7 +198,7 @@ def _token_signer(key: TokenKey) -> Iterator[Any]:
             raise InputError(f"{named} does not sign with {key.key!r}: {_why(error)}") from error
 
 
-def _why(error: Exception) -> str:
+def _why(error: BaseException) -> str:
     """Return the message of a token; its errors are mostly the names of return codes, such as PinIncorrect."""
     message = str(error).strip()
     return f"{type(error).__name__}: {message}" if message else type(error).__name__

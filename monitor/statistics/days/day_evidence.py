@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.records import Array
 from monitor.statistics.scan import DAY_GRID, WIDE_DAYS
@@ -31,14 +30,18 @@ def shows_wide_days(support: Array) -> npt.NDArray[np.bool_]:
     assert support.shape[1] == usual + len(WIDE_DAYS)
     # As if one parameter more had shown a usual component.
     before = np.concatenate([np.full(usual, 1.0 / usual), np.zeros(len(WIDE_DAYS))])
-    shown = np.zeros(len(support), dtype=np.bool_)
-    for i, log_likelihood in enumerate(support):
-        others = np.delete(support, i, axis=0)
-        share = np.full(support.shape[1], 1.0 / support.shape[1])
-        for _ in range(STEPS):
-            share = (before + scipy.special.softmax(others + np.log(share), axis=1).sum(axis=0)) / (
-                1 + len(others)
-            )
-            share = np.maximum(share, 1e-300)
-        shown[i] = scipy.special.softmax(log_likelihood + np.log(share))[usual:].sum() >= LIKELY
-    return shown
+    p = len(support)
+    # Row i: the others of parameter i. All shares are followed at once: p loops of arrays so small would take p times as
+    # long.
+    others = support[np.arange(p - 1) + (np.arange(p - 1) >= np.arange(p)[:, np.newaxis])]
+    share = np.full(support.shape, 1.0 / support.shape[1])
+    for _ in range(STEPS):
+        share = (before + _parts(others + np.log(share)[:, np.newaxis, :]).sum(axis=1)) / p
+        share = np.maximum(share, 1e-300)
+    return np.asarray(_parts(support + np.log(share))[:, usual:].sum(axis=1) >= LIKELY)
+
+
+def _parts(logarithms: Array) -> Array:
+    """Return what each exponential is of the sum along the last axis."""
+    above = np.exp(logarithms - logarithms.max(axis=-1, keepdims=True))
+    return np.asarray(above / above.sum(axis=-1, keepdims=True))

@@ -15,12 +15,23 @@ from monitor.exceptions import StoreError
 from monitor.store.archiving import ACTION as ARCHIVE
 from monitor.store.connection import Database
 from monitor.store.copies.backup import audit_ends, begin_copy, checksums, finished_copy, quoted
-from monitor.store.copies.manifest import Backup, Checksums, Span, list_backups, write_manifest
+from monitor.store.copies.manifest import (
+    Backup,
+    Checksums,
+    Span,
+    list_backups,
+    note_current,
+    refuse_existing,
+    write_manifest,
+)
 from monitor.store.entries import rows_recorded, select_portion
 
 
 def take_increment(db: Database, target: str | Path) -> Backup:
     """Write what was stored since the newest backup in the folder of ``target`` into that new file, with a manifest.
+
+    Where nothing was, no file is made: that newest backup is returned, and its manifest says that it holds all until
+    now.
 
     Raises StoreError where the folder has no backup that this database followed, or rows were stored otherwise.
     """
@@ -29,6 +40,10 @@ def take_increment(db: Database, target: str | Path) -> Backup:
     before = previous.span
     assert before is not None
     database, last, last_sha256, schema = audit_ends(db)
+    refuse_existing(target)
+    if last == before.last_entry:
+        _compare_counts(db, before.totals, previous.path)
+        return note_current(target.with_name(previous.path), previous)
     with finished_copy(target) as partial:
         with db.attached(partial, "increment"):
             begin_copy(db, partial)

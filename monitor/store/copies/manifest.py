@@ -7,7 +7,7 @@ import json
 import os
 import stat
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import duckdb
@@ -15,6 +15,8 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import utc_now
+from monitor.store.kept_blocks import ENDING
+from monitor.store.opening import sync_folder
 
 _MANIFEST_END = ".manifest.json"
 
@@ -46,7 +48,8 @@ class Backup:
     """A backup: its file and hash, when it was made (UTC), and rows and checksum of every table in the file.
 
     The checksum is DuckDB's own hash, summed over the rows; it compares tables within ``duckdb_version`` only. ``span``
-    is None where version 0.2.0 or an earlier one made it.
+    is None where version 0.2.0 or an earlier one made it. ``current_at`` is when an incremental backup last had nothing
+    to add to it; None where none was asked for since.
     """
 
     path: str
@@ -56,6 +59,12 @@ class Backup:
     duckdb_version: str
     tables: Checksums
     span: Span | None = None
+    current_at: str | None = None
+
+    @property
+    def holds_until(self) -> str:
+        """The last moment (UTC) of which it is known to hold everything."""
+        return self.current_at or self.made_at
 
 
 def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -> Backup:
@@ -69,14 +78,33 @@ def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -
         tables,
         span,
     )
+    _write(backup, partial)
+    sync(partial)
+    return backup
+
+
+def note_current(path: Path, backup: Backup) -> Backup:
+    """Write into the manifest of a backup that it holds everything until now. Raises StoreError."""
+    partial = path.with_name(path.name + ".partial")
+    renewed = replace(backup, current_at=utc_now().isoformat())
+    try:
+        manifest_of(partial).unlink(missing_ok=True)
+        _write(renewed, partial, stat.S_IMODE(os.stat(path).st_mode))
+        os.replace(manifest_of(partial), manifest_of(path))
+        sync_folder(path.absolute().parent)
+    except OSError as fault:
+        raise StoreError(f"the manifest of {path} could not be written: {fault}") from fault
+    return renewed
+
+
+def _write(backup: Backup, partial: Path, mode: int | None = None) -> None:
+    """Write a manifest beside a file, for those who may read the file, onto the disk. Raises OSError."""
     path = manifest_of(partial)
     with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
         file.write(json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n")
     # Who may read the backup may read what it has to be compared with.
-    os.chmod(path, stat.S_IMODE(os.stat(partial).st_mode))
-    for written in (partial, path):
-        sync(written)
-    return backup
+    os.chmod(path, stat.S_IMODE(os.stat(partial).st_mode) if mode is None else mode)
+    sync(path)
 
 
 def manifest_of(path: Path) -> Path:
@@ -105,7 +133,8 @@ def list_backups(folder: str | Path) -> tuple[Backup, ...]:
 
 def remove_partial(partial: Path) -> None:
     """Remove what was not finished: the file, its log and its manifest."""
-    for path in (partial, partial.with_name(partial.name + ".wal"), manifest_of(partial)):
+    beside = (partial.with_name(partial.name + ending) for ending in (".wal", ENDING))
+    for path in (partial, *beside, manifest_of(partial)):
         path.unlink(missing_ok=True)
 
 

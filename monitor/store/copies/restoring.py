@@ -63,9 +63,10 @@ def restore(source: str | Path, target: str | Path, at: datetime | None = None) 
         source = _backup_in(source, moment)
     chain = _chain(source)
     refuse_existing(target)
-    if moment is not None and moment > datetime.fromisoformat(chain[-1].made_at):
+    if moment is not None and moment > datetime.fromisoformat(chain[-1].holds_until):
         raise InputError(
-            f"--at {moment:%Y-%m-%d %H:%M:%S} UTC is later than {source.name}, made at {chain[-1].made_at[:19]} UTC: "
+            f"--at {moment:%Y-%m-%d %H:%M:%S} UTC is later than {source.name}, which holds all until "
+            f"{chain[-1].holds_until[:19]} UTC: "
             "what was stored after that is in none; name an earlier moment, or a later backup"
         )
     partial = target.with_name(target.name + ".partial")
@@ -94,12 +95,12 @@ def _backup_in(folder: Path, moment: datetime | None) -> Path:
         names = ", ".join(backup.path for backup in backups[-5:])
         raise InputError(f"{folder} has backups of several databases; name one of them: {names}")
     later = [
-        backup for backup in backups if moment is None or moment <= datetime.fromisoformat(backup.made_at)
+        backup for backup in backups if moment is None or moment <= datetime.fromisoformat(backup.holds_until)
     ]
     if not later:
         raise InputError(
-            f"--at {moment:%Y-%m-%d %H:%M:%S} UTC is later than the newest backup in {folder}, made at "
-            f"{backups[-1].made_at[:19]} UTC: what was stored after that is in none"
+            f"--at {moment:%Y-%m-%d %H:%M:%S} UTC is later than the newest backup in {folder}, which holds all "
+            f"until {backups[-1].holds_until[:19]} UTC: what was stored after that is in none"
         )
     return folder / (later[-1] if moment is None else later[0]).path
 

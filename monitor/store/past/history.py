@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
 from types import MappingProxyType
@@ -50,6 +50,8 @@ FROM (
 ORDER BY ALL
 """
 
+_LACK_OF_FIT = "SELECT identification_id, p_value FROM lack_of_fit WHERE identification_id IN ({marks})"
+
 _CHANNELS = """
 SELECT campaign_id, run, e.key AS channel, avg(e.value) AS value
 FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing WHERE campaign_id IN ({marks}))
@@ -70,9 +72,24 @@ ORDER BY ALL
 
 
 @dataclass(frozen=True)
-class _Identified:
-    """The head of an identification: its number, of how many runs it is, and its parameters."""
+class CampaignFit:
+    """How the readings of a campaign judge the ``model`` (a version of it) that its values come from.
 
+    ``lack_of_fit_p`` is the probability of as much lack of fit where the model is right; None where nothing could be
+    compared.
+    """
+
+    model: str
+    version: int
+    lack_of_fit_p: float | None
+
+
+@dataclass(frozen=True)
+class _Identified:
+    """The head of an identification: its model, its number, of how many runs it is, and its parameters."""
+
+    model: str
+    version: int
     runs: int
     number: int
     parameters: tuple[str, ...]
@@ -90,7 +107,8 @@ class MachineHistory:
     the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
     are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
     of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
-    in the same order.
+    in the same order. ``fits`` by campaign say whether its readings refute the model, where that was looked for: none
+    for identifications of older versions.
     """
 
     machine: str
@@ -110,6 +128,7 @@ class MachineHistory:
     tolerances: Mapping[str, float]
     unidentified: tuple[str, ...]
     channels: frozenset[str] = frozenset()
+    fits: Mapping[str, CampaignFit] = field(default_factory=dict)
 
     @cached_property
     def seconds(self) -> Array:
@@ -208,7 +227,22 @@ def _read(
         tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
         unidentified=_unidentified(campaigns, recorded, identified),
         channels=channels,
+        fits=_fits(db, campaigns, identified),
     )
+
+
+def _fits(
+    db: Database, campaigns: Mapping[int, tuple[str, str]], identified: Mapping[int, _Identified]
+) -> dict[str, CampaignFit]:
+    """Return how the readings of each campaign judge its model, where that was stored, in the order of import."""
+    judged = dict(_with_marks(db, _LACK_OF_FIT, [head.number for head in identified.values()]))
+    return {
+        name: CampaignFit(
+            identified[number].model, identified[number].version, judged[identified[number].number]
+        )
+        for number, (name, _) in campaigns.items()
+        if number in identified and identified[number].number in judged
+    }
 
 
 def _unidentified(
@@ -243,7 +277,7 @@ def _identified(
         run_count, number, *lists = head
         current = identified.get(campaign)
         if current is None or (run_count, number) > (current.runs, current.number):
-            identified[campaign] = _Identified(run_count, number, *map(tuple, lists))
+            identified[campaign] = _Identified(of_model, of_version, run_count, number, *map(tuple, lists))
     return identified
 
 

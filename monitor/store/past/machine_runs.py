@@ -145,10 +145,11 @@ def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> d
     if not numbers:
         return {}
     marks = ", ".join("?" * len(numbers))
-    rows = db.rows(
-        "SELECT parameter, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) FROM parameter_frame "
-        f"WHERE identification_id IN ({marks}) GROUP BY parameter",
+    # Put together here: DuckDB takes three times as long for its ordered aggregate of distinct texts.
+    frames: dict[str, set[str]] = {}
+    for parameter, refers_to in db.rows(
+        f"SELECT DISTINCT parameter, refers_to FROM parameter_frame WHERE identification_id IN ({marks})",
         [number for (number,) in numbers],
-    )
-    of_machine = dict(rows)
-    return {name: of_machine[name] for name in parameters if name in of_machine}
+    ):
+        frames.setdefault(parameter, set()).add(refers_to)
+    return {name: " or ".join(sorted(frames[name])) for name in parameters if name in frames}

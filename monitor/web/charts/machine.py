@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.web.charts.chart import Trace
@@ -22,7 +23,8 @@ ARC, TURN = 40, np.radians(300.0)
 
 
 def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
-    """Draw every axis: a linear one as an arrow, a rotary one as its line with the arc of its positive turn.
+    """Draw every axis: a linear one as a bar, a rotary one as its line with the arc of its positive turn; the table
+    that turns, and the nose of the spindle, so that one sees which end is which.
 
     Lengths follow what was probed, because a topology has none. A machine seen from outside whose axes lie apart (a
     robot) is drawn as its arm with all axes at zero.
@@ -32,6 +34,7 @@ def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
     span = max(float((high - low).max()), 1.0)
     arm = [axis for axis in residuals.machine if any(axis.at_mm)]
     traces = [] if not arm else [_arm(residuals.machine)]
+    bodies: list[Trace] = []
     corner = low - 0.12 * span
     for axis in residuals.machine:
         direction = np.array(axis.direction)
@@ -45,14 +48,18 @@ def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
             top = (low + high) / 2.0 + direction * (
                 float((high - low) @ np.abs(direction)) / 2.0 + 0.1 * span
             )
-            traces.append(_line(axis, top, top + 0.22 * span * direction))
-            traces.append(_arc(axis, top + 0.11 * span * direction, 0.05 * span))
+            traces.append(_line(axis, top, top + 0.3 * span * direction))
+            traces.append(_arc(axis, top + 0.24 * span * direction, 0.09 * span))
+            bodies.append(_nose(axis, top, direction, 0.2 * span))
         else:
             along = places @ direction
             ends = [np.array(axis.at_mm) + direction * level for level in _ends(along, span)]
-            traces.append(_line(axis, *ends))
+            # Named at the end where its arc is: the other one may lie in the spindle.
+            traces.append(_line(axis, ends[1], ends[0]))
             traces.append(_arc(axis, ends[0], 0.22 * span))
-    return traces
+            if axis is _table_axis(residuals.machine):
+                bodies.append(_disc(axis, ends[0], 0.22 * span))
+    return [*traces, *bodies]
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,11 @@ def motion_of(residuals: ResidualsAnswer) -> Motion | None:
     )
 
 
+def _table_axis(machine: Sequence[AxisPlace]) -> AxisPlace | None:
+    """The axis that the workpiece is clamped to, where there is one."""
+    return next((axis for axis in reversed(machine) if axis.carries == "workpiece"), None)
+
+
 def _ends(along: Array, span: float) -> tuple[float, float]:
     """Where a rotary axis is drawn from and to: a little further than what was probed along it."""
     return min(float(along.min()), 0.0) - 0.14 * span, max(float(along.max()), 0.0) + 0.14 * span
@@ -118,17 +130,55 @@ def _line(axis: AxisPlace, start: Array, end: Array) -> Trace:
 def _arc(axis: AxisPlace, centre: Array, radius: float) -> Trace:
     """Part of a circle about an axis in the sense of its positive turn, with an arrow's head at its end."""
     direction = np.array(axis.direction)
-    across = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
-    across /= np.linalg.norm(across)
-    further = np.cross(direction, across)
+    across, further = _square_to(direction)
     angles = np.linspace(0.0, TURN, ARC)
-    points = [centre + radius * (np.cos(angle) * across + np.sin(angle) * further) for angle in angles]
+    points = list(_round(centre, direction, radius, angles))
     back = points[-1] - 0.35 * radius * (-np.sin(TURN) * across + np.cos(TURN) * further)
     outwards = (points[-1] - centre) / radius
     head = [back + 0.16 * radius * outwards, points[-1], back - 0.16 * radius * outwards]
     return {
         "type": "scatter3d", "mode": "lines", **_points([*points, *head]), "meta": axis.name,
         "line": {"color": "@mid", "width": 4}, "hoverinfo": "skip", "showlegend": False,
+    }  # fmt: skip
+
+
+def _square_to(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors square to a direction; with it they are right-handed."""
+    across = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
+    across /= np.linalg.norm(across)
+    return across, np.cross(direction, across)
+
+
+def _round(centre: Array, direction: Array, radius: float, angles: Array) -> Array:
+    """Points about an axis at the angles (n, 3)."""
+    across, further = _square_to(direction)
+    return centre + radius * (np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * further)
+
+
+def _disc(axis: AxisPlace, centre: Array, radius: float) -> Trace:
+    """The table that turns with an axis."""
+    rim = _round(centre, np.array(axis.direction), radius, np.linspace(0.0, 2.0 * np.pi, ARC, endpoint=False))
+    corners = np.arange(1, ARC + 1)
+    return _body(axis, [centre, *rim], [np.zeros(ARC, np.int64), corners, np.roll(corners, -1)])
+
+
+def _nose(axis: AxisPlace, tip: Array, direction: Array, length: float) -> Trace:
+    """The nose of a spindle, which narrows towards the tool."""
+    angles = np.linspace(0.0, 2.0 * np.pi, ARC, endpoint=False)
+    near = _round(tip, direction, 0.12 * length, angles)
+    far = _round(tip + length * direction, direction, 0.45 * length, angles)
+    low = np.arange(ARC)
+    after, up = np.roll(low, -1), low + ARC
+    triangles = [np.concatenate(pair) for pair in ((low, up), (after, after + ARC), (up, after))]
+    return _body(axis, [*near, *far], triangles)
+
+
+def _body(axis: AxisPlace, points: Sequence[Array], triangles: Sequence[npt.NDArray[np.int64]]) -> Trace:
+    """A surface that one can look through, of triangles given by the numbers of their corners."""
+    corners = {name: numbers.tolist() for name, numbers in zip("ijk", triangles, strict=True)}
+    return {
+        "type": "mesh3d", **_points(points), **corners, "meta": axis.name, "color": "@mid", "opacity": 0.22,
+        "hoverinfo": "skip", "showlegend": False,
     }  # fmt: skip
 
 

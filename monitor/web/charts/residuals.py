@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 
 #: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
-MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100)
+MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+#: From where the machine is looked at; the middle is lowered, so that the axes below it stay in the picture.
+CAMERA = {"eye": {"x": 1.1, "y": -1.5, "z": 0.72}, "center": {"x": 0.0, "y": 0.0, "z": -0.14}}
 #: More rotary poses than this are no list that anybody chooses from.
 MOST_POSES = 80
 
@@ -29,7 +31,11 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
     """Show the machine and the probed places; the script adds the arrows, and changes size, run, pose and effect."""
     frame = {
         name: axis(
-            f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False, showspikes=False
+            f"{name[0].upper()} / mm",
+            nticks=5,
+            backgroundcolor="rgba(0,0,0,0)",
+            showbackground=False,
+            showspikes=False,
         )
         for name in ("xaxis", "yaxis", "zaxis")
     }
@@ -38,13 +44,13 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
         says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
         traces=machine_traces(residuals),
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.2, "y": -1.62, "z": 0.84}}},
+            "scene": {**frame, "aspectmode": "data", "camera": CAMERA},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
             "uirevision": "scene",
             "showlegend": True,
-            "legend": {"orientation": "h", "y": 0.02, "x": 0.02, "bgcolor": "@paper"},
+            "legend": {"orientation": "h", "y": 1.0, "yanchor": "top", "x": 0.0, "bgcolor": "@paper"},
         },
-        height=560,
+        height=620,
     )
 
 
@@ -74,10 +80,14 @@ def explained_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
 
 
 def first_magnification(residuals: ResidualsAnswer) -> int:
-    """Return the step of the slider at which the longest arrows take a quarter of what was probed."""
-    places = np.array(residuals.place_mm)
+    """Return the step of the slider at which the longer arrows, means of runs, take a quarter of what was probed."""
+    places, in_fit = np.array(residuals.place_mm), ~np.array(residuals.left_out)
     span = float((places.max(axis=0) - places.min(axis=0)).max())
-    lengths = np.linalg.norm(np.array(residuals.residual_um), axis=1)[~np.array(residuals.left_out)]
+    keys = np.column_stack([np.array(residuals.pose), np.round(places)])[in_fit]
+    _, group, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    sums = np.zeros((len(counts), 3))
+    np.add.at(sums, group.ravel(), np.array(residuals.residual_um)[in_fit])
+    lengths = np.linalg.norm(sums / counts[:, None], axis=1)
     wanted = 0.25 * span / max(float(np.quantile(lengths, 0.9)), 1e-6)
     return int(np.argmin(np.abs(np.log(np.array(MAGNIFICATIONS) / max(wanted, 1e-6)))))
 
@@ -220,15 +230,29 @@ def falling_chart(
             }
         )  # fmt: skip
     lines = [] if expected_um is None else [_level(expected_um, "noise floor")]
+    labels = names if proposed is None else [*names, f"with {proposed.effect}"]
+    every = [*fitted, *held_out, expected_um, None if proposed is None else proposed.rms_after_um]
     return Chart(
         key="falling",
         says="RMS of the residual by version in µm; the noise floor is what the readings' uncertainty leaves",
         traces=traces,
         layout={
-            "xaxis": axis("", type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"), "shapes": lines,
+            # Half a step beside the first and the last: their names are whole.
+            "xaxis": axis("", type="category", range=[-0.5, len(labels) - 0.5]),
+            "yaxis": axis("RMS / µm", range=_falling_range([value for value in every if value is not None])),
+            "shapes": lines,
         },
         height=340,
     )  # fmt: skip
+
+
+def _falling_range(values: Sequence[float]) -> list[float]:
+    """From zero, or where all steps lie far above it from a little below the lowest: the steps are looked at."""
+    low, high = min(values), max(values)
+    return [
+        0.0 if low < 0.5 * high else low - 0.5 * (high - low) - 0.02 * high,
+        high + 0.1 * (high - low) + 0.02 * high,
+    ]
 
 
 def _steps(names: list[str], values: Sequence[float | None], title: str, colour: str, marker: str) -> Trace:
@@ -247,6 +271,6 @@ def _level(value: float, name: str = "") -> Any:
     if name:
         font = {"size": 11, "color": "@ink"}
         line["label"] = {
-            "text": f"{name} {value:.2f} µm", "textposition": "middle", "yanchor": "top", "font": font,
+            "text": f"{name} {value:.2f} µm", "textposition": "start", "yanchor": "top", "font": font,
         }  # fmt: skip
     return line

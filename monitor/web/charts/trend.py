@@ -29,14 +29,15 @@ def trend_chart(
     if trend is not None:
         events = [(event.at, f"{event.kind}: {event.description}") for event in trend.events]
         shapes += [_upright(at, "@violet", "dash") for at, _ in events]
-        notes += [_flag(at, text, "@violet", 1.0) for at, text in events]
+        notes += _flags(values, events, "@violet", 1.0)
     if statement is not None:
         shapes += [_upright(change.at, "@orange", "solid") for change in statement.changes if change.at]
-        notes += [
-            _flag(change.at, f"{change.kind} {number(change.size)} {change.unit}", "@orange", 0.92)
+        changes = [
+            (change.at, f"{change.kind} {number(change.size)} {change.unit}")
             for change in statement.changes
             if change.at
         ]
+        notes += _flags(values, changes, "@orange", 0.84)
         traces += _forecast(statement)
     conditions = _conditions(values)
     return Chart(
@@ -116,11 +117,21 @@ def _upright(at: str, colour: str, dash: str) -> Any:
     }  # fmt: skip
 
 
-def _flag(at: str | None, text: str, colour: str, y: float) -> Any:
-    return {
-        "x": at, "yref": "paper", "y": y, "text": text[:60], "showarrow": False, "xanchor": "left",
-        "font": {"color": colour, "size": 11},
-    }  # fmt: skip
+def _flags(values: ValuesAnswer, flags: Sequence[tuple[str, str]], colour: str, top: float) -> list[Any]:
+    """The words at upright lines, on paper of their own; one below the other in turns, since neighbours may be close.
+
+    Those of the last quarter of the runs stand on the left of their lines, where they have room.
+    """
+    first, last = min(values.started_at), max(values.started_at)
+    late = (first + 0.75 * (last - first)).isoformat()
+    return [
+        {
+            "x": at, "yref": "paper", "y": top - 0.055 * (index % 3), "yanchor": "top", "text": text[:60],
+            "showarrow": False, "xanchor": "right" if at > late else "left", "bgcolor": "@paper",
+            "font": {"color": colour, "size": 11},
+        }
+        for index, (at, text) in enumerate(flags)
+    ]  # fmt: skip
 
 
 def _forecast(statement: ParameterTrend) -> list[Trace]:

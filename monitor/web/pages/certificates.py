@@ -14,7 +14,7 @@ from monitor.exceptions import InputError, MonitorError
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, asked_once, read_form
-from monitor.web.rendering import page
+from monitor.web.rendering import link, page
 from monitor.web.users import User
 
 if TYPE_CHECKING:
@@ -30,9 +30,16 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/certificates")
-    def certificates(request: Request) -> Response:
-        """List the certificates."""
-        return _listed(request)
+    def certificates(request: Request, checked: str = "") -> Response:
+        """List the certificates; below the outcome of a check where one was made."""
+        if not checked:
+            return _listed(request)
+        outcome = request.app.state.outcomes.outcome_of(request.state.user.name, checked)
+        if outcome is None:
+            outcome = Refusal(404, "what this check led to is not held any more: choose the file again")
+        if isinstance(outcome, Refusal):
+            return _listed(request, outcome.status, refusal=outcome)
+        return _listed(request, verification=outcome)
 
     @router.get("/certificate.pdf")
     def document(request: Request, number: str) -> Response:
@@ -51,13 +58,8 @@ def routes() -> APIRouter:
             outcome = await run_in_threadpool(
                 _verified, request.app.state.asker, request.state.user, form, request.app.state.working_folder
             )
-        refused = isinstance(outcome, Refusal)
-        return _listed(
-            request,
-            status=outcome.status if isinstance(outcome, Refusal) else 200,
-            verification=None if refused else outcome,
-            refusal=outcome if refused else None,
-        )
+        key = request.app.state.outcomes.hold(request.state.user.name, outcome)
+        return RedirectResponse(link("/certificates", checked=key), status_code=303)
 
     @router.post("/certificates/withdraw")
     async def withdraw(request: Request) -> Response:

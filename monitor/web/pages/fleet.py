@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
@@ -14,7 +14,7 @@ from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
-from monitor.web.desk import Ticket
+from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from monitor.workflow.query import TableAnswer
 
 IDENTIFY = "identify all"
+#: The question after all machines and parameters.
+ASKED: tuple[str, Mapping[str, Any]] = ("fleet", {"top": 0})
 #: Machines of one page.
 PAGE_SIZE = 40
 
@@ -70,19 +72,34 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
     ]
 
 
-def _summed(request: Request, machines: TableAnswer) -> tuple[FleetAnswer | None, Ticket | None]:
-    """The fleet's answer, None where there is nothing to sum yet, and what the page waits for."""
-    desk = request.app.state.desk
-    answer, ticket = None, None
-    if machines.rows:
-        ticket = desk.ask(request.state.user, "fleet", {"top": 0})
-        try:
-            answer = ticket.answer()
-        except NotFoundError:
-            ticket = None
-    identifying = [other for other in desk.under_way() if other.question == IDENTIFY]
-    waiting = identifying[0] if identifying else ticket
-    return answer, waiting if waiting is not None and not waiting.is_done else None
+@dataclass(frozen=True)
+class _Sums:
+    """What is known of the fleet: the latest ``answer`` (None: none yet), what the page is ``waiting`` for, and the
+    ``moment`` of the answer where campaigns were imported since (UTC, empty: it is of now)."""
+
+    answer: FleetAnswer | None = None
+    waiting: Ticket | None = None
+    moment: str = ""
+
+
+def _summed(request: Request, machines: TableAnswer) -> _Sums:
+    """The fleet's latest answer; where it is being computed anew the one before is shown until then."""
+    desk: Desk = request.app.state.desk
+    identifying = next((other for other in desk.under_way() if other.question == IDENTIFY), None)
+    if not machines.rows:
+        return _Sums(waiting=identifying)
+    ticket, last = desk.ask_rested(request.state.user, *ASKED)
+    try:
+        answer = ticket.answer()
+    except NotFoundError:
+        # Nothing is identified any more, or not yet.
+        return _Sums(waiting=identifying)
+    shown = ticket if answer is not None else last
+    waiting = identifying or (None if ticket.is_done else ticket)
+    if shown is None:
+        return _Sums(waiting=waiting)
+    is_of_now = desk.standing(*ASKED) is shown
+    return _Sums(shown.answer(), waiting, "" if is_of_now else f"{shown.asked_on:%Y-%m-%d %H:%M:%S}")
 
 
 def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
@@ -115,7 +132,8 @@ def routes() -> APIRouter:
     ) -> Response:
         """Show the machines; of one state, of one plant, measured last in a period."""
         machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
-        answer, waiting = _summed(request, machines)
+        sums = _summed(request, machines)
+        answer, waiting = sums.answer, sums.waiting
         rows = [] if answer is None else machine_rows(answer.table, plants_of(machines))
         listed = {row.machine for row in rows}
         every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
@@ -128,7 +146,7 @@ def routes() -> APIRouter:
         first = min(max(first, 0), max(len(shown) - 1, 0))
         return page(
             request, "fleet.html",
-            empty=not machines.rows, waiting=waiting,
+            empty=not machines.rows, waiting=waiting, moment=sums.moment,
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
@@ -136,6 +154,7 @@ def routes() -> APIRouter:
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],
             not_identified=() if answer is None else answer.not_identified,
+            refuted={} if answer is None else answer.models_refuted or {},
         )  # fmt: skip
 
     @router.post("/fleet/identify")

@@ -19,7 +19,7 @@ from monitor.exceptions import InputError, MonitorError
 from monitor.readers import MAPPING as FILE
 from monitor.readers.archive import UploadedFile, unpack, unpack_files
 from monitor.web.asking import check_role
-from monitor.web.desk import Ticket
+from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
 from monitor.web.rendering import link, page
@@ -46,12 +46,9 @@ def routes() -> APIRouter:
         check_role(request.state.user, "import")
         async with read_form(request) as form:
             ticket = await run_in_threadpool(_begun, request, form)
-        if isinstance(ticket, Refusal):
-            return _shown(request, ticket)
-        outcome = await run_in_threadpool(ticket.answer, request.app.state.import_patience_s)
-        if outcome is None:
-            return RedirectResponse(link("/import/under-way", number=ticket.number), status_code=303)
-        return _shown(request, outcome)
+        # A quick one is done when its page is asked for, which then need not load itself again.
+        await ticket.settled(request.app.state.import_patience_s)
+        return RedirectResponse(link("/import/under-way", number=ticket.number), status_code=303)
 
     @router.get("/import/under-way")
     def under_way(request: Request, number: int) -> Response:
@@ -74,9 +71,10 @@ def _shown(
     )  # fmt: skip
 
 
-def _begun(request: Request, form: Form) -> Ticket | Refusal:
+def _begun(request: Request, form: Form) -> Ticket:
     """Begin to import what came with a form; the files are unpacked before, since they go with the form."""
     state, user = request.app.state, request.state.user
+    desk: Desk = state.desk
     folder = Path(tempfile.mkdtemp(dir=state.working_folder))
     try:
         document = {"dry_run": True} if form.texts.get("button") == "look" else {}
@@ -84,7 +82,8 @@ def _begun(request: Request, form: Form) -> Ticket | Refusal:
         files = _sent_files(form, folder)
     except MonitorError as error:
         shutil.rmtree(folder)
-        return _refusal(error, folder)
+        refusal = _refusal(error, folder)
+        return desk.begin(user, "import", {"folders": []}, lambda tell: refusal)
     except BaseException:
         shutil.rmtree(folder)
         raise
@@ -102,7 +101,7 @@ def _begun(request: Request, form: Form) -> Ticket | Refusal:
         finally:
             shutil.rmtree(folder)
 
-    ticket: Ticket = state.desk.begin(user, "import", {"folders": names}, work)
+    ticket = desk.begin(user, "import", {"folders": names}, work)
     # Taken back before it began, nobody else removes what was unpacked.
     ticket.future.add_done_callback(lambda future: shutil.rmtree(folder, ignore_errors=True))
     return ticket

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
 from monitor.reporting.certificate.completeness import IncompleteCertificateError
@@ -20,7 +20,7 @@ from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
-from monitor.web.rendering import page
+from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 from monitor.web.users import User
 
@@ -30,15 +30,19 @@ FILE_BYTES = 2**20
 FILE_NAME = "laboratory.toml"
 #: What stands in the place of the number on a preview.
 PREVIEW = "preview {}"
+GONE = Refusal(
+    404, "what was filled in here is not held any more; nothing of it was stored: fill it in again"
+)
 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What a button of the form led to: a certificate's ``number``, a ``preview`` (PDF), or a ``refusal`` with what is
-    wrong at each box."""
+    """What a button of the form led to: a certificate's ``number``, a ``preview`` (PDF; ``has_preview`` once it is
+    held), or a ``refusal`` with what is wrong at each box."""
 
     number: str = ""
     preview: bytes = b""
+    has_preview: bool = False
     refusal: Refusal | None = None
     faults: Mapping[str, str] = field(default_factory=dict)
     grounds: bool = False
@@ -49,10 +53,15 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/certificate/new")
-    def form(request: Request, campaign: str, run: str = "", replaces: str = "") -> Response:
-        """Show the form, empty."""
+    def form(
+        request: Request, campaign: str, run: str = "", replaces: str = "", filled: str = ""
+    ) -> Response:
+        """Show the form, empty, or as it was filled in when one of its buttons was pressed."""
         texts = {"campaign": campaign, "run": run, "replaces": replaces, "laboratory.language": "en"}
-        return _shown(request, texts, _Outcome())
+        held = request.app.state.outcomes.outcome_of(request.state.user.name, filled) if filled else None
+        if held is not None:
+            return _shown(request, *held)
+        return _shown(request, texts, _Outcome(refusal=GONE if filled else None))
 
     @router.post("/certificate/new")
     async def press(request: Request) -> Response:
@@ -60,15 +69,13 @@ def routes() -> APIRouter:
         async with read_form(request) as filled:
             button = filled.texts.get("button", "")
             texts = dict(filled.texts)
-            if button == "fill":
-                texts, outcome = _with_file(texts, filled)
-                return await run_in_threadpool(_shown, request, texts, outcome)
             if button == "keep":
                 return attachment(FILE_NAME, laboratory_file(texts).encode("utf-8"))
-            outcome = await run_in_threadpool(_pressed_once, request, filled, texts)
-        if outcome.preview:
-            request.app.state.previews.hold(request.state.user.name, outcome.preview)
-        return await run_in_threadpool(_shown, request, texts, outcome)
+            if button == "fill":
+                texts, outcome = _with_file(texts, filled)
+            else:
+                outcome = await run_in_threadpool(_pressed_once, request, filled, texts)
+        return RedirectResponse(_held(request, texts, outcome), status_code=303)
 
     @router.get("/certificate/preview.pdf")
     def preview(request: Request) -> Response:
@@ -80,6 +87,17 @@ def routes() -> APIRouter:
         )
 
     return router
+
+
+def _held(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> str:
+    """Hold what a button led to, and a preview; return the address that shows it."""
+    state, user = request.app.state, request.state.user
+    if outcome.preview:
+        state.previews.hold(user.name, outcome.preview)
+        outcome = replace(outcome, preview=b"", has_preview=True)
+    key = state.outcomes.hold(user.name, (texts, outcome))
+    names = {name: texts.get(name) or None for name in ("run", "replaces")}
+    return link("/certificate/new", campaign=texts.get("campaign", ""), **names, filled=key)
 
 
 def _from_file(form: Form) -> dict[str, str]:

@@ -9,14 +9,16 @@ from datetime import date, timedelta
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
-from starlette.responses import RedirectResponse, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
-from monitor.web.desk import Ticket
+from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import asked_once, read_form
+from monitor.web.pages.fleet import ASKED as FLEET
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Which runs are shown: all, those of a warm machine, those of one that warms up.
 WARMTHS = ("", "warm", "warming up")
+#: So long the script's question for the table of all parameters is held before it has to ask again.
+FETCH_S = 20.0
 #: Usual kinds of events; any word is one.
 KINDS = ("crash", "repair", "compensation", "probe", "note")
 
@@ -37,9 +41,9 @@ def routes() -> APIRouter:
     @router.get("/machine")
     def machine(
         request: Request, name: str, parameter: str = "", since: str = "", until: str = "",
-        colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "",
+        colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "", every: bool = False,
     ) -> Response:  # fmt: skip
-        """Show a machine; one parameter, one period."""
+        """Show a machine; one parameter, one period; with ``every`` the table of all parameters at once."""
         ask, user = request.app.state.asker, request.state.user
         if colour not in GROUPINGS:
             raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
@@ -55,14 +59,31 @@ def routes() -> APIRouter:
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
         campaigns = ask(user, "campaigns", {"machine": name}).campaigns
         trend = trends.shown(shown)
+        all_trends = trends.of_all() if every else trends.of_all_already()
         return page(
             request, "machine.html",
             name=name, parameter=shown, parameters=names, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
-            waiting=trends.waiting, season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
+            every=all_trends if shown else None, waiting=trends.waiting,
+            season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
+        )  # fmt: skip
+
+    @router.get("/machine/parameters")
+    async def parameters(
+        request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
+    ) -> Response:
+        """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
+        desk: Desk = request.app.state.desk
+        ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
+        await ticket.settled(FETCH_S)
+        if not ticket.is_done:
+            return JSONResponse({}, 202)
+        return page(
+            request, "parameters.html",
+            name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
         )  # fmt: skip
 
     @router.get("/machine/values.csv")
@@ -88,9 +109,10 @@ def routes() -> APIRouter:
 
 
 class _Trends:
-    """The trends of a page: of its one parameter at once, of all in the table below as soon as that is answered.
+    """The trends of a page: of its one parameter, and of all where they are answered already or asked for.
 
-    All parameters take some fifteen times as long as one, and share the processor with whoever asks next.
+    All parameters take some five times as long as one, and share the processor with whoever asks next: they are
+    computed for whoever scrolls to their table.
     """
 
     def __init__(self, request: Request, asked: dict[str, Any], parameter: str) -> None:
@@ -111,6 +133,13 @@ class _Trends:
         answer: TrendAnswer | None = self._all.answer()
         return answer
 
+    def of_all_already(self) -> TrendAnswer | None:
+        """Return the trends of all parameters where they need not be computed."""
+        if self._all is None or not self._all.is_done:
+            return None
+        answer: TrendAnswer | None = self._all.answer()
+        return answer
+
     def shown(self, parameter: str) -> TrendAnswer | None:
         """Return what there is of a parameter (empty: the machine has none), None while it is computed."""
         if not parameter or (self._all is not None and self._all.is_done):
@@ -118,8 +147,6 @@ class _Trends:
         if self._one is None:
             self._one = self._of_one(parameter)
         answer: TrendAnswer | None = self._one.answer()
-        if answer is not None:
-            self._all = self._desk.ask(self._user, "trend", self._asked)
         return answer
 
     @property
@@ -231,11 +258,8 @@ def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> V
 def _most_urgent(request: Request, name: str, names: list[str]) -> str:
     """The parameter that the fleet names first, where that is computed already; else the first by name."""
     # Not asked here: of a large fleet that is seconds of work, beside which everybody waits for the page of a machine.
-    ticket = request.app.state.desk.standing("fleet", {"top": 0})
-    try:
-        answer = None if ticket is None else ticket.answer()
-    except NotFoundError:
-        answer = None
+    ticket = request.app.state.desk.answered_last(*FLEET)
+    answer = None if ticket is None else ticket.answer()
     rows = () if answer is None else answer.table
     return next((row.parameter for row in rows if row.machine == name and row.parameter in names), names[0])
 

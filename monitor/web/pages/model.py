@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
@@ -20,7 +21,7 @@ from monitor.web.charts.residuals import (
     scene_chart,
     scene_vectors,
 )
-from monitor.web.desk import Ticket
+from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import Form, asked_once, read_form
 from monitor.web.rendering import link, page
 from monitor.web.words import listed
@@ -74,12 +75,7 @@ def routes() -> APIRouter:
             waiting=answers.waiting,
         )  # fmt: skip
 
-    @router.get("/model/explained")
-    def explained(request: Request, campaign: str, effect: str, model: str = "") -> Response:
-        """Send what an effect explains of every residual, for the script; 202 while it is being computed."""
-        document = {"campaign": campaign, **({"model": model} if model else {}), "effect": effect}
-        residuals = request.app.state.desk.ask(request.state.user, "residuals", document).answer(FETCH_S)
-        return JSONResponse(None, 202) if residuals is None else JSONResponse(explained_vectors(residuals))
+    router.get("/model/explained")(_explained)
 
     @router.post("/model/add")
     async def add(request: Request) -> Response:
@@ -107,6 +103,16 @@ def routes() -> APIRouter:
         return _back(campaign, answer, f"{effect} was taken out")
 
     return router
+
+
+async def _explained(request: Request, campaign: str, effect: str, model: str = "") -> Response:
+    """Send what an effect explains of every residual, for the script; 202 while it is being computed."""
+    document = {"campaign": campaign, **({"model": model} if model else {}), "effect": effect}
+    desk: Desk = request.app.state.desk
+    ticket = await run_in_threadpool(desk.ask, request.state.user, "residuals", document)
+    await ticket.settled(FETCH_S)
+    residuals = ticket.answer()
+    return JSONResponse(None, 202) if residuals is None else JSONResponse(explained_vectors(residuals))
 
 
 class _Answers:

@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from monitor.documents import INLINED, OMITTED
+from monitor.reporting.signature.long_term import LongTermMaterial
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class VerificationAnswer:
     """Whether a file is a valid certificate of this database, by its ``verdict`` a genuine one; ``faults`` say why not.
 
     ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed; ``stamped_at``
-    when a time stamp authority saw the signature.
+    when a time stamp authority saw the signature, ``long_term`` what the file carries to be judged by later.
     """
 
     number: str | None
@@ -111,3 +112,4 @@ class VerificationAnswer:
     signer_sha256: str | None = None
     stamped_at: datetime | None = field(default=None, metadata=OMITTED)
     verdict: Verdict = Verdict.NOT_CONFIRMED
+    long_term: LongTermMaterial | None = field(default=None, metadata=OMITTED)

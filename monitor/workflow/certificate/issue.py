@@ -118,7 +118,7 @@ def _issued(
     keep_issued(db, path)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:
-        pdf = sign(pdf, request.key, request.timestamp_url)
+        pdf = sign(pdf, request.key, request.timestamp_url, request.long_term)
     # The file is whole on the disk before the entry is, and gets its name after it: whenever this is killed, no file
     # bears the name of a certificate that the database does not know.
     part = prepared(path, pdf)

@@ -38,7 +38,8 @@ class CertificateOptions:
     volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it. ``accept`` names the
     grounds against the certificate that the laboratory answers for, each with the reason that is printed on it.
     ``dcc_version`` is the release of the digital certificate (else that of the laboratory's file, else the newest).
-    ``timestamp_url`` is the address of an authority that puts a time stamp (RFC 3161) on the signature.
+    ``timestamp_url`` is the address of an authority that puts a time stamp (RFC 3161) on the signature;
+    ``long_term`` is a file of the certificates that both lead to: what is needed to judge them later is embedded.
 
     Raises InputError for a method or a rule that there is not, or a blank reason.
     """
@@ -62,6 +63,7 @@ class CertificateOptions:
     accept: Mapping[GroundKind, str] = field(default_factory=dict)
     dcc_version: str | None = None
     timestamp_url: str | None = None
+    long_term: Path | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -77,6 +79,11 @@ class CertificateOptions:
         if self.timestamp_url is not None and not re.match(r"https?://[^/]", self.timestamp_url):
             raise InputError(
                 f"--timestamp-url {self.timestamp_url}: write the address of the authority, with http:// or https://"
+            )
+        if self.long_term is not None and (self.key is None or self.timestamp_url is None):
+            raise InputError(
+                "--long-term belongs to a signature with a time stamp: name the key by --sign or --token, and the "
+                "authority by --timestamp-url"
             )
         if self.dcc_version is not None:
             dcc_version(self.dcc_version)

@@ -60,6 +60,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         faults=(*filter(None, faults), *signature.faults, *chain.faults),
         stamped_at=signature.stamped_at,
         verdict=_verdict(signature) if ok else Verdict.NOT_CONFIRMED,
+        long_term=signature.long_term,
     )
 
 

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from monitor.discovery import Explanation, Fit
 from monitor.effects import Basis, ChainEffect, ParsedEffect, parse_effect
 from monitor.effects.context import REFERENCE_TEMPERATURE_DEGC
-from monitor.effects.drivers import Channel, EachRun, LaggedTemperature, RunTime, WarmUp
-from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal
+from monitor.effects.drivers import Channel, EachRun, LaggedTemperature, RunTime, Settling, WarmUp
+from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal, WindUp
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.reporting.figures import driver_names
@@ -118,7 +118,7 @@ def _axis_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
         return {}
     context, joint = fit.problem.context, effect.joint
     reading = joint.sign * context.positions[:, effect.term.joint] * (180.0 / np.pi if joint.turns else 1.0)
-    if isinstance(effect.shape, Reversal):
+    if isinstance(effect.shape, Reversal | WindUp):
         travel = joint.sign * context.travel[:, effect.term.joint]
         return {driver_names.last_travel(joint.name): travel}
     if isinstance(effect.shape, Cyclic):
@@ -149,7 +149,8 @@ def _driver_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
             driver_names.SINCE_DAY_BEGAN: context.day_time / MINUTE.factor,
             driver_names.WARM_UP_WITHIN_RUN: _within_run(context.run, warmth),
         }
-    return {driver_names.PART_OF_RUN: 100.0 * context.run_time} if isinstance(driver, RunTime) else {}
+    of_run = isinstance(driver, RunTime | Settling)
+    return {driver_names.PART_OF_RUN: 100.0 * context.run_time} if of_run else {}
 
 
 def _within_run(run: npt.NDArray[np.int64], values: Array) -> Array:

@@ -84,7 +84,7 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
 def _driver(text: str) -> str:
     name = text.rpartition("@")[2] if "@" in text else ""
     # A time constant that was searched (@warmup45min) is no other driver.
-    return re.sub(r"^(warmup|lagged)[\d.]+min", r"\1", name)
+    return re.sub(r"^(warmup|settling|lagged)[\d.]+min", r"\1", name)
 
 
 def _recorded(driver: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from monitor.documents import OMITTED
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.fleet.attention import Attention
+from monitor.workflow.history.refuted import RefutedCampaign
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
     part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
+    ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from.
     """
 
     machines: int
@@ -68,3 +70,4 @@ class FleetAnswer:
     table: tuple[FleetTableRow, ...]
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
+    models_refuted: Mapping[str, RefutedCampaign] | None = field(default=None, metadata=OMITTED)

@@ -21,6 +21,7 @@ from monitor.store import (
     latest_frames,
     latest_tolerances,
     not_identified,
+    refuted_machines,
     tolerance_types,
 )
 from monitor.units import DAYS_PER_YEAR
@@ -29,7 +30,8 @@ from monitor.workflow.fleet.attention import ATTENTION
 from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, warmth_beside
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
-from monitor.workflow.models import resolve
+from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
+from monitor.workflow.models import label_of, resolve
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,18 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         table=_shown(db, [row for row, _ in measured[:most]]),
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
+        models_refuted=_refuted(db, request.model) or None,
     )
+
+
+def _refuted(db: Database, model: str | None) -> dict[str, RefutedCampaign]:
+    """Return by machine the latest campaign, where its readings refute its model."""
+    stored = None if model is None else resolve(db, model)
+    name, version = (None, None) if stored is None else (stored.name, stored.version)
+    return {
+        row.machine: RefutedCampaign(row.campaign, label_of(row.model, row.version), row.p_value)
+        for row in refuted_machines(db, REFUTED_P, name, version)
+    }
 
 
 def _shown(db: Database, rows: list[FleetTableRow]) -> tuple[FleetTableRow, ...]:

@@ -21,6 +21,7 @@ from monitor.reporting.health.sentences import (
 from monitor.store import (
     Database,
     MachineEvent,
+    MachineHistory,
     RecordedRun,
     campaign_tolerances,
     machine_events,
@@ -58,6 +59,7 @@ from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.forecast import drift_forecast
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
+from monitor.workflow.history.refuted import is_refuted
 from monitor.workflow.history.runs import only_runs
 from monitor.workflow.models import resolve_for
 
@@ -173,9 +175,21 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         run=_named(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_of(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
-        model=model_health(explanation, results.versions, measured.span, unchanged), quality=quality,
+        model=model_health(
+            explanation, results.versions, measured.span, unchanged, _refuted_p(history, measured),
+        ),
+        quality=quality,
         map=stated_map(results.map, limit_um, beyond),
     )  # fmt: skip
+
+
+def _refuted_p(history: MachineHistory, measured: MeasuredWeek) -> float | None:
+    """Return the p-value of lack of fit where the readings refute the model; None where runs of the campaign are still
+    to come, as what is stored is of all of them."""
+    fit = history.fits.get(measured.last.campaign)
+    if fit is None or measured.span.before is not None or not is_refuted(fit):
+        return None
+    return fit.lack_of_fit_p
 
 
 def _limits(db: Database, campaign: str, remarks: list[Said]) -> dict[str, float]:

@@ -19,11 +19,13 @@ def model_health(
     versions: HistoryAnswer | None,
     span: Span,
     unchanged: Set[str],
+    refuted_p: float | None = None,
 ) -> ModelHealth | None:
     """The comparison, which is of the runs of ``span``: their number and days are said with it.
 
     ``versions`` of the model are None where there is one only.
-    ``unchanged`` are the parameters whose history shows no change.
+    ``unchanged`` are the parameters whose history shows no change; ``refuted_p`` is the p-value of lack of fit, where
+    the readings of the whole campaign refute the model.
     """
     if explanation is None:
         return None
@@ -64,6 +66,7 @@ def model_health(
                 if isinstance(change, ChangedParameter) and change.parameter in unchanged
             )
         ),
+        refuted_p=refuted_p,
     )
 
 

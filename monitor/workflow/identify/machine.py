@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification, RunIdentification
-from monitor.methods.chain.problem import Solver, solve_problem
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.model import chain_of
 from monitor.records import Array, Campaign, Machine
 from monitor.refusal import Reason, ReasonKind, Refusal
@@ -14,6 +17,7 @@ from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun, reversal_value
+from monitor.workflow.identify.lack_of_fit import lack_of_fit
 from monitor.workflow.identify.notes import note
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.machine_frame import frames_of, refers_to
@@ -22,12 +26,19 @@ from monitor.workflow.uncertainty.machine_frame import frames_of, refers_to
 def identified(
     campaign: Campaign, model: StoredModel, solve: Solver = solve_problem
 ) -> tuple[Identification, StoredIdentification]:
-    """Identify a campaign under a model; the result, and the same as it is stored.
+    """Identify a campaign under a model; the result, and the same as it is stored, with its lack of fit.
 
     ``solve`` gives the solution of the method's problem. Raises DataError, EffectError as ``identify``.
     """
-    identification = campaign_method(campaign).identify(campaign, as_model(model), solve)
-    return identification, _stored(campaign, identification, model)
+    solved: list[tuple[ChainProblem, Solution]] = []
+
+    def remembered(problem: ChainProblem) -> Solution:
+        solved.append((problem, solve(problem)))
+        return solved[-1][1]
+
+    identification = campaign_method(campaign).identify(campaign, as_model(model), remembered)
+    judged = lack_of_fit(*solved[-1], is_gross=bool(identification.gross))
+    return identification, replace(_stored(campaign, identification, model), lack_of_fit=judged)
 
 
 def machine_answer(machine: Machine, identification: Identification) -> IdentifyAnswer:

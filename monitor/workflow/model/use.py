@@ -17,7 +17,6 @@ from monitor.store import (
     save_identification,
     save_machine_model,
 )
-from monitor.workflow.identify.machine import identified
 from monitor.workflow.model.answer import UseModelAnswer
 from monitor.workflow.model.request import UseModelRequest
 from monitor.workflow.models import label, label_of, resolve
@@ -38,6 +37,9 @@ def use_model(db: Database, request: UseModelRequest) -> UseModelAnswer:
         choice = save_machine_model(db, request.machine, method, (model.name, model.version), request.reason)
     finished, failed = [], {}
     history = machine_history(db, request.machine, model=model.name, version=model.version)
+    if history.unidentified:
+        # Loaded here: a list of models needs no solver.
+        from monitor.workflow.identify.machine import identified
     for name in history.unidentified:
         campaign = load_campaign(db, name)
         if campaign.method != method:

@@ -14,6 +14,7 @@ from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.season import Season, SlopeVerdict
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
@@ -371,6 +372,8 @@ class TrendAnswer:
 
     ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated;
     ``refers_to`` says in words what the parameters are relative to, those that are errors of the chain.
+    ``model_refuted``: campaigns whose readings refute the model that the values come from; None where none does, or
+    where an older version identified them and nothing is known.
     """
 
     machine: str
@@ -391,3 +394,4 @@ class TrendAnswer:
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     refers_to: Mapping[str, str] = field(default_factory=dict)
+    model_refuted: ModelRefuted | None = field(default=None, metadata=OMITTED)

@@ -31,6 +31,7 @@ from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
+from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
 from monitor.workflow.trend.answer import (
     ControlCharts,
@@ -64,8 +65,10 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     """
     history = _history(db, request)
     events = machine_events(db, request.machine)
+    # Read before anything is computed: the file is let go of when nothing was asked for a moment.
+    refers_to = parameter_frames(db, request.machine, history.parameters)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-    answer = _answer(db, request, history, events, past)
+    answer = _answer(db, request, history, events, past, refers_to)
     if past and request.is_plain and not db.read_only:
         save_analysis(
             db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED,
@@ -128,7 +131,9 @@ def _answer(
     history: MachineHistory,
     events: list[MachineEvent],
     past: Mapping[str, ParameterPast],
+    refers_to: Mapping[str, str],
 ) -> TrendAnswer:
+    refuted = model_refuted(history)
     head = TrendAnswer(
         machine=request.machine,
         since=None if request.since is None else request.since.isoformat(),
@@ -140,12 +145,18 @@ def _answer(
             RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
             for event in events
         ),
-        notes=(*map(str, same_hours(history)), *_not_followed(history), *_limits_of_type(db, history)),
+        notes=(
+            *map(str, same_hours(history)),
+            *_not_followed(history),
+            *_limits_of_type(db, history),
+            *_refuted(refuted),
+        ),
         false_alarm=FALSE_ALARM,
         seed=SEED,
         why=None if past else _why_none(request),
         parameters={},
-        refers_to=parameter_frames(db, request.machine, tuple(past)),
+        refers_to={name: refers_to[name] for name in past if name in refers_to},
+        model_refuted=refuted,
     )
     if not past:
         return head
@@ -182,6 +193,15 @@ def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
     if name is None:
         return ()
     return (messages.limits_of_type(name),)
+
+
+def _refuted(refuted: ModelRefuted | None) -> tuple[str, ...]:
+    """That readings refute the model, and what names what it lacks."""
+    if refuted is None:
+        return ()
+    latest = refuted.campaigns[-1]
+    names = tuple(campaign.campaign for campaign in refuted.campaigns)
+    return (messages.model_refuted(names, refuted.judged, latest.model, latest.p_value),)
 
 
 def _not_followed(history: MachineHistory) -> list[str]:

@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 
 from monitor.reporting.certificate.grounds import Ground, GroundKind
+from monitor.workflow.history.refuted import REFUTED_P
 from monitor.workflow.uncertainty.answer import FrameworkAnswer, UncertaintyAnswer
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT
 
 #: Lack of fit over the rest of the budget, as standard uncertainties: from one on it is more than all else together.
 #: docs/trials-grounds.md has the rates.
 MOST_OF_THE_REST = 1.0
-#: One right model in a thousand, as `compare` tests it.
-LEVEL = 1e-3
 
 
 def largest_lack(framework: FrameworkAnswer) -> tuple[str, float] | None:
@@ -45,7 +44,7 @@ def lack_in_budget(answer: UncertaintyAnswer) -> tuple[Ground, ...]:
     if largest is None or largest[1] <= MOST_OF_THE_REST:
         return ()
     p_value = answer.residuals.lack_of_fit_p
-    is_refuted = answer.residuals.something_is_missing if p_value is None else p_value < LEVEL
+    is_refuted = answer.residuals.something_is_missing if p_value is None else p_value < REFUTED_P
     if not is_refuted:
         return ()
     parameter, times = largest

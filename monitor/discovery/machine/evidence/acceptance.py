@@ -54,6 +54,14 @@ def blocks_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
     return np.asarray(scene.run * count + np.tile(np.arange(rows) * count // rows, runs))
 
 
+def rows_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
+    """The reading (M,) of every whitened number, counted over all runs."""
+    runs, rows = scene.fit.solution.last.residual.shape
+    numbers = scene.fit.problem.sigma.shape[1]
+    of_run = np.arange(rows) // numbers
+    return np.asarray((np.arange(runs)[:, None] * (of_run[-1] + 1) + of_run).reshape(-1))
+
+
 class ChainAcceptance(Acceptance[ChainCandidate]):
     """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
     the scene takes for granted."""
@@ -69,7 +77,9 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self.rate = rate
         self._families = family_count(scene)
         self._poses = poses_of_rows(scene.fit)
-        self._units = (scene.run, blocks_of_runs(scene))
+        # Readings one by one only where neighbours do not resemble each other.
+        alone = (rows_of_runs(scene),) if scene.fit.whitening is None else ()
+        self._units = (scene.run, blocks_of_runs(scene), *alone)
         self._flexible = FlexibleErrors(scene, drivers)
         self._wander = tracker_wander(scene)
         self._weighed: Memory[float] = Memory()
@@ -194,7 +204,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
     def stands_among(
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
     ) -> bool:
-        """Whether an effect stands out under sign flips of whole runs, where there are enough of them."""
+        """Whether an effect stands out under sign flips of whole runs, of blocks of them or, in one run of independent
+        readings, of these: noise with heavy tails follows no F distribution. True where too few show it."""
         if pool is not self._pool:
             self._pool, self._flipped = pool, Memory()
         p_value = self._flipped.answer(

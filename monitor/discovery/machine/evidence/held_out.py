@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import inverse_above, orthonormal, without
 from monitor.records import Array
 
 PARTS = 10
@@ -182,7 +182,7 @@ def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]
         grams.append(np.eye(shared_rows.shape[2]) - shared_rows.reshape(left_out.size, -1).T @ reaction)
         ontos.append(reaction.T @ left_out.reshape(-1))
         parts.append(((fold.predicted @ left_out[..., None]).reshape(-1), reaction))
-    inverses = np.linalg.pinv(np.array(grams), rcond=PREDICTED, hermitian=True)
+    inverses = inverse_above(np.array(grams), PREDICTED)
     shares = (inverses @ np.array(ontos)[..., None])[..., 0]
     errors = [alone + reaction @ share for (alone, reaction), share in zip(parts, shares, strict=True)]
     return float(np.sqrt(sum(float(error @ error) for error in errors) / number))

@@ -4,8 +4,8 @@ A strain wave drive errs at many orders at once. Searched one by one they fill a
 which the next one moves. So, before the search, the lines of all joints are pursued together (orthogonal matching
 pursuit: Pati, Rezaiifar and Krishnaprasad, Asilomar 1993) on whole orders, with all that weights, play, lag and drifts
 could do taken out, every pose counted as one observation, for as long as poses left out in blocks are predicted better.
-A joint with several lines becomes one effect; a single line is left to the search. Where a table over the travel
-predicts better than the lines, it is the curve.
+A joint with several lines becomes one effect; where no joint has several, single lines are left to the search. Where a
+table over the travel predicts better than the lines, it is the curve.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def columns_of(fit: Fit, texts: Sequence[str]) -> Array:
 
 
 def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tuple[ChainVariant, ...]:
-    """The curves of rotary joints with several lines, one variant a joint; empty where there are none.
+    """The curves of rotary joints, one variant a joint, where some joint has several lines; else empty.
 
     ``variants`` is the catalogue, ``rate`` the false-alarm probability of a sweep over all orders and joints.
     """
@@ -206,6 +206,9 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
         if joint.clusters(lines[joint.index]) > 1
     }
     curves = _with_tables(high, always, joints, lines, curves)
+    if curves:
+        # The search beside curves looks for no lines: those of the other joints come along.
+        curves = {index: _text_of(orders) for index, orders in lines.items() if orders} | curves
     chain = fit.problem.context.chain
     orders = float(sum(len(joint.orders) for joint in joints))
     return tuple(
@@ -215,6 +218,11 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
         for joint in joints
         if joint.index in curves
     )
+
+
+def _text_of(orders: Sequence[float]) -> str:
+    """The shape of the lines of a joint, as one harmonic where there is one."""
+    return f"harmonic{orders[0]:g}" if len(orders) == 1 else harmonics_text(orders)
 
 
 def all_curves_were_searched(fit: Fit) -> bool:

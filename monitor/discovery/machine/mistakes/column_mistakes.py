@@ -13,7 +13,7 @@ from monitor.records import Array, Campaign
 
 #: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
 MOST_TARGETS = 12
-MEASURED = ("tracker_", "plane_", "paraboloid_")
+MEASURED = ("tracker_", "plane_", "paraboloid_", "direction_")
 #: Columns of a sensor of two spots, and the columns of its spots.
 SPOTS = (("plane_u_um", "plane_v_um"), ("paraboloid_u_um", "paraboloid_v_um"))
 ACROSS = (("plane_u_um", "paraboloid_u_um"), ("plane_v_um", "paraboloid_v_um"))
@@ -38,6 +38,8 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
     for name in measured:
         yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
     yield from _axes_in_other_units(linear, turning)
+    if "direction_x" in measured:
+        yield from _angles_of_mounts(turning)
     if measured and measured[0].startswith("tracker_"):
         yield f"{', '.join(measured)} were in metres", _of_channels(_scaled(measured, 1e3))
     yield from _exchanged_targets(campaign)
@@ -88,6 +90,18 @@ def _axes_in_other_units(linear: Sequence[str], turning: Sequence[str]) -> Itera
             yield f"{columns} {verb} {unit}", _of_readings(_scaled(group, factor))
 
 
+def _angles_of_mounts(turning: Sequence[str]) -> Iterator[Trial]:
+    """Angles as observatories write them: in hours, or from the zenith or the pole instead of from the horizon or the
+    equator."""
+    for axis in turning:
+        column = _column(axis, ())
+        yield f"{column} was in hours (15 degrees each)", _of_readings(_scaled((axis,), 15.0))
+        yield (
+            f"{column} was counted from 90 degrees (a zenith or polar distance)",
+            _of_readings(_complement(axis)),
+        )
+
+
 def _exchanged_targets(campaign: Campaign) -> Iterator[Trial]:
     names = [str(name) for name in np.unique(campaign.probings.target)]
     if len(names) > MOST_TARGETS:
@@ -135,6 +149,11 @@ def _scaled(names: Sequence[str], factor: float) -> Change:
     return lambda columns: {
         name: values * (factor if name in names else 1.0) for name, values in columns.items()
     }
+
+
+def _complement(name: str) -> Change:
+    """Count a column of angles (rad) from a right angle."""
+    return lambda columns: {**columns, name: np.pi / 2.0 - columns[name]}
 
 
 def _with_targets_exchanged(first: str, second: str) -> Undo:

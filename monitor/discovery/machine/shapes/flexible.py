@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
-from monitor.discovery.machine.shapes.variants import TIME_CONSTANTS_S
+from monitor.discovery.machine.shapes.variants import constants_of
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, with_time_constant
 from monitor.effects.drivers import Always, parse_driver
@@ -58,7 +58,6 @@ class FlexibleErrors:
             return variants
         for name in self.drivers:
             driven = replace(effect, driver=parse_driver(name), driver_text=name)
-            constants = TIME_CONSTANTS_S if name == "warmup" else ()
-            effects = [with_time_constant(driven, tau) for tau in constants] or [driven]
+            effects = [with_time_constant(driven, tau) for tau in constants_of(driven.driver)] or [driven]
             variants += [Variant(f"{name} {number}", each) for number, each in enumerate(effects)]
         return variants

@@ -26,6 +26,9 @@ LOWEST, HIGHEST, STEP = 4.0, 330.0, 0.5
 FEWEST_POSITIONS = 100
 # So many orders of one joint are looked at in detail.
 MOST_PEAKS = 3
+# Periods that the travel has to show before a line is a gear: one, and three where flexure and refraction bend too
+# (of 1.3 periods over the 65 degrees of an elevation axis nobody can say that they repeat).
+FEWEST_PERIODS, FEWEST_BESIDE_BENDS = 1.0, 3.0
 
 
 def in_rows(fit: Fit, padded: Array) -> Array:
@@ -57,6 +60,7 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     rows = in_rows(fit, residual)
     orders = np.arange(LOWEST, HIGHEST + STEP / 2.0, STEP)
     limit = -2.0 * np.log(rate / (len(orders) * len(joints)))
+    fewest = FEWEST_BESIDE_BENDS if problem.needs_whole_periods else FEWEST_PERIODS
     variants = []
     for index in joints:
         joint = chain.joints[index]
@@ -68,8 +72,8 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
         # The two columns are all but orthogonal and of the same length over many positions.
         square = (cosine @ turn) ** 2 + (sine @ turn) ** 2
         power = 2.0 * square / max(float(weight.sum()), 1e-300) / variance
-        # Less than one period over the travel is a bend, not a gear.
-        power = np.where(orders * float(np.ptp(positions[:, index])) < 2.0 * np.pi, 0.0, power)
+        # Too few periods over the travel are a bend, not a gear.
+        power = np.where(orders * float(np.ptp(positions[:, index])) < fewest * 2.0 * np.pi, 0.0, power)
         peaks = np.flatnonzero((power > limit) & (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
         term = f"E{COMPONENTS[3 + joint.main]}{joint.name}"
         for peak in peaks[np.argsort(-power[peaks])][:MOST_PEAKS]:

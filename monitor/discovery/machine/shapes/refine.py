@@ -20,7 +20,7 @@ from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, Context, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import SettlingDriver, parse_driver
-from monitor.effects.shapes import Cyclic, Harmonic
+from monitor.effects.shapes import Cyclic, Harmonic, WindUp
 from monitor.records import Array
 
 # Neighbours on the grid of time constants differ by a factor of two, on that of pitches by a two-hundredth of
@@ -89,6 +89,16 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
         )
+    if isinstance(effect.shape, WindUp):
+        return _Range(
+            "width",
+            "mm",
+            effect.shape.width,
+            float(np.log(GRID_FACTOR)),
+            1e-3,
+            lambda width: replace(variant, effect=_with_width(effect, width)),
+            lambda width: None,
+        )
     if isinstance(effect.shape, Harmonic) and family.endswith(":harmonic"):
         order = float(effect.shape.order)
         return _Range(
@@ -105,6 +115,10 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
 
 def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
     return replace(effect, shape=Harmonic(order), shape_text=f"harmonic{order:.6g}")
+
+
+def _with_width(effect: ChainEffect, width: float) -> ChainEffect:
+    return replace(effect, shape=WindUp(width), shape_text=f"windup{width:.4g}mm")
 
 
 def _with_pitch(effect: ChainEffect, pitch: float) -> ChainEffect:

@@ -16,6 +16,7 @@ import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.slight_shapes import slight_shape
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -62,9 +63,11 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         scene = _with_candidate(scene, selected[0])
     scene, selected = _with_free(scene, selected)
     margin = _margin(scene, selected)
-    alone = None if margin is None else _alone(scene, selected, margin)
-    if alone is not None:
-        selected, scene = [alone], _with_candidate(scene, alone)
+    alone = [] if margin is None else _alone(scene, selected, margin)
+    if alone:
+        selected = alone
+        for free in filter(_is_free, alone):
+            scene = _with_candidate(scene, free)
     if len(selected) == len(result.findings) and all(
         _is_among(shape, result.candidates) for shape in selected
     ):
@@ -93,8 +96,10 @@ def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chain
         others = [shape for shape in selected if not _is_among(shape, mine)]
         free = _free(scene, symbol, mine, others)
         if free is not None:
-            selected = [*others, free]
-            scene = _with_candidate(scene, free)
+            price = 2.0 * free.columns.shape[1] * PRICE
+            bends = bends_instead(scene, symbol, score_beside(scene, [free], others) - price, others)
+            selected = [*others, *(bends or [free])]
+            scene = scene if bends else _with_candidate(scene, free)
     return scene, selected
 
 
@@ -142,14 +147,15 @@ def _slight(scene: ChainScene) -> list[ChainCandidate]:
     return [free] if predicts and _predicts(scene, free, []) else []
 
 
-def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> ChainCandidate | None:
-    """One error of free shape that says more at its price, by a margin, than all selected effects together; None where
-    none does.
+def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> list[ChainCandidate]:
+    """One error, of free shape or as several powers of the position, that says more at its price, by a margin, than all
+    selected effects together; none where none does.
 
     The entry of the catalogue that comes nearest to an unknown shape may be one of another error.
     """
     chain = scene.fit.problem.context.chain
-    best, worth = None, _priced(scene, selected) + margin
+    best: list[ChainCandidate] = []
+    worth = _priced(scene, selected) + margin
     for joint in chain.joints:
         for component in COMPONENTS:
             symbol = f"E{component}{joint.name}"
@@ -158,20 +164,22 @@ def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float)
             ]
             if not shapes:
                 continue
-            whole = _whole(scene, symbol, shapes[0])
-            parts = _parts(scene, whole, [])
+            bends = bends_instead(scene, symbol, worth, [])
+            if bends:
+                best, worth = bends, _priced(scene, bends)
+            parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
             if parts:
                 free = _of_parts(scene, symbol, parts, shapes, [])
                 score = _priced(scene, [free])
                 if score > worth and _predicts(scene, free, []):
-                    best, worth = free, score
+                    best, worth = [free], score
     return best
 
 
 def _priced(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
     """The score of effects together, free shapes at the price of the choice of their parts."""
     number = sum(shape.columns.shape[1] for shape in selected if _is_free(shape))
-    return float(_score(scene, selected, []) - 2.0 * number * PRICE)
+    return float(score_beside(scene, selected, []) - 2.0 * number * PRICE)
 
 
 def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
@@ -190,7 +198,7 @@ def _free(
         return None
     free = _of_parts(scene, symbol, parts, mine, others)
     price = 2.0 * len(parts) * PRICE
-    worth = _score(scene, [free], others) - price > _score(scene, mine, others) + WORTH_EXCHANGING
+    worth = score_beside(scene, [free], others) - price > score_beside(scene, mine, others) + WORTH_EXCHANGING
     return free if worth and _predicts(scene, free, others) else None
 
 
@@ -256,14 +264,6 @@ def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandi
         residual = without(direction, residual[:, None])[:, 0]
         columns = without(direction, columns)
     return parts
-
-
-def _score(scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate]) -> float:
-    """The score of effects together beside others, one after the other."""
-    return sum(
-        weigh_beside(scene, [candidate], [*others, *selected[:index]])[0].score
-        for index, candidate in enumerate(selected)
-    )
 
 
 def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
@@ -11,9 +11,19 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
-from monitor.effects.drivers import Always, EachRun, LaggedTemperature, SettlingDriver, parse_driver
+from monitor.effects.drivers import (
+    Always,
+    Driver,
+    EachRun,
+    LaggedTemperature,
+    Settling,
+    SettlingDriver,
+    WarmUp,
+    parse_driver,
+)
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
+from monitor.effects.shapes.poly import Poly
 from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
@@ -23,37 +33,75 @@ from monitor.records import Array
 TIME_CONSTANTS_S = tuple(600.0 * 2.0**step for step in range(7))
 # A part follows its sensor in ten minutes to some hours; what is slower hardly moves within a shift.
 LAGS_S = TIME_CONSTANTS_S[:5]
+# What settles within every run does so in minutes; what takes longer than the run is a line in its time.
+PAUSES_S = tuple(300.0 * 2.0**step for step in range(4))
 # Pitches searched for an unknown cycle, from fine screw leads up to a third of a small machine's stroke. The
 # grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
 
-# Positions closer than this are one; a cycle needs its two coefficients, the base's zero and gain, and some to spare.
-GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.05, 6
+# Widths over which a reversal builds up, from what a long screw gives way to that of covers that drag.
+WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
+
+# Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
+# some to spare.
+GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.1, 6
+# A wave of fewer periods over the travel, as the positions show it, is a bend.
+FEWEST_PERIODS = 2.0
 
 # A driver that hardly varies makes nearly the same columns as none; where the data cannot decide, the plain effect
 # leads and the driven one is reported as its rival. 2 log 400 = 12 is what counts as decided.
 ODDS_OF_A_DRIVER = 400.0
 
 
-# Odds against a temperature that is followed late: one that is followed at once does where both do as well.
+# Odds against a cube: over positions of one sign it bends as a square does, which leads where both do as well.
+ODDS_OF_A_CUBE = 20.0
+# Odds against a temperature that is followed late, and against what settles anew in every run: one that is followed at
+# once, and a line in the time of the run, do where both do as well.
 ODDS_OF_A_LAG = 20.0
+
+# Odds against a reversal that builds up over a width: a play leads where it does as well.
+ODDS_OF_A_WIDTH = 20.0
 
 # Odds against what is named beside a finding and never found itself; any evidence of a campaign is smaller.
 NEVER_FOUND = 1e300
 # A period counts as travelled a little before its end.
 WHOLE_PERIOD = 0.95
+# Over less than a quarter of a period a cosine and a sine are a slope and a parabola, to 5 % of what they bend.
+SHORTEST_PART = 0.25
+# An axis is level where it leans less than 15 degrees: there three quarters of flexure lie about it alone.
+LEVEL = 0.26
 
 
 def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
-    """The variants, with what an axis did not travel one period of never found, only named as rivals.
+    """The variants, with what only bends over the travel of its axis never found where other causes bend alike, and at
+    the odds of a driver elsewhere.
 
     Over a part of a period a cosine and a sine are a bend of any cause, and so are the components of gravity in the
-    frame of an axis, each with a coefficient of its own.
+    frame of an axis, each with a coefficient of its own. About an axis that lies level flexure and refraction bend so,
+    too; about any other one they depend on the other axes as well, and poses tell them apart.
     """
     return [
-        variant if part_of_period(variant.effect, context) is None else replace(variant, odds=NEVER_FOUND)
-        for variant in variants
+        replace(variant, odds=variant.odds * _odds_of_a_bend(variant.effect, context)) for variant in variants
     ]
+
+
+def _odds_of_a_bend(effect: MachineEffect, context: Context) -> float:
+    """The odds against an effect that may be no more than a bend over the travel of its axis; 1 for all others."""
+    if not isinstance(effect, ChainEffect) or not effect.joint.turns:
+        return 1.0
+    is_slope = isinstance(effect.shape, Poly) and isinstance(effect.driver, Always)
+    part = part_of_period(effect, context)
+    if part is None and not is_slope:
+        return 1.0
+    told_apart = isinstance(effect.driver, Always) and not _is_level(effect.term.joint, context)
+    long_enough = part is None or part > SHORTEST_PART
+    return ODDS_OF_A_DRIVER if told_apart and long_enough else NEVER_FOUND
+
+
+def _is_level(joint: int, context: Context) -> bool:
+    """Whether a turning axis lies level at all poses."""
+    along = np.array(context.chain.joints[joint].direction)
+    return bool(np.abs(context.gravity[:, joint] @ along).max() < LEVEL)
 
 
 def part_of_period(effect: MachineEffect, context: Context) -> float | None:
@@ -85,9 +133,8 @@ def bends_of(effect: MachineEffect) -> list[ChainVariant]:
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     """The effect itself, or one variant for every time constant where it has none of its own."""
     if isinstance(effect.driver, SettlingDriver) and effect.driver.time_constant_s is None:
-        late = isinstance(effect.driver, LaggedTemperature)
-        constants = LAGS_S if late else TIME_CONSTANTS_S
-        odds = ODDS_OF_A_LAG if late else 1.0
+        constants = constants_of(effect.driver)
+        odds = 1.0 if isinstance(effect.driver, WarmUp) else ODDS_OF_A_LAG
         return [
             Variant(effect.text, with_time_constant(effect, tau), len(constants), odds) for tau in constants
         ]
@@ -96,7 +143,18 @@ def variants_of(effect: MachineEffect) -> list[ChainVariant]:
         # A drive gives way before a bearing does, and one load is simpler than the weight of every link.
         simple = isinstance(effect.driver, Load) and effect.term.component == 3 + effect.joint.main
         odds = 1.0 if simple else ODDS_OF_A_DRIVER
+    if isinstance(effect, ChainEffect) and isinstance(effect.shape, Poly) and effect.shape.order > 2:
+        odds = ODDS_OF_A_CUBE
     return [Variant(effect.text, effect, odds=odds)]
+
+
+def constants_of(driver: Driver) -> tuple[float, ...]:
+    """The time constants in s that are searched of a driver; none where it has none to search."""
+    if not isinstance(driver, SettlingDriver) or driver.time_constant_s is not None:
+        return ()
+    if isinstance(driver, LaggedTemperature):
+        return LAGS_S
+    return PAUSES_S if isinstance(driver, Settling) else TIME_CONSTANTS_S
 
 
 @lru_cache(maxsize=16)
@@ -114,6 +172,21 @@ def cycles_of_unknown_pitch(chain: Chain) -> tuple[ChainVariant, ...]:
     return tuple(variants)
 
 
+def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
+    """Positioning errors of every linear axis that build up after a reversal, with every width within its travel."""
+    variants: list[ChainVariant] = []
+    for index, joint in enumerate(context.chain.joints):
+        if joint.kind == "linear":
+            term = f"E{COMPONENTS[joint.main]}{joint.name}"
+            travel = float(np.ptp(context.positions[:, index]))
+            texts = [f"{term}:windup{width:g}mm" for width in WIDTHS_MM if width < travel]
+            variants += [
+                Variant(f"{term}:windup", parse_effect(text, context.chain), len(texts), ODDS_OF_A_WIDTH)
+                for text in texts
+            ]
+    return variants
+
+
 def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
     """The cycles that the plan can separate from longer ones, by the positions of their axis.
 
@@ -121,34 +194,71 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
     anyhow have no such limit. A period longer than what was travelled is a bend.
     """
-    limits = {
+    limits = _pitch_limits(context)
+    return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
+
+
+def without_aliases(
+    variants: Iterable[ChainVariant], context: Context, stated: Mapping[str, float]
+) -> list[ChainVariant]:
+    """The variants, with usual leads never found that at the positions of their axis look like a bend; ``stated`` are
+    pitches by axis that the file gives, which may be.
+
+    On positions 50 mm apart a lead of 12 mm is a wave of 300 mm: over 300 mm of travel nobody can say that it repeats.
+    """
+    limits = _pitch_limits(context)
+    return [
+        replace(variant, odds=NEVER_FOUND)
+        if isinstance(effect := variant.effect, ChainEffect)
+        and isinstance(effect.shape, Cyclic)
+        and effect.shape.pitch != stated.get(effect.joint.name)
+        and not _repeats(effect.shape.pitch, *limits[effect.joint.name])
+        else variant
+        for variant in variants
+    ]
+
+
+def _repeats(pitch: float, shortest: float, travel: float) -> bool:
+    """Whether a cycle repeats at positions of which ``shortest`` is the shortest pitch that they show, twice their step
+    on a grid."""
+    if not 0.0 < shortest < float("inf"):
+        return shortest == 0.0 and pitch <= travel
+    frequency, steps = 1.0 / pitch, 2.0 / shortest
+    seen = abs(frequency - steps * np.round(frequency / steps))
+    return bool(seen * travel >= FEWEST_PERIODS)
+
+
+def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Cyclic)
+    low, high = limits[effect.joint.name]
+    return low <= effect.shape.pitch <= high
+
+
+def _pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
+    """The shortest and the longest pitch in mm that the positions of every linear axis can show."""
+    return {
         joint.name: (_shortest_pitch(context.positions[:, index]), float(np.ptp(context.positions[:, index])))
         for index, joint in enumerate(context.chain.joints)
         if joint.kind == "linear"
     }
-    separable = []
-    for variant in variants:
-        effect = variant.effect
-        assert isinstance(effect, ChainEffect)
-        assert isinstance(effect.shape, Cyclic)
-        low, high = limits[context.chain.joints[effect.term.joint].name]
-        if low <= effect.shape.pitch <= high:
-            separable.append(variant)
-    return separable
 
 
 def _shortest_pitch(positions: Array) -> float:
-    """The shortest pitch in mm that positions (n,) of an axis can show; infinite where there are too few."""
-    distinct = np.unique(np.round(positions / GRID_TOLERANCE_MM)) * GRID_TOLERANCE_MM
-    steps = np.diff(distinct)
+    """The shortest pitch in mm that positions (n,) of an axis can show, 0 where they lie anyhow; infinite where there
+    are too few."""
+    ordered = np.sort(positions)
     # Touches of one nominal place scatter by less than a step of the grid.
-    real = steps[steps > SHORTEST_PITCH_MM / 2.0]
-    if len(real) + 1 < FEWEST_POSITIONS:
-        return float("inf") if not len(steps) or len(real) == len(steps) else 0.0
-    step = float(real.min())
-    multiples = real / step
-    on_grid = len(real) == len(steps) and np.all(np.abs(multiples - np.round(multiples)) < 0.02)
-    return 2.0 * step if on_grid else 0.0
+    stops = np.split(ordered, np.flatnonzero(np.diff(ordered) > SHORTEST_PITCH_MM / 2.0) + 1)
+    if max(float(np.ptp(stop)) for stop in stops) > GRID_TOLERANCE_MM:
+        return 0.0
+    if len(stops) < FEWEST_POSITIONS:
+        return float("inf")
+    steps = np.diff([float(stop.mean()) for stop in stops])
+    step = float(steps.min())
+    multiples = steps / step
+    return 2.0 * step if np.all(np.abs(multiples - np.round(multiples)) < 0.02) else 0.0
 
 
 def that_lag(effects: Iterable[MachineEffect], context: Context) -> list[ChainVariant]:
@@ -173,7 +283,8 @@ def _can_lag(driver: str, context: Context) -> str | None:
 def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVariant]:
     """The effect multiplied by every driver, where it has none; without its driver, where it has one.
 
-    A driver must earn its place: beforehand the plain effect is the likelier one.
+    A driver must earn its place: beforehand the plain effect is the likelier one. No shape settles within the minutes
+    after a run's begin: a guideway does not bend and a table does not tilt by what stood still for a while.
     """
     if not isinstance(effect, ChainEffect) or isinstance(effect.shape, Compliance):
         return []
@@ -183,6 +294,8 @@ def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVar
     variants: list[ChainVariant] = []
     for name in drivers:
         driven = replace(effect, driver=parse_driver(name), driver_text=name)
+        if isinstance(driven.driver, Settling):
+            continue
         variants += [replace(variant, odds=ODDS_OF_A_DRIVER) for variant in variants_of(driven)]
     return variants
 

@@ -19,7 +19,7 @@ from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEff
 from monitor.discovery.machine.shapes.variants import each_run
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove, bad_points, ball_moves
 from monitor.discovery.machine.suspects.bad_poses import bad_poses
-from monitor.discovery.machine.suspects.varying import most_varying
+from monitor.discovery.machine.suspects.varying import Varying, most_varying
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
@@ -99,6 +99,30 @@ class Suspects:
         return [*self.move_effects(problem), *varying]
 
 
+class _LooksForVarying:
+    """Looks for what varies from run to run.
+
+    It is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads, and once
+    nothing single is left, not after each of some forty bad points.
+    """
+
+    def __init__(self, variants: Sequence[ChainVariant], scene: ChainScene | None) -> None:
+        self._variants = variants
+        self._scene = scene
+        self._under: Fit | None = None
+        self._latest: Varying | None = None
+
+    def leading(self, under: Fit, least: float) -> Varying | None:
+        """The effect that varies most under a fit, where it gains more than the ``least``; None where it does not."""
+        if self._under is None or (self._under is not under and (least == 0.0 or self._gains(least))):
+            self._latest = most_varying(under, self._variants, self._scene)
+            self._under, self._scene = under, None
+        return self._latest if self._gains(least) else None
+
+    def _gains(self, least: float) -> bool:
+        return self._latest is not None and self._latest.gain > least
+
+
 def find_suspects(
     under: Fit,
     problem: ChainProblem,
@@ -116,12 +140,15 @@ def find_suspects(
         return replace(earlier, bad={**earlier.bad, **{point.row: point for point in bad_poses(under)}})
     suspects = earlier
     current = under
+    look = _LooksForVarying(variants, scene)
     while len(suspects.bad) < MOST_BAD_POINTS:
         before = suspects
         single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
         single.sort(key=lambda suspect: -suspect.chi_square)
-        varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
-        if varying is not None and (not single or varying.gain > single[0].chi_square):
+        varying = None
+        if len(suspects.varying) < MOST_VARYING:
+            varying = look.leading(current, single[0].chi_square if single else 0.0)
+        if varying is not None:
             suspects = replace(suspects, varying=(*suspects.varying, varying.effect))
         elif not single:
             break
@@ -133,5 +160,4 @@ def find_suspects(
         except (DataError, np.linalg.LinAlgError):
             # What cannot be fitted is no suspect; those before it remain.
             return before
-        scene = None
     return suspects

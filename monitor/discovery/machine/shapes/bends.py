@@ -1,0 +1,53 @@
+"""Several powers of the position together, where an error of free shape would be told instead.
+
+A guideway that bends about the middle of its travel is a parabola there, and a line and a parabola in the readings,
+whose zero lies at one end. Neither of the two alone comes near, so that the scan is led to another error, and what
+finds the right one is its free shape, which has more parts and no name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.search.evidence import weigh_beside
+from monitor.effects import ChainEffect
+from monitor.effects.drivers import Always
+from monitor.effects.shapes import Poly
+
+
+def bends_instead(
+    scene: ChainScene, symbol: str, worth: float, others: Sequence[ChainCandidate]
+) -> list[ChainCandidate]:
+    """The powers of the position that say together, beside others, at least as much of an error as its free shape, of
+    which ``worth`` is the score at its price; none where no two or three do, or where they raise the error at poses
+    left out."""
+    powers = [shape for shape in scene.candidates if _is_power(shape) and error_of(shape) == symbol]
+    together = [list(some) for size in (2, 3) for some in combinations(powers, size)]
+    if not together:
+        return []
+    best = max(together, key=lambda some: score_beside(scene, some, others))
+    if score_beside(scene, best, others) < worth:
+        return []
+    before = scene.held_out_error_by_poses(scene.columns(others))
+    after = scene.held_out_error_by_poses(scene.columns([*others, *best]))
+    return best if before is None or after is None or after < before else []
+
+
+def score_beside(
+    scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> float:
+    """The score of effects together beside others, one after the other."""
+    return sum(
+        weigh_beside(scene, [candidate], [*others, *selected[:index]])[0].score
+        for index, candidate in enumerate(selected)
+    )
+
+
+def _is_power(candidate: ChainCandidate) -> bool:
+    effect = candidate.effect
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+        return False
+    return candidate.visible and isinstance(effect.shape, Poly)

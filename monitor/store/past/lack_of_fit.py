@@ -1,0 +1,65 @@
+"""Machines whose latest campaign refutes the model that they are followed by, over the whole fleet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.store.connection import Database
+
+# From the refuted ones, which are few, to the machines that have any, and of these alone to the campaign that counts.
+_REFUTED = """
+WITH suspect AS (
+    SELECT DISTINCT c.machine
+    FROM lack_of_fit JOIN identification USING (identification_id) JOIN campaign AS c USING (campaign_id)
+    WHERE p_value < $level
+), own AS (
+    SELECT model, max(version) AS version FROM model
+    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+), chosen AS (
+    -- Of each campaign the identification with the most runs, the later of two: what load_identification takes.
+    SELECT c.machine, c.campaign_id, c.campaign,
+           max((CAST(i.run_count AS BIGINT) << 32) | i.identification_id) & 4294967295 AS identification_id
+    FROM identification AS i
+    JOIN campaign AS c USING (campaign_id)
+    SEMI JOIN suspect USING (machine)
+    LEFT JOIN v_machine_models AS f ON f.machine = c.machine AND f.method = c.method
+    LEFT JOIN own AS o ON o.model = i.method
+    WHERE CASE WHEN $model IS NULL
+          -- That which the machine is followed by, else the latest version of the method's own.
+          THEN i.model = coalesce(f.model, i.method)
+               AND i.model_version = coalesce(f.model_version, o.version, i.model_version)
+          ELSE i.model = $model AND ($version IS NULL OR i.model_version = $version) END
+    GROUP BY ALL
+), latest AS (
+    SELECT c.machine, arg_max(c.campaign_id, (r.started_at, c.campaign_id)) AS campaign_id
+    FROM chosen AS c JOIN run AS r USING (campaign_id) GROUP BY c.machine
+)
+SELECT c.machine, c.campaign, i.model, i.model_version, l.p_value
+FROM chosen AS c
+SEMI JOIN latest USING (machine, campaign_id)
+JOIN identification AS i ON i.identification_id = c.identification_id
+JOIN lack_of_fit AS l ON l.identification_id = c.identification_id
+WHERE l.p_value < $level ORDER BY c.machine
+"""
+
+
+@dataclass(frozen=True)
+class RefutedMachine:
+    """A machine whose latest ``campaign`` refutes a ``version`` of its ``model``: ``p_value`` of lack of fit."""
+
+    machine: str
+    campaign: str
+    model: str
+    version: int
+    p_value: float
+
+
+def refuted_machines(
+    db: Database, level: float, model: str | None = None, version: int | None = None
+) -> tuple[RefutedMachine, ...]:
+    """The machines whose latest identified campaign refutes its model at a ``level``, by name.
+
+    Without ``model`` that which each machine is followed by. Reads what was stored with the identifications.
+    """
+    rows = db.rows(_REFUTED, {"level": level, "model": model, "version": version})
+    return tuple(RefutedMachine(*row) for row in rows)

@@ -1,0 +1,113 @@
+"""What is computed for many who ask at once: an answer that rests while others import, quick questions first."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra web is not installed")
+
+from monitor.exceptions import NotFoundError
+from monitor.web import desk as desk_module
+from monitor.web.desk import Desk
+from monitor.web.freshness import Freshness
+from monitor.web.users import Role, User
+
+ADA = User("ada", Role.ENGINEER)
+SUMS = ("fleet", {"top": 0})
+
+
+class _Asked:
+    """Answers every question with how often it was asked, once ``go`` is set; refuses while ``refuses``."""
+
+    def __init__(self) -> None:
+        self.freshness, self.go, self.count, self.refuses = Freshness(), threading.Event(), 0, False
+
+    def __call__(self, user: User, question: str, document: Any, files: Any = None) -> int:
+        self.go.wait(60.0)
+        if self.refuses:
+            raise NotFoundError("nothing was identified")
+        self.count += 1
+        return self.count
+
+
+@pytest.fixture
+def asked() -> Iterator[tuple[Desk, _Asked]]:
+    asker = _Asked()
+    desk = Desk(asker)  # type: ignore[arg-type]
+    yield desk, asker
+    asker.go.set()
+    desk.close()
+
+
+def test_an_answer_rests_while_others_import_and_is_shown_while_the_next_is_computed(
+    asked: tuple[Desk, _Asked],
+) -> None:
+    desk, asker = asked
+    asker.go.set()
+    first, before = desk.ask_rested(ADA, *SUMS)
+    assert first.answer(60.0) == 1
+    assert before is None
+    # Nothing was written: it is the same.
+    assert desk.ask_rested(ADA, *SUMS) == (first, first)
+    # An import, a moment later: the answer stands, and is known not to be of now.
+    first.took_s = 1e6
+    asker.freshness.wrote({"M1"})
+    assert desk.ask_rested(ADA, *SUMS) == (first, first)
+    assert desk.standing(*SUMS) is None
+    # After it has rested it is computed anew, and shown until then.
+    first.took_s = 0.0
+    asker.go.clear()
+    second, before = desk.ask_rested(ADA, *SUMS)
+    assert second.number > first.number
+    assert before is first
+    assert second.answer(0.0) is None
+    asker.go.set()
+    assert second.answer(60.0) == 2
+    assert desk.answered_last(*SUMS) is second
+    # What is no import is seen at once: an identification, an event, a withdrawal.
+    for write in (asker.freshness.identified, lambda: asker.freshness.wrote(None)):
+        last = desk.answered_last(*SUMS)
+        assert last is not None
+        last.took_s = 1e6
+        write()
+        ticket, _ = desk.ask_rested(ADA, *SUMS)
+        assert ticket is not last
+        ticket.future.result(60.0)
+
+
+def test_nothing_rests_longer_than_a_minute_and_a_refusal_not_at_all(asked: tuple[Desk, _Asked]) -> None:
+    desk, asker = asked
+    asker.go.set()
+    ticket, _ = desk.ask_rested(ADA, *SUMS)
+    ticket.future.result(60.0)
+    ticket.took_s = 100.0
+    ticket.asked_at -= 100.0 + desk_module.LONGEST_REST_S - 5.0
+    assert not ticket.is_rested
+    ticket.asked_at -= 10.0
+    assert ticket.is_rested
+    asker.freshness.wrote(None)
+    asker.refuses = True
+    refused, before = desk.ask_rested(ADA, *SUMS)
+    with pytest.raises(NotFoundError, match="nothing was identified"):
+        refused.answer(60.0)
+    assert before is ticket
+    assert desk.answered_last(*SUMS) is ticket
+
+
+def test_the_trend_that_somebody_looks_at_does_not_wait_behind_long_questions(
+    asked: tuple[Desk, _Asked],
+) -> None:
+    desk, _ = asked
+    with ThreadPoolExecutor(1) as aside:
+        for name in "abc":
+            desk.ask(ADA, "explain", {"campaign": name})
+        waiting = desk.ask(ADA, "trend", {"machine": "M1"})
+        quick = desk.ask(ADA, "trend", {"machine": "M1", "parameter": "EXX"})
+        begun = aside.submit(lambda: next(iter(filter(None, iter(lambda: quick.is_running, None)))))
+        assert begun.result(60.0)
+        assert not waiting.is_running
