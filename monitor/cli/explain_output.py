@@ -200,13 +200,15 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         symbol = effect.effect.partition(":")[0]
         output.say(f"   not separable from the shape of {symbol}: {', '.join(effect.within_its_shape)}")
     um = output.micrometres
-    poses = ""
-    if effect.heldout_poses_after_um is not None:
-        poses = f", on held-out poses {um(effect.heldout_poses_before_um)} -> {um(effect.heldout_poses_after_um)} µm"
-    output.say(
-        f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; on held-out {explanation.held_out} "
-        f"{um(effect.heldout_before_um)} -> {um(effect.heldout_after_um)} µm{poses}"
-    )
+    held_out = [
+        f"on held-out {what} {um(before)} -> {um(after)} µm"
+        for what, before, after in (
+            (explanation.held_out, effect.heldout_before_um, effect.heldout_after_um),
+            ("poses", effect.heldout_poses_before_um, effect.heldout_poses_after_um),
+        )
+        if after is not None
+    ] or ["too few readings to leave some out"]
+    output.say(f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; {', '.join(held_out)}")
 
 
 def _curve_effect(effect: CurveMissing, unit: str) -> None:

@@ -121,6 +121,8 @@ def what_is_wrong(cell: str) -> str | None:
             f"{shown} is not a number: it has a decimal comma; write a decimal point, {point}, and no thousands "
             "separators"
         )
-    if re.fullmatch(r"[+-]?[0-9]{1,3}([,'_ \u00a0\u2009\u202f\u2019][0-9]{3})+(\.[0-9]*)?", cell):
+    if re.fullmatch(
+        r"[+-]?[0-9]{1,3}([,'_ \u00a0\u2009\u202f\u2019][0-9]{3})+([.,][0-9]*)?", cell
+    ) or re.fullmatch(r"[+-]?[0-9]{1,3}(\.[0-9]{3})+,[0-9]*", cell):
         return f"{shown} is not a number: write it without thousands separators"
     return f"{shown} is not a number; write digits with a decimal point, such as -12.345"

@@ -23,6 +23,8 @@ from monitor.reporting.resources import report_folder, report_text
 ENGLISH = "en"
 #: Symbols as sentences write them, with what stands below the line in print.
 _SYMBOL = re.compile(r"\b(k|R|u)_(q|p|C|P|day|Tag)\b")
+#: SHA-256 in hexadecimal digits.
+_HASH = re.compile(r"\b[0-9a-f]{64}\b")
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
 
 
@@ -56,8 +58,12 @@ class Texts:
 
 
 def with_subscripts(text: str) -> Markup:
-    """A sentence for a page, its symbols (``k_q``) set with subscripts; text that is no markup is escaped."""
-    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text))))
+    """A sentence for a page, its symbols (``k_q``) set with subscripts; text that is no markup is escaped.
+
+    A hash in it goes on in the next line without a hyphen, which would be copied with it.
+    """
+    marked = _SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))
+    return Markup(_HASH.sub(r'<span class="hash">\g<0></span>', marked))
 
 
 @cache

@@ -136,7 +136,7 @@ def _independent(fit: MixedFit, at: float) -> BlockLines:
     return BlockLines(
         at=np.array([at]), slope=fit.coefficients[-1:], covariance=fit.covariance[pick][np.newaxis], dof=fit.dof[-1:],
         correlation=none, allowed=none, widening=unity, scatter=unity, blocks=np.zeros(1, dtype=np.int64),
-        cyclic=np.zeros(1, dtype=np.bool_), seasonal=AgainstSeason(np.full(1, np.nan), np.full(1, np.nan)),
+        cyclic=np.zeros(1, dtype=np.bool_), seasonal=AgainstSeason(np.full(1, np.nan), np.full(1, np.nan), np.zeros(1)),
     )  # fmt: skip
 
 
@@ -206,7 +206,10 @@ def _with_season(line: Trend, alone: BlockLines, t: Array, cycle: float | None) 
     if line.season_p is None or cycle is None:
         return line
     u = float(np.sqrt(max(line.u_slope**2 - float(alone.u_slope[0]) ** 2, 0.0)))
-    return replace(line, season_ahead=SeasonAhead(u, float(t.min()), float(t.max()), cycle))
+    return replace(
+        line,
+        season_ahead=SeasonAhead(u, float(t.min()), float(t.max()), cycle, float(alone.seasonal.bend[0])),
+    )
 
 
 def trend(

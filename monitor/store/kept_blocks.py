@@ -124,21 +124,21 @@ def metadata_blocks(file: int) -> tuple[int, ...]:
     headers = os.pread(file, _HEADERS, 0)
     *_, free_list, _, _ = _state(headers)
     try:
-        words = _Words(file, headers, free_list)
-        for _ in range(words.next("<Q")):
-            words.next("<Q")
-        for _ in range(words.next("<Q")):
-            words.next("<QI")
+        numbers = _Numbers(file, headers, free_list)
+        for _ in range(numbers.next("<Q")):
+            numbers.next("<Q")
+        for _ in range(numbers.next("<Q")):
+            numbers.next("<QI")
         blocks = []
-        for _ in range(words.next("<Q")):
-            blocks.append(words.next("<Q"))
-            words.next("<Q")  # which of its parts are free
+        for _ in range(numbers.next("<Q")):
+            blocks.append(numbers.next("<Q"))
+            numbers.next("<Q")  # which of its parts are free
     except (struct.error, OSError, OverflowError):
         return ()
     return tuple(blocks)
 
 
-class _Words:
+class _Numbers:
     """Numbers that follow one another in parts of metadata blocks, each of which names the next."""
 
     def __init__(self, file: int, headers: bytes, pointer: int) -> None:
@@ -189,9 +189,9 @@ def _is_whole(content: bytes) -> bool:
     # Loaded where something is written: whoever only reads does not wait for it.
     import numpy as np
 
-    words = np.frombuffer(content, "<u8")
-    products = words[1:] * np.uint64(_MULTIPLIER)
-    return bool(np.bitwise_xor.reduce(products) ^ np.uint64(_FIRST) == words[0])
+    integers = np.frombuffer(content, "<u8")
+    products = integers[1:] * np.uint64(_MULTIPLIER)
+    return bool(np.bitwise_xor.reduce(products) ^ np.uint64(_FIRST) == integers[0])
 
 
 def _torn(path: str, file: int) -> dict[int, bytes]:
@@ -199,11 +199,11 @@ def _torn(path: str, file: int) -> dict[int, bytes]:
     headers = os.pread(file, _HEADERS, 0)
     if _state(headers) != _state(_kept_headers(path)):
         return {}
-    kept = _read(path)
-    if kept is None:
+    copied = _read(path)
+    if copied is None:
         return {}
-    before = {begin: kept.headers[begin : begin + _HEADER] for begin in (_HEADER, 2 * _HEADER)}
-    before |= {_offset(headers, number): block for number, block in kept.blocks.items()}
+    before = {begin: copied.headers[begin : begin + _HEADER] for begin in (_HEADER, 2 * _HEADER)}
+    before |= {_offset(headers, number): block for number, block in copied.blocks.items()}
     return {
         offset: whole
         for offset, whole in before.items()

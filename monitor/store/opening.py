@@ -22,6 +22,9 @@ from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writ
 #: a quarter of DuckDB's own size reads a fleet's machine in half the time, and a small file is a third as large.
 BLOCK_SIZE = 65536
 
+#: Settings of DuckDB by name.
+Config = dict[str, str | bool | int | float | list[str]]
+
 #: What a file is called while it is made: it gets its name when it is whole.
 _UNFINISHED = ".new"
 #: What manifests of backups are called, and how many are looked through for the newest.
@@ -38,7 +41,7 @@ def connect(
     Raises BusyError naming that process, StoreError for a file that cannot be opened.
     """
     # Nothing is fetched from the network behind the user's back.
-    config: dict[str, str | bool | int | float | list[str]] = {
+    config: Config = {
         "autoinstall_known_extensions": "false",
         "autoload_known_extensions": "false",
         "default_block_size": str(BLOCK_SIZE),
@@ -57,22 +60,8 @@ def connect(
             holder = writer_at_work(path)
             if holder is not None:
                 continue
-        if not read_only:
-            settle_blocks(path)
-        elif has_torn_blocks(path):
-            raise UnfinishedLogError(
-                f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is "
-                f"put back by the next verb of somebody who may write: `monitor --db {path} verify`"
-            )
         try:
-            connection = duckdb.connect(path, read_only=read_only, config=config)
-            # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
-            connection.execute("SET enable_progress_bar = false")
-            if not read_only and _has_log(path):
-                # What it replayed is written into the file when it is closed, whether or not anything is added.
-                with contextlib.suppress(StoreError):
-                    keep_blocks(path)
-            return connection
+            return _opened(path, read_only, config)
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
             if patience.seconds > 0 and _is_open_here(str(fault)):
@@ -82,6 +71,25 @@ def connect(
                     raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
                 raise StoreError(_in_words(path, read_only, str(fault))) from fault
     raise busy(path, holder, patience)
+
+
+def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnection:
+    """Open a file whose blocks are whole. Raises UnfinishedLogError, StoreError, duckdb.Error, ValueError."""
+    if not read_only:
+        settle_blocks(path)
+    elif has_torn_blocks(path):
+        raise UnfinishedLogError(
+            f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is put "
+            f"back by the next verb of somebody who may write: `monitor --db {path} verify`"
+        )
+    connection = duckdb.connect(path, read_only=read_only, config=config)
+    # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
+    connection.execute("SET enable_progress_bar = false")
+    if not read_only and _has_log(path):
+        # What it replayed is written into the file when it is closed, whether or not anything is added.
+        with contextlib.suppress(StoreError):
+            keep_blocks(path)
+    return connection
 
 
 def busy(path: str, holder: Holder | None, patience: Patience) -> BusyError:
@@ -254,12 +262,12 @@ def damaged(path: str, message: str) -> str:
     if "Could not write" in message or "No space left" in message:
         return f"{path} could not be written, nothing was kept: {message.splitlines()[0]}"
     newest = _newest_backup(path)
-    known = "BACKUP" if newest is None else shlex.quote(str(newest[1]))
+    backup = "BACKUP" if newest is None else shlex.quote(str(newest[1]))
     when = "" if newest is None else f" (the newest that lies near it was made at {newest[0][:19]} UTC)"
     restored = shlex.quote(str(Path(path).with_suffix("")) + "-restored.duckdb")
     return (
         f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; leave it where it is, and restore a "
-        f"backup{when} under another name: `monitor --db {restored} restore {known}`"
+        f"backup{when} under another name: `monitor --db {restored} restore {backup}`"
     )
 
 

@@ -156,5 +156,9 @@ def whole_number(name: str, text: str) -> int:
 
 
 def own_address(address: str) -> str:
-    """Return an address of this server, the first page for any other."""
-    return address if address.startswith("/") and not address.startswith(("//", "/\\")) else "/"
+    """Return an address of this server, the first page for any other.
+
+    A browser leaves out tabs and ends of lines: "/<tab>/elsewhere" would be the address of another server.
+    """
+    is_own = address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
+    return address if is_own else "/"

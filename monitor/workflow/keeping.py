@@ -176,8 +176,8 @@ class BackupAnswer:
     """The copy with its hash, and how many rows it has in all tables.
 
     ``first_entry`` and ``last_entry`` are the entries of the audit that it holds, ``follows`` is the name of the backup
-    that an incremental one follows. Where nothing was new for an incremental one, none was ``made``, and the answer is
-    about the newest backup that is there.
+    that an incremental one follows. Where nothing was new for an incremental one, there is no ``new_file``, and
+    the answer is about the newest backup that is there.
     """
 
     file: Path
@@ -187,7 +187,7 @@ class BackupAnswer:
     first_entry: int
     last_entry: int
     follows: str | None = None
-    made: bool = True
+    new_file: bool = True
 
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
@@ -201,8 +201,8 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     rows = sum(count for count, _ in copy.tables.values())
     span = copy.span
     assert span is not None  # of those made by this version
-    made = copy.path == request.target.name
-    if not made:
+    new_file = copy.path == request.target.name
+    if not new_file:
         message = messages.nothing_to_back_up(request.target, copy.path)
     elif span.previous is None:
         message = messages.backup_made(request.target, len(copy.tables), rows)
@@ -218,7 +218,7 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
         first_entry=span.first_entry,
         last_entry=span.last_entry,
         follows=span.previous,
-        made=made,
+        new_file=new_file,
     )
 
 

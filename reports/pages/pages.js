@@ -64,7 +64,7 @@ function arrows(vectors, list, run, pose) {
 function traces(list, magnification, name, shade, visible) {
   const line = { type: "scatter3d", mode: "lines", name, legendgroup: name, visible, line: { color: shade, width: 5 }, x: [], y: [], z: [], hoverinfo: "skip" };
   const head = { type: "cone", name, legendgroup: name, visible: visible === true, x: [], y: [], z: [], u: [], v: [], w: [], text: [], anchor: "tip",
-    showscale: false, sizemode: "raw", sizeref: 0.6, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
+    showscale: false, sizemode: "raw", sizeref: 0.45, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
   for (const { target, place, vector } of list) {
     const end = place.map((number, axis) => number + magnification * vector[axis]);
     ["x", "y", "z"].forEach((axis, index) => {

@@ -184,7 +184,7 @@ def slopes(rng: np.random.Generator) -> None:
 
 
 #: Series of a cell of the parts of a year, and histories of their forecasts.
-PARTS, FORETOLD = 4000, 300
+PARTS, FORETOLD = 4000, 2000
 
 
 def parts_of_a_year(rng: np.random.Generator) -> None:

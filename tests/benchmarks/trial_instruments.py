@@ -5,6 +5,8 @@
 is the ellipsoid of the stated covariance at 95 % (chi-square, JCGM 102, 6.5.2). ``--heavy``: noise of Student's t with
 three degrees of freedom and the same standard deviation; ``--drift``: the machine grows by 2 µm in X in the R-test's
 hour; ``--pitch``: the effect of the example, which the model lacks; ``--bar``: the ball bar alone, in three planes.
+``--told``: how often `explain` finds something, `compare` says that something is missing and `contributions` that
+instruments disagree.
 ``--session``: three runs of a day with one bar, the first with a laser too; ``--apart``: the same with a length for
 every run, as until 23 November 2026.
 """
@@ -26,6 +28,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
+from monitor.records import Verdict
+from monitor.store import Database, import_campaign
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
+from monitor.workflow.instruments.instruments import instruments
+from monitor.workflow.instruments.request import InstrumentsRequest
 from tests.simulator import four_instruments as shop
 
 #: The parameters that these three instruments separate, from the errors that were put in.
@@ -99,15 +109,39 @@ def sessions(seeds: int, apart: bool) -> None:
         )
 
 
+def told(options: argparse.Namespace) -> None:
+    """Print in how many campaigns `explain`, `compare` and `contributions` say that model or instrument is wrong."""
+    counts = {"explain": 0, "compare": 0, "contributions, E_n above 1": 0}
+    for seed in range(options.seeds):
+        with tempfile.TemporaryDirectory() as folder:
+            campaign, _ = campaign_of(Path(folder) / "shop", seed, options, 1, 10.0)
+            with Database(Path(folder) / "shop.duckdb") as db:
+                import_campaign(db, campaign)
+                verdict = compare(db, CompareRequest("shop")).comparison.verdict
+                shares = instruments(db, InstrumentsRequest("shop"))
+                explanation = explain(db, ExplainRequest("shop")).explanation
+        assert isinstance(explanation, MachineExplanation)
+        largest = max((pair.e_n for each in shares.parameters for pair in each.agreement), default=0.0)
+        counts["explain"] += bool(explanation.missing)
+        counts["compare"] += verdict is Verdict.SOMETHING_IS_MISSING
+        counts["contributions, E_n above 1"] += largest > 1.0
+    for what, count in counts.items():
+        low, high = scipy.stats.binomtest(int(count), options.seeds).proportion_ci(method="exact")
+        print(f"{what}: {count} of {options.seeds} (95 % interval {100 * low:.1f} to {100 * high:.1f} %)")
+
+
 def main() -> None:
     """Print the rates."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=300)
-    for name in ("--heavy", "--drift", "--pitch", "--bar", "--session", "--apart"):
+    for name in ("--heavy", "--drift", "--pitch", "--bar", "--session", "--apart", "--told"):
         parser.add_argument(name, action="store_true")
     options = parser.parse_args()
     if options.session:
         sessions(options.seeds, options.apart)
+        return
+    if options.told:
+        told(options)
         return
     names = PARAMETERS[4:] if options.bar else PARAMETERS
     inside, singly, distance, iterations = 0, np.zeros(len(names)), [], []

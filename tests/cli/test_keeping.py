@@ -62,7 +62,7 @@ def test_an_incremental_backup_and_a_moment_as_typed(typed: Any, db: Path, tmp_p
         in (nothing.out)
     )
     document = typed("backup", folder / "third.duckdb", "--incremental", "--json", db=db).document
-    assert (document["made"], Path(document["file"]).name) == (False, "second.duckdb")
+    assert (document["new_file"], Path(document["file"]).name) == (False, "second.duckdb")
     assert not (folder / "third.duckdb").exists()
     at = before[0]["made_at"]
     early = typed("restore", folder, "--at", at, "--json", db=tmp_path / "early.duckdb")

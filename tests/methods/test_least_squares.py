@@ -184,3 +184,17 @@ def test_the_space_of_one_run_is_that_of_the_elimination(alike: float, rows: int
         rtol=1e-6,
         atol=1e-6,
     )
+
+
+def test_a_model_that_bends_under_a_large_residual_converges_where_whole_steps_run_away() -> None:
+    """Fletcher's example (Practical Methods of Optimization, 1987, 6.1): (x + 1)^2 + (b x^2 + x - 1)^2 has its minimum
+    at 0, and each whole step of Gauss and Newton multiplies x by b: -1.4 leads away."""
+
+    def at(x: Array, y: Array) -> Linearisation:
+        (value,) = x[0]
+        residual = np.array([[value + 1.0, -1.4 * value**2 + value - 1.0]])
+        by_x = np.array([[[1.0], [-2.8 * value + 1.0]]])
+        return Linearisation(residual, by_x, np.zeros((1, 2, 0)))
+
+    solution = solve(at, np.array([[0.1]]), np.zeros(0))
+    assert abs(solution.local[0, 0]) < 1e-7

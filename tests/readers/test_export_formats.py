@@ -178,3 +178,51 @@ def test_any_small_damage_to_any_file(data):
     assert isinstance(
         outcome(name, content[:start] + piece + content[start + length :]), Campaign | CampaignError
     )
+
+
+def test_a_column_goes_by_its_whole_header_too(tmp_path):
+    """People copy what stands in the file: ``Position [mm]``; another unit than the file's is another column."""
+    mapping = """format = 1
+campaign = "header"
+method = "instruments"
+
+[machine]
+id = "header"
+topology = "w Y b X Z t"
+
+[[setups]]
+id = "laser"
+reading = "displacement"
+standard_uncertainty_um = 0.3
+direction = "X"
+
+[[exports]]
+file = "laser.csv"
+format = "table"
+setup = "laser"
+
+[exports.columns]
+x_mm = "Position [UNIT]"
+y_mm = 0.0
+z_mm = 0.0
+reading_um = { column = "abweichung [µm]", deviation = true }
+
+[[runs]]
+run = 1
+started_at = "2026-03-02T08:00:00+01:00"
+day = 1
+warm_up = false
+ambient_degC = 20.0
+"""
+    (tmp_path / "laser.csv").write_text(
+        "Position [mm];Abweichung [µm]\n" + "".join(f"{100 * n},5;{n},25\n" for n in range(5)),
+        encoding="cp1252",
+    )
+    (tmp_path / "mapping.toml").write_text(mapping.replace("UNIT", "mm"), encoding="utf-8")
+    campaign = read_campaign(tmp_path)
+    assert campaign.probings.readings["X"].tolist() == [0.5, 100.5, 200.5, 300.5, 400.5]
+    (tmp_path / "mapping.toml").write_text(mapping.replace("UNIT", "inch"), encoding="utf-8")
+    with pytest.raises(
+        CampaignError, match=r"laser.csv has no column 'Position \[inch\]'; it has Position"
+    ):
+        read_campaign(tmp_path)

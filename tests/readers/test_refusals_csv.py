@@ -24,6 +24,8 @@ ONE_FAULT = [
             ("1,051.7", "write it without thousands separators"),
             ("1_051.7", "write it without thousands separators"),
             ("1'051.7", "write it without thousands separators"),
+            ("1.051,7", "write it without thousands separators"),
+            ("1\u00a0051,7", "write it without thousands separators"),
             ("\u221251.7", "its minus is a typographic sign; write the plain '-'"),
             (" 51.7", "remove the spaces around it"),
             ("", "the cell is empty; a number is needed"),

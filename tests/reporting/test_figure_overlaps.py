@@ -21,6 +21,7 @@ from monitor.reporting.figures.drivers import (
 from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_falling, ranked_effects
 from monitor.reporting.figures.parameters import ParametersOfRuns, parameters_by_run
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
+from monitor.reporting.figures.standards import followed_figure, part_figure, rotation_figure
 from monitor.reporting.figures.style import style
 from monitor.reporting.figures.trend import RunsOverTime, parameter_over_time, selections_side_by_side
 
@@ -185,3 +186,30 @@ def test_the_check_sees_a_text_on_a_text(overlapping: bool) -> None:
     figure.text(0.3, 0.5, "one")
     figure.text(0.32 if overlapping else 0.6, 0.5, "other")
     assert bool(faults(figure)) == overlapping
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_no_text_covers_another_of_motions_and_parts(size: float) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    motion = size * (np.sin(3.0 * angle) + 0.2 * np.cos(angle))
+    square = np.array([[0.0, 0.0], [0.0, 100.0], [100.0, 100.0], [100.0, 0.0]])
+    across = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
+    sides = [
+        (f"side {name} of the square", np.linspace(square[at], square[(at + 1) % 4], 20), np.tile(across[at], (20, 1)),
+         1e-3 * size * np.sin(np.arange(20.0)))
+        for at, name in enumerate("1234")
+    ]  # fmt: skip
+    bore = (
+        "bore with a long name", 40.0 * np.column_stack([np.cos(angle), np.sin(angle)]),
+        np.column_stack([np.cos(angle), np.sin(angle)]), 1e-3 * motion,
+    )  # fmt: skip
+    drawn = [
+        rotation_figure(angle, motion, unit="µm", title=LONG),
+        followed_figure(np.degrees(angle), {"X": motion}, axis="C", title=LONG),
+        followed_figure(
+            np.degrees(angle), {f"direction {name}": motion for name in "XYZABC"}, axis="C", title=LONG
+        ),
+        part_figure([bore], title=LONG),
+        part_figure(sides, title=LONG),
+    ]
+    assert [faults(figure) for figure in drawn] == [[]] * len(drawn)

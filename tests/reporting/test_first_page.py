@@ -277,6 +277,10 @@ def test_a_machine_that_its_drift_may_have_taken_out_is_not_fine_but_due() -> No
     assert [row.machine for row in week.rows] == ["Away", "Mitsui", "Good"]
     page = " ".join(pypdf.PdfReader(io.BytesIO(health_pdf(week, pages))).pages[0].extract_text().split())
     assert "◔ Mitsui: due for a check" in page
+    assert (
+        "due for a check nothing is wrong so far, but by its drift it need not be in tolerance any more"
+        in page
+    )
     assert "grows by 4.00 µrad a month, so that it reaches its tolerance about 2026-03-21." in page
     assert (
         "What to do: Measure it again now, EC0Y stayed in tolerance with 95 % until 2026-03-07 only." in page

@@ -38,8 +38,6 @@ from computed_once import COMPUTED_ONCE, FOLDER, computed_once  # noqa: E402
 
 EXAMPLES = CHECKOUT / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
-#: What is said of a file that has half a block.
-DAMAGED = "it may be damaged"
 #: What a reader says of a campaign that was withdrawn, and of the fleet of which it was the only one.
 WITHDRAWN = ("it was withdrawn on", "no campaign was identified yet")
 #: Of what follows each kill: a verb that was killed late may have done its work, and says so with status 2.
@@ -252,17 +250,12 @@ def compute_once(folder: Path) -> None:
 
 @dataclass
 class Result:
-    """How often each verb was tried and hit before its end, by which kind of death, and what was wrong afterwards.
-
-    ``torn`` are the seeds whose half a write damaged the file (a fault of the engine, test_half_a_block.py): the damage
-    was said, and the backup restored.
-    """
+    """How often each verb was tried and hit before its end, by which kind of death, and what was wrong afterwards."""
 
     tries: Counter[str] = field(default_factory=Counter)
     hits: Counter[str] = field(default_factory=Counter)
     deaths: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
-    torn: list[int] = field(default_factory=list)
 
 
 def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS, minutes: float = 1e9) -> Result:
@@ -306,16 +299,6 @@ def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS, minut
             status, said, _ = forked(partial(_faults_as_text, name, room, reader))
             faults += said.split("\0") if said else []
             faults += [f"the look at it ended with {status}"] if status and not said else []
-            if death.torn and faults and all(DAMAGED in fault for fault in faults):
-                restoring = [
-                    "--db",
-                    str(room / "mended.duckdb"),
-                    "restore",
-                    str(room / "kept" / "second.duckdb"),
-                ]
-                status, said, _ = forked(partial(typed, restoring))
-                result.torn.append(seed)
-                faults = [] if status == 0 else [f"damaged, and not restored: {said}"]
             for fault in faults:
                 result.wrong.append(f"seed {seed}, {name}: {fault}")
                 print(f"  {result.wrong[-1]}", file=sys.stderr, flush=True)
@@ -344,8 +327,7 @@ def main() -> int:
     print(
         f"{sum(result.hits.values())} of {sum(result.tries.values())} killed, from seed {chosen.first_seed}: "
         f"{result.deaths['call']} before a change of a file, {result.deaths['torn']} in the middle of one, "
-        f"{result.deaths['time']} at a time; {len(result.torn)} files damaged by half a write and restored (seeds "
-        f"{result.torn}); {len(result.wrong)} faults"
+        f"{result.deaths['time']} at a time; {len(result.wrong)} faults"
     )
     for fault in result.wrong:
         print(f"  {fault}")

@@ -116,6 +116,32 @@ def test_export_writes_only_inside_its_folder(
     ]
 
 
+@pytest.mark.parametrize("killed_at", ["replace", "unlink"])
+def test_an_export_that_was_killed_at_its_end_is_made_anew_or_whole(
+    filled: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed_at: str
+) -> None:
+    """Before its folder had its name, and after (seed 3143 of the trial of kills)."""
+    original = getattr(Path, killed_at)
+
+    def die(path: Path, *arguments: object, **options: object) -> None:
+        if path.exists() and path.name.startswith((".unfinished", "out.partial")):
+            raise KeyboardInterrupt
+        original(path, *arguments, **options)
+
+    with monkeypatch.context() as killing:
+        killing.setattr(Path, killed_at, die)
+        with pytest.raises(KeyboardInterrupt):
+            export_tables(filled, tmp_path / "out")
+    if killed_at == "replace":
+        export_tables(filled, tmp_path / "out")
+    else:
+        with pytest.raises(InputError, match="is not an empty folder"):
+            export_tables(filled, tmp_path / "out")
+    assert [path.name for path in tmp_path.glob("out*")] == ["out"]
+    assert list((tmp_path / "out").glob(".*")) == []
+    assert (tmp_path / "out" / "run.csv").is_file()
+
+
 def test_export_refuses_other_forms_and_full_folders(filled: Database, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exported as csv or parquet, not 'xlsx'"):
         export_tables(filled, tmp_path / "x", "xlsx")

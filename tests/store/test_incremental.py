@@ -175,6 +175,23 @@ def test_where_nothing_is_new_no_file_is_made_and_the_newest_backup_says_so(
         assert take_increment(db, folder / "3.duckdb").tables["audit"][0] == 1
 
 
+def test_what_a_killed_backup_left_is_none(
+    weeks: tuple[Path, list[State]], path: Path, tmp_path: Path
+) -> None:
+    """A manifest that was cut off before it had its name (seed 2118 of the trial of kills)."""
+    folder, _ = weeks
+    before = list_backups(folder)
+    (folder / "3.duckdb.partial").write_bytes(b"half")
+    (folder / "3.duckdb.partial.manifest.json").write_text("")
+    assert list_backups(folder) == before
+    assert restore(folder, tmp_path / "back.duckdb").faults == ()
+    with Database(path) as db:
+        record_event(db, "MILL 0", datetime(2026, 6, 1, tzinfo=UTC), "crash", "x")
+        take_increment(db, folder / "3.duckdb")
+    assert [backup.path for backup in list_backups(folder)][-1] == "3.duckdb"
+    assert not list(folder.glob("*.partial*"))
+
+
 def test_a_chain_that_is_not_whole_is_refused(weeks: tuple[Path, list[State]], tmp_path: Path) -> None:
     folder, states = weeks
     back = tmp_path / "back.duckdb"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from monitor.exceptions import DataError, NotFoundError
 from monitor.readers import read_campaign
@@ -92,6 +93,10 @@ def test_laser_and_ball_bar_disagree_where_the_pitch_is_hidden(shared: Instrumen
         abs(laser.value - bar.value) / np.hypot(2.0 * laser.u, 2.0 * bar.u), rel=1e-9
     )
     assert pair.e_n > 3.0
+    # Bonferroni's bound over all comparisons, by scipy's normal distribution.
+    every = [pair.e_n for parameter in shared.parameters for pair in parameter.agreement]
+    assert shared.by_chance == pytest.approx(2.0 * len(every) * scipy.stats.norm.sf(2.0 * max(every)))
+    assert shared.by_chance < 1e-6
     apart = shop.PITCH * (shop.BAR_AT[2] - shop.TOOL[2] - 0.0) * 1e6
     assert bar.value - laser.value == pytest.approx(apart, abs=4.0 * bar.u)
 

@@ -13,6 +13,8 @@ from monitor.workflow.instruments.instruments import instruments
 from monitor.workflow.instruments.request import InstrumentsRequest
 
 SMALLEST_PART = 0.01
+#: A disagreement that comes out by chance more often than this is said to be doubtful.
+DOUBTFUL = 0.01
 EXAMPLE = "monitor contributions four-instruments"
 
 
@@ -96,6 +98,11 @@ def _say_agreement(answer: InstrumentsAnswer) -> None:
     apart = [(parameter, pair) for parameter, pair in pairs if pair.e_n > 1.0]
     for parameter, pair in apart:
         output.say(f"{parameter}: {pair.first} and {pair.second} disagree, E_n = {pair.e_n:.2f}")
+    if apart and answer.by_chance is not None and answer.by_chance > DOUBTFUL:
+        output.say(
+            f"of {len(pairs)} comparisons the largest comes out so large by chance in up to "
+            f"{100 * answer.by_chance:.0f} % of campaigns without fault: measure again before you look for a cause"
+        )
     if not apart:
         worst, pair = max(pairs, key=lambda compared: compared[1].e_n)
         output.say(

@@ -32,6 +32,12 @@ STEP_TOLERANCE = 1e-8
 # hundred-thousandth that have stopped shrinking are rounding.
 ROUNDING = 1e-5
 MOST_ITERATIONS = 50
+# Where much is left and the model bends, whole steps of Gauss and Newton go past the point, each further than the last
+# (Fletcher, Practical Methods of Optimization, 1987, 6.1). Steps above this size that raise the sum of squares by more
+# than rounding are halved, and those after them begin so.
+SMALLEST_HALVED, ROUNDING_OF_SUM = 1e-3, 1e-11
+# Halved steps take a tenth off the rest where whole ones take a fifth.
+DAMPED_TIMES = 4
 MOST_HALVINGS = 12
 # A member of a null vector is named where its share exceeds this part of the largest.
 MEMBER_SHARE = 1e-3
@@ -174,8 +180,10 @@ def solve(
     current = linearise(local, common)
     cost = float(np.sum(current.residual**2))
     space, spanned = eliminate(current.local), current.local
-    before = np.inf
-    for iteration in range(1, most + 1):
+    before, damping = np.inf, 1.0
+    for iteration in range(1, DAMPED_TIMES * most + 1):
+        if iteration > most and damping == 1.0:
+            break
         checkpoint()
         if current.local is not spanned:
             space, spanned = eliminate(current.local), current.local
@@ -186,13 +194,15 @@ def solve(
         in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
         size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
-        factor = 1.0
+        factor = damping
         for _ in range(MOST_HALVINGS):
             trial = linearise(local + factor * step_local, common + factor * of_common.step)
             trial_cost = float(np.sum(trial.residual**2))
-            if trial_cost <= cost or size < 1.0:
+            if trial_cost <= cost * (1.0 + ROUNDING_OF_SUM) or size < SMALLEST_HALVED:
                 break
             factor /= 2.0
+        if size < 1.0:
+            damping = factor
         local, common = local + factor * step_local, common + factor * of_common.step
         current, cost = trial, trial_cost
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:

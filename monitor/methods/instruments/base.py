@@ -32,6 +32,8 @@ POSES, SEED = 120, 20260217
 REACH, PLACES = 400.0, 150.0
 # Derivatives below this part of the largest are rounding.
 ROUNDING = 1e-9
+# What may be known of a setup and says of no place where it is.
+NO_PLACE = frozenset({"direction", "length"})
 
 
 def mount_setup(chain: Chain) -> Setup:
@@ -144,7 +146,7 @@ def _candidates(chain: Chain, setups: tuple[Setup, ...]) -> list[tuple[int, int,
     first = chain.index(frame.name)
     of_first = [(first, 0, component) for component in (3 + frame.main, 3, 4, 5, 0, 1, 2)]
     # What unknown places take up elsewhere shows where a setup states them.
-    places_known = any(setup.known for setup in setups)
+    places_known = any(set(setup.known) - NO_PLACE for setup in setups)
     others = [
         (index, 0, component)
         for index, joint in enumerate(chain.joints)

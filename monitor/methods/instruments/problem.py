@@ -31,6 +31,9 @@ LARGEST_OUTSIDE = (5.0, 0.02)
 LARGEST_TURN = 0.35
 # What is read of an error's displacement is at least this part, else it comes from products of errors alone.
 SECOND_ORDER = 5e-3
+# A turn that moves a reading by less than this, mm/rad, is seen by rounding alone; one that turns sensors shows what
+# they read, which is some tenths of a millimetre and an error itself.
+LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
 
@@ -312,11 +315,14 @@ class InstrumentProblem(ChainProblem):
         them be, and turn with every step.
         """
         assert pose.by_error is not None
-        if shown.by_shift is None or shown.by_turn is not None:
+        if shown.by_shift is None:
             return np.ones(derivatives.shape[2:], dtype=bool)
         if setup not in self._masks:
-            moved = np.sum(pose.by_error[at] ** 2, axis=(0, 1))
-            self._masks[setup] = np.sum(derivatives**2, axis=(0, 1)) > SECOND_ORDER**2 * moved
+            turns = shown.by_turn is not None
+            moved = np.zeros(derivatives.shape[2:]) if turns else np.sum(pose.by_error[at] ** 2, axis=(0, 1))
+            least = np.where(np.arange(6) < 3, 0.0, LEAST_READ if turns else LEAST_LEVER)
+            size = np.sum(derivatives**2, axis=(0, 1))
+            self._masks[setup] = (size > SECOND_ORDER**2 * moved) & (size > least**2 * len(at))
         return self._masks[setup]
 
     def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:

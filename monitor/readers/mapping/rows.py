@@ -10,6 +10,7 @@ import numpy as np
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.axes import Axis
+from monitor.readers.delimited import name_and_unit
 from monitor.readers.export import Export
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import (
@@ -95,9 +96,17 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
 
 
 def matching(export: Export, name: str) -> str | None:
-    """Return the column of a file that goes by a name, capitals aside; None where there is none."""
+    """Return the column of a file that goes by a name, capitals aside; None where there is none.
+
+    A name may be the whole header with the unit that it states: ``Position [mm]`` is the column Position in mm.
+    """
     folded = {column.casefold(): column for column in export.columns}
-    return name if name in export.columns else folded.get(name.casefold())
+    column = name if name in export.columns else folded.get(name.casefold())
+    if column is not None:
+        return column
+    stem, unit = name_and_unit(name)
+    column = folded.get(stem.casefold())
+    return column if column is not None and unit is not None and export.units.get(column) == unit else None
 
 
 def _selected(entry: Entry, file: str, export: Export) -> Export:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from markupsafe import Markup
@@ -58,6 +58,7 @@ LOOKS = {
 }
 #: How a machine is named that its drift may have taken out of tolerance since it was measured.
 _DUE_SIGN, _DUE = "◔", "due for a check"
+_DUE_MEANS = "nothing is wrong so far, but by its drift it need not be in tolerance any more"
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
 _BLIND_SHOWN = 4
 #: Changes and events named on the page, the latest first.
@@ -147,11 +148,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "anchor": fleet.anchor,
         "ended": fleet.ended,
         "lines": [_line(row) for row in fleet.rows],
-        "legend": [
-            (SIGNS[state], state, meaning)
-            for state, meaning in STATES.items()
-            if state in {row.state for row in fleet.rows}
-        ],
+        "legend": _legend(fleet.rows),
         "noticed": [(machine, _anchor(machine), what) for machine, what in fleet.noticed],
         "answers": answers(fleet),
         "cards": [_card(health) for health in fleet.attention if health.state in URGENT or is_due(health)],
@@ -161,11 +158,18 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
     }
 
 
+def _legend(rows: Sequence[FleetRow]) -> list[tuple[str, str, str]]:
+    """Sign, word and meaning of the states on the page."""
+    states = {row.state for row in rows if not is_due(row)}
+    due = [(_DUE_SIGN, _DUE, _DUE_MEANS)] if any(map(is_due, rows)) else []
+    return [
+        *((SIGNS[state], state.value, meaning) for state, meaning in STATES.items() if state in states),
+        *due,
+    ]
+
+
 def _card(health: MachineHealth) -> Card:
-    head = _line(fleet_row(health))
-    if is_due(health):
-        head = replace(head, sign=_DUE_SIGN, state=_DUE, look="doubtful")
-    return Card(head, reason(health), to_do(health), _card_picture(health))
+    return Card(_line(fleet_row(health)), reason(health), to_do(health), _card_picture(health))
 
 
 def _card_picture(health: MachineHealth) -> Markup:
@@ -192,7 +196,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
     return PrintedMachine(
         health=health,
         head=_line(fleet_row(health)),
-        meaning=STATES[health.state],
+        meaning=_DUE_MEANS if is_due(health) else STATES[health.state],
         lines=lines,
         widths=column_widths(lines),
         no_trend=(
@@ -238,9 +242,9 @@ def _line(row: FleetRow) -> FleetLine:
         machine=row.machine,
         anchor=_anchor(row.machine),
         location=row.location,
-        sign=SIGNS[row.state],
-        state=row.state,
-        look=LOOKS[row.state],
+        sign=_DUE_SIGN if is_due(row) else SIGNS[row.state],
+        state=_DUE if is_due(row) else row.state,
+        look="doubtful" if is_due(row) else LOOKS[row.state],
         alarm=row.state in ALARMS,
         changed=str(row.changed),
         since="" if row.since is None else day(row.since),

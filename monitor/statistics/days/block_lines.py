@@ -74,11 +74,13 @@ class AgainstSeason(NamedTuple):
     """Slopes (c,) beside a part of a wave of any size: Student's ``t`` without its sign, and its degrees ``dof``.
 
     NaN where no such wave is asked of the slope: the wave is fitted, a column (the temperature) stands beside the line,
-    or no period was given. ``t`` is 0 where the blocks are too few to tell the two apart.
+    or no period was given. ``t`` is 0 where the blocks are too few to tell the two apart. ``bend`` is the size of the
+    wave that turns in the middle of the history, which no slope shows; 0 where the blocks are too few.
     """
 
     t: Array
     dof: Array
+    bend: Array
 
 
 @dataclass(frozen=True)
@@ -352,7 +354,7 @@ def _against_season(
     # days scatter about their line as much as the season moves them.
     share = np.where(full.sum(axis=1) >= FEWEST_BESIDE_WAVE, ENDS_BEFORE, COVERED)
     open_ = ~cyclic & ~is_beside & (span < share * cycle)
-    t, dof = np.full(c, np.nan), np.full(c, np.nan)
+    t, dof, bend = np.full(c, np.nan), np.full(c, np.nan), np.zeros(c)
     if open_.any():
         some = Blocks(blocks.weight[open_], blocks.time[open_], blocks.value[open_], blocks.days[open_])
         at, away = _middle(some)
@@ -365,7 +367,16 @@ def _against_season(
         enough = (lines.blocks >= FEWEST_BESIDE_WAVE) & (lines.u_slope > 0.0)
         t[open_] = np.where(enough, np.abs(lines.slope) / np.where(enough, lines.u_slope, 1.0), 0.0)
         dof[open_] = np.where(enough, lines.dof, 1.0)
-    return AgainstSeason(t, dof)
+        bend[open_] = np.where(enough, _bend(some, at, np.cos(phase), away), 0.0)
+    return AgainstSeason(t, dof, bend)
+
+
+def _bend(blocks: Blocks, at: Array, even: Array, away: Array) -> Array:
+    """The size (c,) of the even part of a wave, ``even`` (c, b), beside level and slope."""
+    basis, shares = _orthonormal(np.sqrt(blocks.weight), [np.ones_like(away), away, even])
+    design = _Design(basis, shares, np.sqrt(blocks.weight.sum(axis=1)))
+    lines = _lines(blocks, design, at, np.ones(len(at), dtype=np.bool_))
+    return np.nan_to_num(np.abs(lines.slope))
 
 
 def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bool_]) -> BlockLines:
@@ -415,7 +426,7 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         scatter=scatter,
         blocks=count,
         cyclic=cyclic,
-        seasonal=AgainstSeason(np.full(c, np.nan), np.full(c, np.nan)),
+        seasonal=AgainstSeason(np.full(c, np.nan), np.full(c, np.nan), np.zeros(c)),
     )
 
 

@@ -50,18 +50,21 @@ def beside_season(slope: Array, u: Array, dof: Array, seasonal: AgainstSeason) -
 @dataclass(frozen=True)
 class SeasonAhead:
     """What a season may be of lines (k,) beyond their last runs: ``u`` of the slopes, ``begins`` and ``ends`` of the
-    runs, and the period ``cycle``."""
+    runs, the period ``cycle``, and the size of the wave that turns within the runs (``bend`` of ``AgainstSeason``)."""
 
     u: npt.ArrayLike
     begins: npt.ArrayLike
     ends: npt.ArrayLike
     cycle: float
+    bend: npt.ArrayLike = 0.0
 
     def at(self, times: npt.ArrayLike) -> Array:
         """Return the standard uncertainty that the season adds at ``times``, 0 up to the last run.
 
         The season may end what the line goes on with (the time ahead by ``u``), or turn back: a wave whose slope over
-        the runs is that of the line departs from it as computed here, in times by the slope.
+        the runs is that of the line departs from it as computed here, in times by the slope. A wave that turns within
+        the runs has no slope: what it falls by after the last run, at most to its other turn, is the half-width of a
+        rectangular distribution, as the slope is. Both are of one wave and may add up, so they are added.
         """
         begins, ends = np.asarray(self.begins, dtype=np.float64), np.asarray(self.ends, dtype=np.float64)
         half, ahead = (ends - begins) / 2.0, np.maximum(np.asarray(times, dtype=np.float64) - ends, 0.0)
@@ -69,4 +72,6 @@ class SeasonAhead:
         # Slope of the least-squares line through sin(w t), from -half to half.
         slope = 3.0 * (np.sin(w * half) / w - half * np.cos(w * half)) / (w * half**3)
         turned = ahead - (np.sin(w * (half + ahead)) - np.sin(w * half)) / slope
-        return np.asarray(self.u * np.maximum(ahead, turned))
+        falls = self.bend * (np.cos(w * half) - np.cos(np.minimum(w * (half + ahead), np.pi)))
+        falls = np.where(ahead > 0.0, np.maximum(falls, 0.0), 0.0) / np.sqrt(3.0)
+        return np.asarray(self.u * np.maximum(ahead, turned) + falls)

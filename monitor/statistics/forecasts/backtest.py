@@ -231,7 +231,7 @@ def _forecasts(
     if cycle is not None:
         season_u = np.sqrt(np.maximum(widened**2 - c[:, 1, 1], 0.0))
         ends = np.maximum.accumulate(days.latest)[last]
-        of_line += SeasonAhead(season_u, days.earliest, ends, cycle).at(t) ** 2
+        of_line += SeasonAhead(season_u, days.earliest, ends, cycle, judged.seasonal.bend).at(t) ** 2
     spread = of_line + run_variance + variance * unit * judged.scatter + lines.of_wave
     return lines.level + lines.slope * away, np.sqrt(spread), judged.dof
 

@@ -46,6 +46,7 @@ def export_tables(
     if form not in _OPTIONS:
         raise InputError(f"a database is exported as csv or parquet, not {form!r}")
     folder = Path(folder)
+    _remove_mark(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} is not an empty folder; name a new one")
     if folder.suffix.lower() in _FILES:
@@ -65,15 +66,21 @@ def export_tables(
         written.append(_columns(db, partial))
         if tables is None and machine is None:
             written += _source_files(db, partial)
-        (partial / _MARK).unlink()
         if folder.exists():
             folder.rmdir()  # an empty one; Windows puts no folder in the place of another
         partial.replace(folder)
+        # Last: killed before that, the next export would find a folder that it may not remove.
+        _remove_mark(folder)
     except (OSError, StoreError, duckdb.IOException) as fault:
         with contextlib.suppress(OSError):
             _remove(partial)
         raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
     return tuple(folder / file.relative_to(partial) for file in written)
+
+
+def _remove_mark(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        (folder / _MARK).unlink(missing_ok=True)
 
 
 def _remove(partial: Path) -> None:

@@ -19,6 +19,8 @@ from monitor.store.kept_blocks import ENDING
 from monitor.store.opening import sync_folder
 
 _MANIFEST_END = ".manifest.json"
+#: What the name of a backup ends with until it is whole.
+_PARTIAL_END = ".partial"
 
 #: Rows and checksum by table.
 Checksums = Mapping[str, tuple[int, str]]
@@ -126,8 +128,12 @@ def read_manifest(path: Path) -> Backup:
 
 
 def list_backups(folder: str | Path) -> tuple[Backup, ...]:
-    """The backups in a folder that have a manifest, the oldest first."""
-    backups = [read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
+    """The backups in a folder that have a manifest, the oldest first; not what a killed one left unfinished."""
+    backups = [
+        read_manifest(path)
+        for path in Path(folder).glob(f"*{_MANIFEST_END}")
+        if not path.name.endswith(_PARTIAL_END + _MANIFEST_END)
+    ]
     return tuple(sorted(backups, key=lambda backup: (backup.made_at, backup.path)))
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 #: From where the machine is looked at; the middle is lowered, so that the axes below it stay in the picture.
-CAMERA = {"eye": {"x": 1.1, "y": -1.5, "z": 0.72}, "center": {"x": 0.0, "y": 0.0, "z": -0.14}}
+CAMERA = {"eye": {"x": 1.17, "y": -1.6, "z": 0.77}, "center": {"x": 0.0, "y": 0.0, "z": -0.09}}
 #: More rotary poses than this are no list that anybody chooses from.
 MOST_POSES = 80
 

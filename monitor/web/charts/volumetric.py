@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 ARROWS = [[0, "@mid"], [1, "@orange"]]
 CELLS = [[0, "@paper"], [1, "@heat"]]
 
+#: From where the strokes are looked at; the middle is lowered, so that the names of the axes stay in a narrow picture.
+CAMERA = {"eye": {"x": 1.5, "y": -1.76, "z": 0.98}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+
 
 def vectors_chart(answer: OverStrokeAnswer) -> Chart:
     """Show the error at every point of the grid as an arrow; its colour is the length in µm."""
@@ -44,7 +47,7 @@ def vectors_chart(answer: OverStrokeAnswer) -> Chart:
             }
         ],
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.45, "y": -1.7, "z": 0.95}}},
+            "scene": {**frame, "aspectmode": "data", "camera": CAMERA},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
         height=520,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import tempfile
 from pathlib import Path
 
@@ -76,10 +77,16 @@ def routes() -> APIRouter:
                 name,
                 address_of(name),
                 role_needed(name).word,
-                (QUESTIONS[name].load().__doc__ or "").strip().splitlines()[0],
+                _said(QUESTIONS[name].load().__doc__ or ""),
             )
             for name in offered()
         ]
         return page(request, "interface.html", questions=questions)
 
     return router
+
+
+def _said(docstring: str) -> str:
+    """The first line of a docstring as people read it: without its marks, and without what it raises."""
+    line = docstring.strip().partition("\n")[0]
+    return re.sub(r" ?Raises .*$", "", line).replace("``", "").replace("`", "")

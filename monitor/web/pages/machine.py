@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
-from datetime import date, timedelta
+from datetime import UTC, date, datetime, time, timedelta
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -48,10 +48,12 @@ def routes() -> APIRouter:
         if colour not in GROUPINGS:
             raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
         trends = _Trends(request, _asked(name, since, campaign), parameter)
-        values: ValuesAnswer = ask(user, "values", _period(name, since, until))
+        # The whole history, of which a period is cut: it is read once and held for every period that is looked at.
+        values: ValuesAnswer = ask(user, "values", {"machine": name})
         if not values.parameters and trends.of_all() is not None:
             # The trend has identified what nobody had identified before.
-            values = ask(user, "values", _period(name, since, until))
+            values = ask(user, "values", {"machine": name})
+        values = _within(values, **_ends(since, until))
         methods = sorted(set(values.method))
         values = _chosen(values, campaign, method, warm_up)
         names = list(values.parameters)
@@ -71,21 +73,6 @@ def routes() -> APIRouter:
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
         )  # fmt: skip
 
-    @router.get("/machine/parameters")
-    async def parameters(
-        request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
-    ) -> Response:
-        """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
-        desk: Desk = request.app.state.desk
-        ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
-        await ticket.settled(FETCH_S)
-        if not ticket.is_done:
-            return JSONResponse({}, 202)
-        return page(
-            request, "parameters.html",
-            name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
-        )  # fmt: skip
-
     @router.get("/machine/values.csv")
     def values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
         """Send the values of a machine, a row a run, units in the column names."""
@@ -94,6 +81,7 @@ def routes() -> APIRouter:
         )
         return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
 
+    router.get("/machine/parameters")(_table_of_all)
     router.get("/machine/periods")(_two_periods)
 
     @router.post("/machine/event")
@@ -106,6 +94,21 @@ def routes() -> APIRouter:
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router
+
+
+async def _table_of_all(
+    request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
+) -> Response:
+    """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
+    desk: Desk = request.app.state.desk
+    ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
+    await ticket.settled(FETCH_S)
+    if not ticket.is_done:
+        return JSONResponse({}, 202)
+    return page(
+        request, "parameters.html",
+        name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
+    )  # fmt: skip
 
 
 class _Trends:
@@ -221,6 +224,30 @@ def _period(name: str, since: str, until: str) -> dict[str, Any]:
     return {"machine": name, **{key: f"{date}T00:00:00Z" for key, date in ends.items() if date}}
 
 
+def _ends(since: str, until: str) -> dict[str, datetime]:
+    """The ends of a period that are named. Raises InputError for what is no date."""
+    try:
+        return {
+            key: datetime.combine(date.fromisoformat(text), time(), UTC)
+            for key, text in {"since": since, "until": until}.items()
+            if text
+        }
+    except ValueError as error:
+        raise InputError(f"write dates such as 2026-03-02: {error}") from error
+
+
+def _within(
+    values: ValuesAnswer, since: datetime | None = None, until: datetime | None = None
+) -> ValuesAnswer:
+    """The runs from the beginning of a day until the beginning of another."""
+    rows = [
+        row
+        for row, at in enumerate(values.started_at)
+        if (since is None or at >= since) and (until is None or at < until)
+    ]
+    return _of_rows(values, rows)
+
+
 def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> ValuesAnswer:
     """The runs of one campaign, one method, warm or warming up alone; all parameters and conditions that they have."""
     if warm_up not in WARMTHS:
@@ -232,6 +259,11 @@ def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> V
         and method in ("", values.method[row])
         and warm_up in ("", WARMTHS[2 if warming else 1])
     ]
+    return _of_rows(values, rows)
+
+
+def _of_rows(values: ValuesAnswer, rows: list[int]) -> ValuesAnswer:
+    """Some of the runs, with the parameters and conditions that any of them has."""
     if len(rows) == len(values.run):
         return values
 

@@ -59,7 +59,11 @@ class ParameterShares:
 
 @dataclass(frozen=True)
 class InstrumentsAnswer:
-    """The instruments of one run; ``not_determined`` are parameters that all of them together do not separate."""
+    """The instruments of one run; ``not_determined`` are parameters that all of them together do not separate.
+
+    ``by_chance`` is how often at most the largest E_n of so many comparisons is as large without fault, None where
+    nothing is compared.
+    """
 
     campaign: str
     run: int
@@ -67,3 +71,4 @@ class InstrumentsAnswer:
     instruments: tuple[InstrumentFit, ...]
     parameters: tuple[ParameterShares, ...]
     not_determined: tuple[str, ...]
+    by_chance: float | None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import combinations
 
@@ -73,7 +74,14 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
         ),
         parameters=tuple(parameters),
         not_determined=tuple(open_ones),
+        by_chance=_by_chance([pair.e_n for shares in parameters for pair in shares.agreement]),
     )
+
+
+def _by_chance(e_n: list[float]) -> float | None:
+    """How often at most the largest of such comparisons is as large without fault: Bonferroni's bound for normal
+    differences, each with U = 2 u; None without comparisons."""
+    return min(1.0, len(e_n) * math.erfc(K * max(e_n) / math.sqrt(2.0))) if e_n else None
 
 
 def _parameter(

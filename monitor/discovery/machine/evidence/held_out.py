@@ -78,19 +78,17 @@ class LeftOutBlocks:
 
     def sum_of_squares(self, residual: Array, columns: Array) -> float:
         """Sum of squares of the parts, each predicted from the others with ``columns`` (M, c) of effects beside the own
-        unknowns; residual (M,) and columns are free of these."""
-        scale = np.linalg.norm(columns, axis=0)
-        columns = columns / np.where(scale == 0, 1.0, scale)
-        gram, onto = columns.T @ columns, columns.T @ residual
+        unknowns; residual (M,) and columns are free of these. Directions that the other parts hardly determine are not
+        predicted."""
+        columns = orthonormal(columns)
+        gram, onto = np.eye(columns.shape[1]), columns.T @ residual
         total = 0.0
         for rows, basis_of_fold, inverse in zip(self._rows, self._own, self._inverse, strict=True):
             part, left_out = columns[rows], residual[rows]
             mixed, alone = -basis_of_fold.T @ part, -basis_of_fold.T @ left_out
             reaction = inverse @ mixed
             normal = gram - part.T @ part - mixed.T @ reaction
-            sizes = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ (
-                onto - part.T @ left_out - reaction.T @ alone
-            )
+            sizes = inverse_above(normal, PREDICTED) @ (onto - part.T @ left_out - reaction.T @ alone)
             error = left_out - part @ sizes - basis_of_fold @ (inverse @ alone - reaction @ sizes)
             total += float(error @ error)
         return total

@@ -10,8 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
+import numpy as np
+
+from monitor.discovery.machine.evidence.acceptance import LARGEST_RATIO
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
@@ -29,11 +33,26 @@ def bends_instead(
     if not together:
         return []
     best = max(together, key=lambda some: score_beside(scene, some, others))
-    if score_beside(scene, best, others) < worth:
+    if score_beside(scene, best, others) < worth or _all_but_cancel(scene, best, others):
         return []
     before = scene.held_out_error_by_poses(scene.columns(others))
     after = scene.held_out_error_by_poses(scene.columns([*others, *best]))
     return best if before is None or after is None or after < before else []
+
+
+def _all_but_cancel(
+    scene: ChainScene, powers: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> bool:
+    """Whether one of some powers is many times as large as what it takes of the error: it would be no finding, and the
+    others alone describe nothing."""
+    sizes = amplitudes(scene, [*others, *powers]).estimate[-len(powers) :]
+    for index, (power, size) in enumerate(zip(powers, sizes, strict=True)):
+        beside = [*others, *powers[:index], *powers[index + 1 :]]
+        removed = weigh_beside(scene, [power], beside)[0].explained
+        peak = float(np.linalg.norm(power.raw[..., 0] * size, axis=1).max())
+        if peak > LARGEST_RATIO * scene.fit.sigma * float(np.sqrt(removed / scene.fit.readings)):
+            return True
+    return False
 
 
 def score_beside(

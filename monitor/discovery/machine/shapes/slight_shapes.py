@@ -1,7 +1,7 @@
 """A slight error of unknown shape: one part of a flexible basis that stands out of what an empty catalogue leaves.
 
 Lack of fit asks all poses at once whether anything is missing, and a shape of a few standard deviations is lost among
-them. Here every part of the flexible basis of every error is asked for itself, some 1 600 in all, and the largest one
+them. Here every part of the flexible basis of every error is asked for itself, some 1 700 in all, and the largest one
 has to stand against that number twice: in the whitened residual, and, where runs are many enough, under sign flips of
 whole runs, which holds whatever the noise within a run depends on (A. M. Winkler et al., NeuroImage 92 (2014) 381).
 """

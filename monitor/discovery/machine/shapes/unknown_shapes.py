@@ -165,8 +165,8 @@ def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float)
             if not shapes:
                 continue
             bends = bends_instead(scene, symbol, worth, [])
-            if bends:
-                best, worth = bends, _priced(scene, bends)
+            if bends and (score := _priced(scene, bends)) > worth:
+                best, worth = bends, score
             parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
             if parts:
                 free = _of_parts(scene, symbol, parts, shapes, [])

@@ -224,8 +224,8 @@ def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     if not 0.0 < shortest < float("inf"):
         return shortest == 0.0 and pitch <= travel
     frequency, steps = 1.0 / pitch, 2.0 / shortest
-    seen = abs(frequency - steps * np.round(frequency / steps))
-    return bool(seen * travel >= FEWEST_PERIODS)
+    apparent = abs(frequency - steps * np.round(frequency / steps))
+    return bool(apparent * travel >= FEWEST_PERIODS)
 
 
 def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
