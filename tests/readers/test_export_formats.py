@@ -222,7 +222,5 @@ ambient_degC = 20.0
     campaign = read_campaign(tmp_path)
     assert campaign.probings.readings["X"].tolist() == [0.5, 100.5, 200.5, 300.5, 400.5]
     (tmp_path / "mapping.toml").write_text(mapping.replace("UNIT", "inch"), encoding="utf-8")
-    with pytest.raises(
-        CampaignError, match=r"laser.csv has no column 'Position \[inch\]'; it has Position"
-    ):
+    with pytest.raises(CampaignError, match=r"laser.csv has no column 'Position \[inch\]'; it has Position"):
         read_campaign(tmp_path)
