@@ -107,7 +107,7 @@ def test_the_weekly_page_says_it_of_the_whole_campaign(tmp_path: Path) -> None:
             ((last,),) = own.rows("SELECT max(started_at) FROM run")
             year, week, _ = last.isocalendar()
             named = f"{year}-W{week:02d}"
-            report(own, named)
+            report(own, named, out=tmp_path)
             ((number,),) = own.rows("SELECT analysis_id FROM v_analyses WHERE kind = 'health'")
             health = stored_health(own, number)
             pages[example] = health.model
