@@ -141,7 +141,8 @@ def sexagesimal(text: str, unit: str | None = None) -> Decimal | None:
     minutes, seconds = Decimal(match["minutes"]), Decimal((match["seconds"] or "0").replace(",", "."))
     if minutes >= 60 or seconds >= 60:
         return None
-    size = Decimal(match["whole"]) + minutes / 60 + seconds / 3600
+    # Thirds of a degree have no end; twelve decimals are below any encoder.
+    size = round(Decimal(match["whole"]) + minutes / 60 + seconds / 3600, 12)
     return -size if match["sign"] == "-" else size
 
 
