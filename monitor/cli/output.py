@@ -220,8 +220,9 @@ def working(activity: str) -> Iterator[None]:
 
 
 @contextmanager
-def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each."""
+def stepping(activity: str, total: int, *, behind: bool = False) -> Iterator[Callable[[str], None]]:
+    """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each, or
+    behind each (``behind``), so that the last call fills the bar."""
     if not _shows_progress():
         yield lambda name: None
         return
@@ -235,12 +236,12 @@ def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
         TimeRemainingColumn,
     )
 
-    started = itertools.count()
+    done = itertools.count(int(behind))
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)
         yield lambda name: progress.update(
-            task, description=f"{activity} {escape(name)}", completed=next(started)
+            task, description=f"{activity} {escape(name)}", completed=next(done)
         )
