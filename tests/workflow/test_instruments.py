@@ -14,8 +14,9 @@ import scipy
 from monitor.exceptions import DataError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign
+from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
-from monitor.workflow.explain.request import ExplainRequest
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.instruments.answer import InstrumentsAnswer
@@ -99,6 +100,21 @@ def test_laser_and_ball_bar_disagree_where_the_pitch_is_hidden(shared: Instrumen
     assert shared.by_chance < 1e-6
     apart = shop.PITCH * (shop.BAR_AT[2] - shop.TOOL[2] - 0.0) * 1e6
     assert bar.value - laser.value == pytest.approx(apart, abs=4.0 * bar.u)
+
+
+def test_compare_says_that_instruments_disagree(db: Database, shared: InstrumentsAnswer) -> None:
+    """The worst E_n of `contributions`, where chance does not make it; with the pitch in the model nothing is said, nor
+    where one instrument measured."""
+    apart = compare(db, CompareRequest("four-instruments")).instruments_disagree
+    assert apart is not None
+    worst = max((pair for each in shared.parameters for pair in each.agreement), key=lambda pair: pair.e_n)
+    assert (apart.run, apart.parameter, {apart.first, apart.second}) == (1, "EXX", {LASER, BAR})
+    assert (apart.first, apart.second) == (worst.first, worst.second)
+    assert apart.e_n == pytest.approx(worst.e_n, rel=1e-3)
+    assert apart.by_chance < 1e-6
+    assert compare(db, CompareRequest("r-test")).instruments_disagree is None
+    add_effect(db, AddEffectRequest("EBX:poly1", "instruments", "level", campaign="four-instruments"))
+    assert compare(db, CompareRequest("four-instruments", "level")).instruments_disagree is None
 
 
 def test_only_the_combination_shows_the_pitch(db: Database) -> None:
