@@ -236,12 +236,12 @@ def stepping(activity: str, total: int, *, behind: bool = False) -> Iterator[Cal
         TimeRemainingColumn,
     )
 
-    done = itertools.count(int(behind))
+    counted = itertools.count(int(behind))
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)
         yield lambda name: progress.update(
-            task, description=f"{activity} {escape(name)}", completed=next(done)
+            task, description=f"{activity} {escape(name)}", completed=next(counted)
         )

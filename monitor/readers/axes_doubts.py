@@ -71,7 +71,7 @@ def _arrangements(steps: Array) -> Iterator[tuple[str, bool, Array]]:
     for axis in range(3):
         yield AXES[axis], True, steps * np.where(np.arange(3) == axis, -1.0, 1.0)
     for cycle in permutations(range(3)):
-        if all(place != at for at, place in enumerate(cycle)):
+        if all(axis != at for at, axis in enumerate(cycle)):
             yield AXES, False, steps[:, list(cycle)]
 
 
