@@ -108,8 +108,10 @@ def _curve(explanation: CurveExplanation) -> None:
 
 def _next_step(explanation: MachineExplanation | CurveExplanation, campaign: str = "") -> None:
     if explanation.missing:
-        effect, model = explanation.missing[0].effect, explanation.comparison.model
-        output.say(f'to add it: monitor model add "{effect}" --to {model} --as NAME{campaign}')
+        first, model = explanation.missing[0].effect, explanation.comparison.model
+        together = explanation.added_together if isinstance(explanation, MachineExplanation) else (first,)
+        effects, it = " ".join(f'"{effect}"' for effect in together), "it" if len(together) == 1 else "them"
+        output.say(f"to add {it}: monitor model add {effects} --to {model} --as NAME{campaign}")
 
 
 def _bad_probing(reading: BadProbing, target_word: str) -> None:

@@ -44,10 +44,20 @@ class Move:
 
 
 @dataclass(frozen=True)
+class Scattering:
+    """A target (of the kind ``target_word``) whose readings scatter ``times`` as much as those of the others."""
+
+    target_word: str
+    target: str
+    times: float
+    deviation_um: float
+
+
+@dataclass(frozen=True)
 class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
-    were left out, what moved, at which ends of the search (``limits``) more may be there, and whether more is left than
-    any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how."""
+    were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
+    more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -58,6 +68,7 @@ class MachineFinding:
     unfitted: Sequence[str]
     hopeless: bool
     mistakes: Sequence[MistakeFound]
+    scattering: Sequence[Scattering] = ()
 
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
@@ -93,6 +104,12 @@ def machine_sentences(finding: MachineFinding) -> str:
     if finding.bad_points:
         sentences.append(
             f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
+        )
+    for each in finding.scattering:
+        sentences.append(
+            f"{each.target_word} {each.target} scatters {each.times:.1f} times as much as the others "
+            f"({each.deviation_um:.1f} µm in a reading): see whether it sits firmly and clean; its readings counted "
+            "by so much less."
         )
     for move in finding.moves:
         verb = "stepped" if move.stepped else "moved"

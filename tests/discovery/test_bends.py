@@ -13,6 +13,7 @@ import numpy as np
 from monitor.discovery import explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
+from monitor.workflow.explain.machine_answer import machine_explanation
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -77,5 +78,7 @@ def test_a_pitch_about_the_middle_of_the_travel_is_a_line_and_a_parabola(tmp_pat
     problem = campaign_method(campaign).problem_of(campaign)
     answer = explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
     assert sorted(effect.effect for effect in answer.missing) == ["EBX:poly1", "EBX:poly2"]
+    # Each takes the part of the other, so that both are added together.
+    assert sorted(machine_explanation(answer).added_together) == ["EBX:poly1", "EBX:poly2"]
     parabola = next(effect for effect in answer.missing if effect.effect == "EBX:poly2")
     assert abs(parabola.amplitude - PITCH / 250.0**2) < 4 * parabola.u

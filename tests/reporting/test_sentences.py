@@ -24,6 +24,7 @@ from monitor.reporting.health.sentences import (
     Pose,
     Position,
     RunsNamed,
+    ScatteringBall,
     SteppedAtEvent,
 )
 from monitor.reporting.lacks import Undecided
@@ -95,6 +96,10 @@ def test_the_schema_of_a_sentence_is_a_text() -> None:
         (
             NewThisWeek((SteppedAtEvent("EXX", "crash", 5.0, 1.0, "µm", None),)),
             "EXX stepped by +5.0 µm at the event 'crash' (u = 1.0 µm)",
+        ),
+        (
+            ScatteringBall("3", 6.12, 6.08),
+            "ball 3 scatters 6.1 times as much as the others (6.1 µm): it may be loose or dirty",
         ),
         (BadPoint(3, 17, "B", "Z", -41.26), "run 3, touch 17, ball B: Z is off by -41.3 µm"),
         (NewThisWeek(()), "nothing this week"),

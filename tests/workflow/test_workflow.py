@@ -129,6 +129,17 @@ def test_a_base_effect_is_not_added(db: Database) -> None:
     ]
 
 
+def test_effects_that_take_each_others_part_are_added_in_one_version(db: Database) -> None:
+    pair = AddEffectRequest("EBX:poly2", "samba", "bent", beside=("EBX:poly1",), campaign="hidden-reversal-x")
+    answer = add_effect(db, pair)
+    assert answer.model.version.added == ("EBX:poly2", "EBX:poly1")
+    assert [step.added for step in answer.history] == [None, "EBX:poly2 + EBX:poly1"]
+    with pytest.raises(InputError, match="model bent has EBX:poly1 already"):
+        add_effect(db, AddEffectRequest("EYX:poly2", "bent", beside=("EBX:poly1",)))
+    with pytest.raises(InputError, match="lists an effect twice: EYX:poly2"):
+        add_effect(db, AddEffectRequest("EYX:poly2", "bent", beside=("EYX:poly2",)))
+
+
 def test_history_is_that_of_the_campaign_last_looked_at(db: Database) -> None:
     model = version_with(db, AddEffectRequest("EXX:reversal", "samba", "m"))
     with pytest.raises(NotFoundError, match="model m has not been compared with a campaign yet"):

@@ -32,8 +32,8 @@ def options(parser: ArgumentParser) -> None:
     shown = verbs.add_parser("show", **described("what a model contains", "monitor model show with-reversal"))
     shown.add_argument("name", metavar="NAME")
     shown.set_defaults(run=_show)
-    added = verbs.add_parser("add", **described("a new version with one more effect", EXAMPLE))
-    added.add_argument("effect", metavar="EFFECT")
+    added = verbs.add_parser("add", **described("a new version with further effects", EXAMPLE))
+    added.add_argument("effect", nargs="+", metavar="EFFECT")
     added.add_argument("--to", required=True, metavar="NAME", help="the model, or a version of it: NAME@2")
     added.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
     added.add_argument("--note", default="", help="why")
@@ -133,7 +133,8 @@ def _add(options: Namespace) -> int:
     # What fits a model takes a third of a second to load: `model list` and `model show` do without it.
     from monitor.workflow.model.change import add_effect, affected
 
-    request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
+    effect, *beside = options.effect
+    request = AddEffectRequest(effect, options.to, options.as_, options.note, options.campaign, tuple(beside))
     with opened(options) as db:
         changed = ask(db, affected, request)
         if not options.json and (changed.in_use or options.dry_run):

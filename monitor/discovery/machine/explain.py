@@ -33,6 +33,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.scatter import Scatter
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
@@ -54,7 +55,8 @@ class Explanation:
     recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
     looks wrong, ``mistakes`` says how, and nothing else is reported.
     ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
-    leave nothing to see because base parameters do the same.
+    leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
+    less.
     """
 
     comparison: ChainComparison
@@ -69,6 +71,7 @@ class Explanation:
     unfitted: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
     taken_for_machine: tuple[TakenUp, ...] = ()
+    scatter: tuple[Scatter, ...] = ()
 
 
 def variants_of_campaign(
@@ -118,7 +121,8 @@ def explain(
     missing = _missing(first, search, curves, latest, surroundings)
     if suspects.varying:
         effects = [*suspects.move_effects(foreseen), *latest.effects]
-        steady, _ = fit_those_possible(foreseen, effects, latest.under.left_out, first)
+        weighed = suspects.weighed(foreseen)
+        steady, _ = fit_those_possible(weighed, effects, latest.under.left_out, first)
         steady = steady.with_correlation(correlation_under(latest.under))
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
@@ -138,6 +142,7 @@ def explain(
         unfitted=latest.unfitted,
         limits=latest.limits,
         taken_for_machine=taken_for_machine(latest.scene),
+        scatter=tuple(suspects.scatter.values()),
     )
 
 

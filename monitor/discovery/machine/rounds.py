@@ -25,6 +25,7 @@ from monitor.discovery.machine.suspects.suspects import (
     Suspects,
     find_suspects,
     with_effects,
+    with_scatter_of,
 )
 from monitor.discovery.search.rounds import Turns, in_rounds
 from monitor.discovery.search.scan import MOST_EFFECTS
@@ -100,11 +101,16 @@ class _Rounds:
         self.first = first
         self.beside_curves = beside_curves is not None
         self.most_effects = MOST_BESIDE_CURVES if self.beside_curves else MOST_EFFECTS
-        self.initial = self.suspects = search.gross if beside_curves is None else beside_curves
+        self.initial = search.gross if beside_curves is None else beside_curves
+        # A ball that shakes hides effects and makes others; runs that do not share it show it before any is known.
+        self.suspects = self.initial if self.beside_curves else self._with_scatter()
         self.correlation: Correlation | None = None
         self.unfitted: dict[str, None] = {}
         self._noises: NoiseTurns = Turns()
         self._earlier: Turns[SuspectNames, ChainRound] = Turns()
+
+    def _with_scatter(self) -> Suspects:
+        return with_scatter_of(self.first, self.search.problem, self.initial)
 
     def round(self) -> ChainRound:
         """Search effects under the present suspects and correlation, and fit those that can be."""
@@ -112,7 +118,7 @@ class _Rounds:
         out, single = suspects.left_out(problem), suspects.effects(problem)
         current = self.first
         if not suspects.same_as(self.initial):
-            current = fit(with_effects(problem, single), out, self.first)
+            current = fit(with_effects(suspects.weighed(problem), single), out, self.first)
         scene, result = self._scan(current.with_correlation(self.correlation))
         refined = refine_all(scene, result.candidates)
         effects = [finding.candidate.effect for finding in refined]

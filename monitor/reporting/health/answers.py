@@ -171,7 +171,9 @@ def _changed(health: MachineHealth) -> str:
 
 def _suspect(health: MachineHealth) -> str:
     suspect = health.quality.suspect
-    return f"{len(suspect)} bad point{'s' if len(suspect) != 1 else ''}: {suspect[0]}" if suspect else ""
+    if not suspect:
+        return ""
+    return f"{suspect[0]}{f', and {len(suspect) - 1} more' if len(suspect) > 1 else ''}"
 
 
 def _nearest_limit(health: MachineHealth) -> str:

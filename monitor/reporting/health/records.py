@@ -47,7 +47,7 @@ STATES: dict[State, str] = {
     State.NOT_EVALUATED: "measured, but its last run could not be evaluated: nothing is known of its tolerances",
     State.CHANGED: "a parameter or an artefact changed this week",
     State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing",
-    State.SUSPECT_DATA: "bad points were found and left out; nothing else",
+    State.SUSPECT_DATA: "bad points, or a ball that scatters, were found and count by less; nothing else",
     State.NOT_MEASURED: "no run this week",
     State.IN_TOLERANCE: "every parameter is within its tolerance and nothing changed",
     State.NO_CHANGE_SEEN: "nothing changed; not every parameter has a tolerance to be judged by",

@@ -266,6 +266,21 @@ class BadPoint(Sentence):
 
 
 @dataclass(frozen=True)
+class ScatteringBall(Sentence):
+    """A ball whose readings scatter ``times`` as much as those of the others, ``deviation_um``."""
+
+    ball: str
+    times: float
+    deviation_um: float
+
+    def __str__(self) -> str:
+        return (
+            f"ball {self.ball} scatters {self.times:.1f} times as much as the others "
+            f"({self.deviation_um:.1f} µm): it may be loose or dirty"
+        )
+
+
+@dataclass(frozen=True)
 class TolerancesOfType(Sentence):
     """A machine is judged by the tolerances of its type, because its campaign states none."""
 

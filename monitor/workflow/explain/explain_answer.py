@@ -161,6 +161,18 @@ class BadRow:
 
 
 @dataclass(frozen=True)
+class ScatteringTarget:
+    """A target whose readings have ``times`` the standard deviation of those of the others, ``deviation_um``, over
+    ``touches`` that several runs repeat; they counted by so much less."""
+
+    target: str
+    times: float
+    deviation_um: float
+    touches: int
+    p_value: float
+
+
+@dataclass(frozen=True)
 class MovedTarget:
     """A target that stands elsewhere from a probing of a run on."""
 
@@ -239,12 +251,14 @@ class Remaining:
 class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
-    ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
+    ``scattering`` are targets that are loose or dirty rather than many bad points. ``blind_spots`` are effects that
+    leave nothing to see, ``not_recorded`` those that lack a column, and why;
     ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
     at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
     but could not be fitted, and were skipped. ``remaining`` is what is left with all that is missing in the model, None
     where nothing is. The residual is pictured where something is missing. ``taken_for_machine`` are errors of
-    instruments that would be reported as the machine's.
+    instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
+    other powers of its error, of which each alone says little.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -264,6 +278,8 @@ class MachineExplanation:
     limits_reached: tuple[str, ...] = ()
     remaining: Remaining | None = None
     taken_for_machine: tuple[InstrumentAlias, ...] = ()
+    scattering: tuple[ScatteringTarget, ...] = ()
+    added_together: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistake
-from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.suspects.steps import Step
 from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
 from monitor.machine import Chain
@@ -21,6 +21,7 @@ from monitor.reporting.machine_finding import (
     MissingEffect,
     MistakeFound,
     Move,
+    Scattering,
     machine_sentences,
 )
 from monitor.units import DEGREE, MICROMETRE, Unit
@@ -37,6 +38,7 @@ from monitor.workflow.explain.explain_answer import (
     MachineMissing,
     MovedTarget,
     Remaining,
+    ScatteringTarget,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
 from monitor.workflow.explain.shared_answer import (
@@ -52,6 +54,8 @@ from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.
 HOPELESS_TIMES = 100.0
+#: A power of the position, without a driver.
+POWER = re.compile(r"(?P<error>\w+):poly\d+")
 #: The numbers of a residual that is a vector.
 COORDINATES = ("x", "y", "z")
 
@@ -179,8 +183,9 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     return (*moved, *(_step(step, units, problem.context.chain) for step in explanation.steps))
 
 
-def _remaining(final: Fit) -> Remaining:
+def _remaining(explanation: Explanation) -> Remaining:
     """What the model with all findings leaves."""
+    final = explanation.final
     um = MICROMETRE.to_display
     resting = np.isin(final.problem.context.target, list(final.problem.resting))[:, None]
 
@@ -190,7 +195,10 @@ def _remaining(final: Fit) -> Remaining:
 
     return Remaining(
         deviation_um=um(final.sigma * final.scale),
-        stated_uncertainty_um=um(final.sigma),
+        # Weights of targets that scatter are nobody's statement.
+        stated_uncertainty_um=um(
+            explanation.comparison.stated_uncertainty if explanation.scatter else final.sigma
+        ),
         rms_um=um(final.rms),
         carried_rms_um=rms(~resting) if resting.any() else None,
         resting_rms_um=rms(resting),
@@ -237,6 +245,10 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         for point in explanation.suspect
     )
     changes = _changes(explanation)
+    scattering = tuple(
+        ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
+        for each in explanation.scatter
+    )
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
     if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -261,6 +273,10 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 missing=[_as_said(effect) for effect in missing],
                 bad_points=len(suspect_data),
                 moves=tuple(_move(change, problem.target_word) for change in changes),
+                scattering=tuple(
+                    Scattering(problem.target_word, each.target, each.times, each.deviation_um)
+                    for each in scattering
+                ),
                 limits=explanation.limits,
                 most_bad_points=MOST_BAD_POINTS,
                 unfitted=explanation.unfitted,
@@ -272,9 +288,21 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
         limits_reached=tuple(explanation.limits),
-        remaining=_remaining(explanation.final) if missing else None,
+        remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
+        scattering=scattering,
+        added_together=_added_together([effect.effect for effect in missing]),
     )
+
+
+def _added_together(missing: Sequence[str]) -> tuple[str, ...]:
+    """The first effect, and the powers of the same error where it is one: a bend about the middle of the travel is a
+    line and a parabola, each of which takes the part of the other."""
+    first = [POWER.fullmatch(effect) for effect in missing[:1]]
+    if not first or first[0] is None:
+        return tuple(missing[:1])
+    powers = [power for effect in missing if (power := POWER.fullmatch(effect)) is not None]
+    return tuple(power[0] for power in powers if power["error"] == first[0]["error"])
 
 
 def _aliases(explanation: Explanation) -> tuple[InstrumentAlias, ...]:

@@ -42,15 +42,16 @@ def fitted_version(
 ) -> tuple[MachineVersion | CurveVersion, ...]:
     """Fit a version that need not be stored yet, and its ancestors, to a campaign.
 
-    Raises NotFoundError, DataError, EffectError where its last effect has no column in the campaign.
+    Raises NotFoundError, DataError, EffectError where an effect that it adds has no column in the campaign.
     """
     ancestors = () if version.parent is None else model_history(db, *version.parent)
     if campaign is None:
         campaign = latest_campaign(db, ancestors[-1] if ancestors else version)
     measured = load_measured(db, campaign)
     left_out = machine_problem(measured, version).left_out if isinstance(measured, Campaign) else {}
-    if version.effects and version.effects[-1] in left_out:
-        raise EffectError(left_out[version.effects[-1]])
+    for effect in version.added:
+        if effect in left_out:
+            raise EffectError(left_out[effect])
     return error_steps(measured, (*ancestors, version))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -24,6 +24,7 @@ from monitor.reporting.health.sentences import (
     BallMoved,
     EventNoted,
     ParameterChanged,
+    ScatteringBall,
     SteppedAtEvent,
 )
 from monitor.reporting.symbols import describe
@@ -166,6 +167,19 @@ def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:
     return tuple(ranges)
 
 
+def _suspect(
+    explanation: MachineExplanation, measured: Collection[tuple[str, int]]
+) -> Iterator[ScatteringBall | BadPoint]:
+    """Balls that scatter, and bad points, in the ``measured`` runs (campaign, run)."""
+    campaign = explanation.comparison.campaign
+    if any(name == campaign for name, _ in measured):
+        for each in explanation.scattering:
+            yield ScatteringBall(each.target, each.times, each.deviation_um)
+    for point in explanation.suspect_data:
+        if (campaign, point.run) in measured:
+            yield BadPoint(point.run, point.sequence, point.target, point.axis, point.size_um)
+
+
 def data_quality(
     db: Database,
     runs: Sequence[RecordedRun],
@@ -179,15 +193,7 @@ def data_quality(
     counts = {name: probing_counts(db, name) for name in campaigns}
     noticed = [note for name in campaigns for note in campaign_notes(db, name)]
     measured = {(run.campaign, run.run) for run in runs}
-    suspect = (
-        ()
-        if explanation is None
-        else tuple(
-            BadPoint(point.run, point.sequence, point.target, point.axis, point.size_um)
-            for point in explanation.suspect_data
-            if (explanation.comparison.campaign, point.run) in measured
-        )
-    )
+    suspect = () if explanation is None else tuple(_suspect(explanation, measured))
     return DataQuality(
         runs=len(runs),
         probings=sum(counts[campaign].get(run, 0) for campaign, run in measured),

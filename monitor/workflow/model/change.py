@@ -1,4 +1,4 @@
-"""New versions of models: with one more effect, or without one."""
+"""New versions of models: with further effects, or without one."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from monitor.workflow.models import label, resolve
 
 
 def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
-    """Make a version with one more effect, and fit its line to a campaign.
+    """Make a version with further effects, and fit its line to a campaign.
 
-    The effect must exist on one of the machines of the database, or for a curve in its ``campaign``, else in one of
+    Each effect must exist on one of the machines of the database, or for a curve in its ``campaign``, else in one of
     the curves of the database. Raises EffectError, NotFoundError.
     """
     version = _planned(db, request)
@@ -43,9 +43,9 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
         parent = resolve(db, request.to)
         fitted_version(db, parent, request.campaign)
         raise EffectError(
-            f"{request.effect} could not be fitted: beside the effects of model {label(parent)} the readings do not "
-            "determine it. Nothing was stored; `monitor explain` names the effects that they show, and --campaign "
-            "takes the readings of another campaign"
+            f"{' + '.join(request.effects)} could not be fitted: beside the effects of model {label(parent)} the "
+            "readings do not determine it. Nothing was stored; `monitor explain` names the effects that they show, and "
+            "--campaign takes the readings of another campaign"
         ) from fault
     model = version_with(db, request)
     return _changed(db, model, request.new_name, steps)
@@ -58,7 +58,9 @@ def affected(db: Database, request: AddEffectRequest) -> AffectedAnswer:
     """
     parent = resolve(db, request.to)
     # What would be refused changes nothing for anybody.
-    subjects_of(db, parent).canonical(request.effect, request.campaign)
+    subjects = subjects_of(db, parent)
+    for effect in request.effects:
+        subjects.canonical(effect, request.campaign)
     if request.new_name is not None and request.new_name != parent.name:
         return AffectedAnswer(request.new_name, 1, False, (), ())
     latest = load_model(db, parent.name)
@@ -87,26 +89,28 @@ def remove_effect(db: Database, request: RemoveEffectRequest) -> ChangeModelAnsw
 
 
 def version_with(db: Database, request: AddEffectRequest) -> StoredModel:
-    """The stored version with one more effect; its parent is the one it was added to. Raises as ``add_effect``."""
+    """The stored version with further effects; its parent is the one it was added to. Raises as ``add_effect``."""
     version = _planned(db, request)
     return save_model(db, version.name, version.effects, parent=version.parent, note=version.note)
 
 
 def _planned(db: Database, request: AddEffectRequest) -> StoredModel:
-    """The version with one more effect as it would be stored."""
+    """The version with further effects as it would be stored."""
     parent = resolve(db, request.to)
-    text = subjects_of(db, parent).canonical(request.effect, request.campaign)
-    if text in parent.effects:
-        raise InputError(
-            f"model {label(parent)} has {text} already; add another effect, or take it out first"
-        )
+    subjects = subjects_of(db, parent)
+    texts = tuple(subjects.canonical(effect, request.campaign) for effect in request.effects)
+    for text in texts:
+        if text in parent.effects:
+            raise InputError(
+                f"model {label(parent)} has {text} already; add another effect, or take it out first"
+            )
     name = request.new_name
     if name is not None and name != parent.name and name in {model.name for model in list_models(db)}:
         raise InputError(
             f"there is a model {name} already: add to it with --to {name}, or choose another name"
         )
     return next_version(
-        db, _checked_name(name, parent), (*parent.effects, text), parent=(parent.name, parent.version),
+        db, _checked_name(name, parent), (*parent.effects, *texts), parent=(parent.name, parent.version),
         note=request.note,
     )  # fmt: skip
 

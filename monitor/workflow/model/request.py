@@ -18,7 +18,9 @@ class ShowModelRequest:
 class AddEffectRequest:
     """Make a version of the model ``to`` with one more effect, under another name with ``new_name``.
 
-    ``campaign`` is where the error before and after is shown; with None it is that on which the model was last used.
+    ``beside`` are further effects of the same version: of two that take each other's part neither shows what it is
+    worth alone. ``campaign`` is where the error before and after is shown; with None it is that on which the model was
+    last used.
     """
 
     effect: str
@@ -26,6 +28,12 @@ class AddEffectRequest:
     new_name: str | None = None
     note: str = ""
     campaign: str | None = None
+    beside: tuple[str, ...] = ()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """All effects that are added."""
+        return (self.effect, *self.beside)
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,7 @@ class _Deviations:
     inflation: Array  # (n,): variance of a deviation over that of a residual
     rows: tuple[npt.NDArray[np.int64], ...]  # rows of every run
     bases: Array  # (R, N, p)
+    parts: Array  # (n, d, d): what of a row's own deviation the run's unknowns leave
     scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
 
     def of_run(self, run: int) -> Array:
@@ -93,6 +94,7 @@ def _deviations(fit: Fit) -> _Deviations:
     inflation = np.where(enough, 1.0 + 1.0 / np.where(enough, others, 1), 1.0)
     rows = tuple(np.flatnonzero(problem.context.run == run) for run in problem.runs)
     bases = eliminate(fit.solution.last.local).basis
+    parts = checked_parts(fit)
     # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
     # the others as a whole has no bad points for that.
     # Rows of several instruments differ in how many numbers they have.
@@ -105,10 +107,24 @@ def _deviations(fit: Fit) -> _Deviations:
             of_run = np.median(squares[members][weighted[members]]) / share
             scale[members] = np.maximum(scale[members], of_run)
     scale = np.sqrt(scale)
-    return _Deviations(vectors, inflation, rows, bases, scale)
+    return _Deviations(vectors, inflation, rows, bases, parts, scale)
 
 
-def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
+def checked_parts(fit: Fit) -> Array:
+    """What every run's own unknowns leave (n, d, d) of the variance of each row's own residual."""
+    problem = fit.problem
+    is_read = np.isfinite(problem.sigma)
+    rows, numbers = is_read.shape
+    parts = np.zeros((rows, numbers, numbers))
+    bases = eliminate(fit.solution.last.local).basis
+    for number, run in enumerate(problem.runs):
+        members = np.flatnonzero(problem.context.run == run)
+        basis = bases[number, : numbers * len(members)].reshape(len(members), numbers, -1)
+        parts[members] = np.eye(numbers) - basis @ np.swapaxes(basis, 1, 2)
+    return np.asarray(parts * is_read[:, :, None] * is_read[:, None, :])
+
+
+def statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
     """Explained squares (n,), ranks (n,) and coefficients (n, d) of columns with products ``onto`` (n, d) and
     ``gram`` (n, d, d)."""
     values, vectors = np.linalg.eigh(gram)
@@ -128,12 +144,8 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     context = fit.problem.context
     tests = int((~fit.left_out).sum())
     points = []
-    for run, rows in enumerate(deviations.rows):
-        basis = deviations.of_run(run)
-        gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
-        is_read = np.isfinite(fit.problem.sigma[rows])
-        gram = gram * is_read[:, :, None] * is_read[:, None, :]
-        square, rank, sizes = _statistic(deviations.vectors[rows], gram)
+    for rows in deviations.rows:
+        square, rank, sizes = statistic(deviations.vectors[rows], deviations.parts[rows])
         checked = (rank > 0) & ~fit.left_out[rows]
         if not checked.any():
             continue
@@ -202,7 +214,7 @@ def _ball_move(
     count = len(touches) - first
     gram = count[:, None, None] * np.eye(3) - shared @ np.swapaxes(shared, 1, 2)
     inflation = np.cumsum(deviations.inflation[rows[touches]][::-1])[::-1][first] / count
-    square, rank, shifts = _statistic(onto, gram)
+    square, rank, shifts = statistic(onto, gram)
     chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
     best = int(chi_square.argmax())
     if chi_square[best] <= 0:

@@ -1,7 +1,9 @@
-"""Suspects of single runs: bad points, balls that moved in a run, effects with another size in every run.
+"""Suspects of single runs: bad points, balls that moved in a run, targets whose readings scatter, effects with another
+size in every run.
 
 Each of them can be mistaken for another: an effect that varies makes probings deviate from the other runs', a bad
-point makes sizes scatter. So whatever explains most is taken first, and the rest is judged with it taken out.
+point makes sizes scatter, a ball that shakes makes bad points. So whatever explains most is taken first, and the rest
+is judged with it taken out.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEff
 from monitor.discovery.machine.shapes.variants import each_run
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove, bad_points, ball_moves
 from monitor.discovery.machine.suspects.bad_poses import bad_poses
+from monitor.discovery.machine.suspects.scatter import Scatter, scattering, settled
 from monitor.discovery.machine.suspects.varying import Varying, most_varying
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
@@ -28,7 +31,9 @@ MOST_BAD_POINTS = 40
 # More effects that vary, each with a coefficient a run, than this are beyond what a plan can separate.
 MOST_VARYING = 2
 
-SuspectNames: TypeAlias = tuple[frozenset[int], frozenset[tuple[str, int]], tuple[MachineEffect, ...]]
+SuspectNames: TypeAlias = tuple[
+    frozenset[int], frozenset[tuple[str, int]], frozenset[str], tuple[MachineEffect, ...]
+]
 
 
 def with_effects(problem: ChainProblem, effects: Sequence[MachineEffect]) -> ChainProblem:
@@ -38,16 +43,18 @@ def with_effects(problem: ChainProblem, effects: Sequence[MachineEffect]) -> Cha
 
 @dataclass(frozen=True)
 class Suspects:
-    """Bad points by row, moves by ball and run, and effects (without driver) that vary from run to run."""
+    """Bad points by row, moves by ball and run, what scatters by target, and effects (without driver) that vary from
+    run to run."""
 
     bad: dict[int, BadPoint] = field(default_factory=dict)
     moves: dict[tuple[str, int], BallMove] = field(default_factory=dict)
+    scatter: dict[str, Scatter] = field(default_factory=dict)
     varying: tuple[MachineEffect, ...] = ()
 
     @property
     def any(self) -> bool:
         """Whether there is any."""
-        return bool(self.bad or self.moves or self.varying)
+        return bool(self.bad or self.moves or self.scatter or self.varying)
 
     def with_single(self, suspects: Sequence[BadPoint | BallMove]) -> Suspects:
         """The suspects with the most certain further ones of every run and target.
@@ -76,7 +83,19 @@ class Suspects:
     @property
     def names(self) -> SuspectNames:
         """What they are, without how far off."""
-        return frozenset(self.bad), frozenset(self.moves), self.varying
+        return frozenset(self.bad), frozenset(self.moves), frozenset(self.scatter), self.varying
+
+    def with_scatter(self, scatter: Scatter) -> Suspects:
+        """The suspects with a target that scatters."""
+        return replace(self, scatter={**self.scatter, scatter.target: scatter})
+
+    def weighed(self, problem: ChainProblem) -> ChainProblem:
+        """The problem with the readings of targets that scatter counting by so much less."""
+        sigma = problem.sigma
+        for scatter in self.scatter.values():
+            of_target = problem.context.target == scatter.target
+            sigma = np.where(of_target[:, None], scatter.times * sigma, sigma)
+        return problem if not self.scatter else replace(problem, sigma=sigma)
 
     def left_out(self, problem: ChainProblem) -> npt.NDArray[np.bool_]:
         """Marks (n,) the bad points."""
@@ -142,22 +161,60 @@ def find_suspects(
     current = under
     look = _LooksForVarying(variants, scene)
     while len(suspects.bad) < MOST_BAD_POINTS:
-        before = suspects
-        single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
-        single.sort(key=lambda suspect: -suspect.chi_square)
-        varying = None
-        if len(suspects.varying) < MOST_VARYING:
-            varying = look.leading(current, single[0].chi_square if single else 0.0)
-        if varying is not None:
-            suspects = replace(suspects, varying=(*suspects.varying, varying.effect))
-        elif not single:
+        further = _with_most_certain(suspects, current, look)
+        if further is None:
             break
-        else:
-            suspects = suspects.with_single(single)
-        effects = [*suspects.effects(problem), *selected]
         try:
-            current = fit(with_effects(problem, effects), suspects.left_out(problem), current)
+            current, suspects = _fitted(problem, selected, further, suspects, current)
         except (DataError, np.linalg.LinAlgError):
             # What cannot be fitted is no suspect; those before it remain.
-            return before
+            return suspects
     return suspects
+
+
+def with_scatter_of(under: Fit, problem: ChainProblem, suspects: Suspects) -> Suspects:
+    """The suspects with the target that scatters most under a fit of a problem, if any; each of its touches would be a
+    bad point."""
+    scatter = scattering(under)
+    if scatter is None:
+        return suspects
+    try:
+        return _fitted(problem, (), suspects.with_scatter(scatter), suspects, under)[1]
+    except (DataError, np.linalg.LinAlgError):
+        return suspects
+
+
+def _with_most_certain(suspects: Suspects, current: Fit, look: _LooksForVarying) -> Suspects | None:
+    """The suspects with what explains most of what a fit leaves; None where nothing does."""
+    single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
+    single.sort(key=lambda suspect: -suspect.chi_square)
+    least = single[0].chi_square if single else 0.0
+    scatter = scattering(current, suspects.scatter)
+    scatters = scatter is not None and scatter.gain > least
+    if len(suspects.varying) < MOST_VARYING:
+        varying = look.leading(current, scatter.gain if scatter is not None and scatters else least)
+        if varying is not None:
+            return replace(suspects, varying=(*suspects.varying, varying.effect))
+    if scatter is not None and scatters:
+        return suspects.with_scatter(scatter)
+    return suspects.with_single(single) if single else None
+
+
+def _fitted(
+    problem: ChainProblem,
+    selected: Sequence[MachineEffect],
+    suspects: Suspects,
+    before: Suspects,
+    start: Fit,
+) -> tuple[Fit, Suspects]:
+    """The fit with suspects and effects, and the suspects: how much a target scatters shows once it counts by less."""
+
+    def under(suspects: Suspects, start: Fit) -> Fit:
+        whole = with_effects(suspects.weighed(problem), [*suspects.effects(problem), *selected])
+        return fit(whole, suspects.left_out(problem), start)
+
+    current = under(suspects, start)
+    for target in suspects.scatter.keys() - before.scatter.keys():
+        suspects = suspects.with_scatter(settled(current, suspects.scatter[target]))
+        current = under(suspects, current)
+    return current, suspects
