@@ -267,26 +267,29 @@ def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedPro
         "SELECT campaign, method, machine_description, probe, artefact FROM imported_campaign WHERE campaign_id = ?",
         [campaign_id],
     )
+    with record_json.as_imported(name):
+        described = record_json.machine_record(machine)
+        probed, measured = record_json.probe_record(probe), record_json.artefact_record(artefact)
+        sources = record_json.sources_record(artefact)
     rows = probings.select(db, campaign_id)
     stored_runs = db.rows(
         "SELECT run, started_at, utc_offset_s, day, warm_up, map_keys(conditions), map_values(conditions) "
         "FROM run WHERE campaign_id = ? ORDER BY position",
         [campaign_id],
     )
-    described = record_json.machine_record(machine)
     campaign = Campaign(
         name=name,
         method=method,
         machine=described,
-        probe=record_json.probe_record(probe),
-        artefact=record_json.artefact_record(artefact),
+        probe=probed,
+        artefact=measured,
         runs=tuple(
             Run(run, _moment(at, offset), day, warm_up, dict(zip(names, values, strict=True)))
             for run, at, offset, day, warm_up, names, values in stored_runs
         ),
         probings=probings.as_record(rows, described),
         files=source_files(db, campaign_id),
-        sources=record_json.sources_record(artefact),
+        sources=sources,
     )
     return campaign, rows
 

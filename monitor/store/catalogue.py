@@ -12,7 +12,7 @@ from monitor.exceptions import DataError, NotFoundError, did_you_mean
 from monitor.records import Machine
 from monitor.store.connection import Database
 from monitor.store.past.campaign_runs import imported_campaigns
-from monitor.store.record_json import machine_record
+from monitor.store.record_json import as_imported, machine_record
 
 if TYPE_CHECKING:
     pass
@@ -137,14 +137,15 @@ def list_runs(db: Database, campaign: str) -> tuple[RunRow, ...]:
 
 
 def described_machines(db: Database) -> tuple[Machine, ...]:
-    """Every machine by name, as its latest campaign describes it."""
-    return tuple(
-        machine_record(text)
-        for (text,) in db.rows(
-            "SELECT arg_max(machine_description, campaign_id) FROM campaign WHERE method <> 'curve' "
-            "GROUP BY machine ORDER BY machine"
-        )
-    )
+    """Every machine by name, as its latest campaign describes it. Raises StoreError for one that is not described."""
+    machines = []
+    for campaign, text in db.rows(
+        "SELECT arg_max(campaign, campaign_id), arg_max(machine_description, campaign_id) FROM campaign "
+        "WHERE method <> 'curve' GROUP BY machine ORDER BY machine"
+    ):
+        with as_imported(campaign):
+            machines.append(machine_record(text))
+    return tuple(machines)
 
 
 def campaign_number(db: Database, name: str) -> int:

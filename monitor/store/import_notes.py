@@ -15,7 +15,7 @@ import numpy as np
 from monitor.records import Probings
 from monitor.store import audit, probings
 from monitor.store.connection import Database
-from monitor.store.record_json import machine_record
+from monitor.store.record_json import as_imported, machine_record
 from monitor.units import CONDITION_SUFFIXES
 
 #: Fewer probings than these may agree by chance: a controller that prints whole micrometres and a machine that
@@ -56,12 +56,14 @@ def keep_fingerprints(db: Database, campaign_id: int, prints: dict[int, str]) ->
     """Add the hashes of a campaign's runs, and those of campaigns that came in before there were any."""
     _insert(db, campaign_id, prints)
     older = db.rows(
-        "SELECT campaign_id, machine_description FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
+        "SELECT campaign_id, campaign, machine_description FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
         "AND campaign_id NOT IN (SELECT campaign_id FROM run_fingerprint) ORDER BY campaign_id",
         [campaign_id],
     )
-    for number, machine in older:
-        record = probings.as_record(probings.select(db, number), machine_record(machine))
+    for number, name, machine in older:
+        with as_imported(name):
+            described = machine_record(machine)
+        record = probings.as_record(probings.select(db, number), described)
         _insert(db, number, run_fingerprints(record))
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
 from monitor.documents import from_document, to_document
+from monitor.exceptions import StoreError
 from monitor.records import (
     Artefact,
     AxisSettings,
@@ -25,6 +27,19 @@ from monitor.records import (
     Setup,
 )
 from monitor.sources import Source
+
+
+@contextmanager
+def as_imported(campaign: str) -> Iterator[None]:
+    """Read what describes a campaign. Raises StoreError that names it, for texts that no import stores."""
+    try:
+        yield
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise StoreError(
+            f"the database has no description of the machine, probe and artefact of campaign '{campaign}' that can be "
+            f"read ({type(error).__name__}: {error}): no import stores such a one, so it was written or altered by "
+            "another program; restore a backup, or withdraw the campaign and import it again"
+        ) from error
 
 
 def machine_json(machine: Machine) -> str:

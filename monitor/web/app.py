@@ -31,6 +31,7 @@ from monitor.web.pages import (
     machine as machine_page,
     model,
     plan,
+    refused,
     reports,
     visiting,
     volumetric,
@@ -57,6 +58,7 @@ _PAGES = (
     reports,
     keeping,
     visiting,
+    refused,
 )
 
 
@@ -121,6 +123,8 @@ async def _of_question(request: Request, error: Exception) -> Response:
     refusal = refusal_of(error)
     if refusal.status == 500:
         _log.error("a page failed", exc_info=error)
+    if refused.leads_to_its_refusal(request, refusal):
+        return refused.led_to_its_refusal(request, refusal)
     return _refused(request, refusal)
 
 

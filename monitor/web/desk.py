@@ -114,7 +114,10 @@ class Ticket:
 
         No thread waits with it: some forty answer all pages.
         """
-        await asyncio.wait([asyncio.wrap_future(self.future)], timeout=max(patience - self.seconds, 0.0))
+        waited_for = asyncio.wrap_future(self.future)
+        # Read here, or asyncio reports a refusal as one that nobody saw; the page asks for it by ``answer``.
+        waited_for.add_done_callback(lambda future: future.cancelled() or future.exception())
+        await asyncio.wait([waited_for], timeout=max(patience - self.seconds, 0.0))
 
     def outcome(self) -> tuple[Any, str]:
         """Return the answer and why there is none; None and nothing while it is computed."""

@@ -18,6 +18,10 @@ class TooLargeError(Exception):
     """More came than was announced or is allowed; the message is a sentence."""
 
 
+class TooSlowError(Exception):
+    """The rest of a request did not come; the message is a sentence."""
+
+
 @dataclass(frozen=True)
 class Refusal:
     """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line.
@@ -55,6 +59,8 @@ def _refusal_of(error: Exception) -> Refusal:
         return Refusal(error.status_code, f"the request cannot be read: {error.detail}")
     if isinstance(error, TooLargeError):
         return Refusal(413, str(error))
+    if isinstance(error, TooSlowError):
+        return Refusal(408, str(error))
     if isinstance(error, ForbiddenError):
         return Refusal(403, str(error))
     if isinstance(error, ReplacedError):

@@ -6,13 +6,14 @@ unsafe-inline nor unsafe-eval; the one hash in it is that of the empty style she
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from monitor.web.faults import OUR_FAULT, TooLargeError
+from monitor.web.faults import OUR_FAULT, TooLargeError, TooSlowError
 from monitor.web.sessions import COOKIE, Sessions
 from monitor.web.settings import UPLOAD_BYTES, ServerSettings
 from monitor.web.users import User
@@ -51,6 +52,8 @@ LOGIN = "/login"
 PUBLIC = (LOGIN, "/static/")
 #: Where a body may be as large as an upload.
 UPLOADS = ("/import", "/certificates/verify", "/api/v1/")
+#: A body may pause so long between two pieces (as the first of Apache's mod_reqtimeout, ``body=20``).
+BODY_PAUSE_S = 20.0
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -100,6 +103,9 @@ class Gate:
         except TooLargeError:
             if not started:
                 await _plain(send, 413, too_large)
+        except TooSlowError as error:
+            if not started:
+                await _plain(send, 408, str(error))
         except Exception:
             # It was logged and answered where it happened; what follows would only be said twice.
             if not started:
@@ -207,12 +213,19 @@ def _too_large(path: str) -> str:
 
 
 def _counted(receive: Receive, limit: int, text: str) -> Receive:
-    """Count what comes: a body in pieces announces no length."""
-    total = 0
+    """Count what comes: a body in pieces announces no length; and do not wait for the next piece without end."""
+    total, is_whole = 0, False
 
     async def counting() -> MutableMapping[str, Any]:
-        nonlocal total
-        message = await receive()
+        nonlocal total, is_whole
+        try:
+            # After the whole body comes only that the connection ends, which takes as long as the answer.
+            message = await asyncio.wait_for(receive(), None if is_whole else BODY_PAUSE_S)
+        except TimeoutError as error:
+            raise TooSlowError(
+                f"nothing more of this request came for {BODY_PAUSE_S:g} s; send it again"
+            ) from error
+        is_whole = not message.get("more_body", False)
         total += len(message.get("body", b""))
         if total > limit:
             raise TooLargeError(text)

@@ -39,9 +39,9 @@ def page(request: Request, template: str, *, status: int = 200, **context: Any) 
     return HTMLResponse(text, status_code=status)
 
 
-def refusal_page(request: Request, refusal: Refusal) -> HTMLResponse:
-    """Return the page that says what was wrong."""
-    return page(request, "refusal.html", status=refusal.status, refusal=refusal)
+def refusal_page(request: Request, refusal: Refusal, back: str = "") -> HTMLResponse:
+    """Return the page that says what was wrong; ``back`` is the address of the form, where it was one."""
+    return page(request, "refusal.html", status=refusal.status, refusal=refusal, back=back)
 
 
 def again_page(request: Request, typed: Typed, why: str, status: int = 200) -> HTMLResponse:

@@ -21,10 +21,12 @@ import uvicorn
 
 from monitor.exceptions import InputError
 from monitor.web.app import application
+from monitor.web.gate import Gate
 from monitor.web.note import Note, posted
 from monitor.web.opening import opened
 from monitor.web.rendering import prepare
 from monitor.web.settings import ServerSettings
+from monitor.web.slow_clients import ImpatientProtocol
 from monitor.workflow.contract import QUESTIONS
 
 #: A page asks some ten short queries, and waits so long behind every computation to go on after each (Python's usual
@@ -59,10 +61,7 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
         working_folder = Path(folder).resolve()
         with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
             gate = application(db, settings, working_folder)
-            config = uvicorn.Config(
-                gate, host=settings.host, port=settings.port, log_level="warning", server_header=False,
-                ssl_certfile=settings.certificate, ssl_keyfile=settings.key, proxy_headers=False,
-            )  # fmt: skip
+            config = configuration(gate, settings)
             scheme = "http" if settings.certificate is None else "https"
 
             def listens(port: int) -> None:
@@ -86,6 +85,14 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
             _Server(config, listens).run()
             beside.close()
             gate.close()
+
+
+def configuration(gate: Gate, settings: ServerSettings) -> uvicorn.Config:
+    """Return how the server listens."""
+    return uvicorn.Config(
+        gate, host=settings.host, port=settings.port, log_level="warning", server_header=False,
+        ssl_certfile=settings.certificate, ssl_keyfile=settings.key, proxy_headers=False, http=ImpatientProtocol,
+    )  # fmt: skip
 
 
 def _end_in_order() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,20 @@ def _files(content: bytes = b"hello") -> dict[str, Any]:
             400,
             "Mill &amp; Sons",
         ),
+        ("/certificates/verify", {}, {}, 400, "choose the PDF of a certificate"),
+        ("/certificates/withdraw", {"number": "none", "reason": "x"}, {}, 404, "none"),
+        ("/certificates/withdraw", {"number": "none"}, {}, 400, "the form lacks &#39;reason&#39;"),
+        (
+            "/machine/event",
+            {"machine": "HU40-T", "text": "belt", "at": "yesterday"},
+            {},
+            400,
+            "valid datetime",
+        ),
+        ("/machine/event", {"machine": "HU41-T", "text": "belt"}, {}, 404, "did you mean &#39;HU40-T&#39;"),
+        ("/model/add", {"campaign": CAMPAIGN, "effect": "EZZ1:up", "to": "samba"}, {}, 400, "EZZ1"),
+        ("/model/undo", {"campaign": CAMPAIGN, "effect": "EXX:reversal", "model": "none"}, {}, 404, "none"),
+        ("/work/cancel", {"number": "one"}, {}, 400, "a whole number"),
     ],
 )
 def test_a_form_is_answered_with_the_address_of_its_outcome(
@@ -44,6 +59,21 @@ def test_a_form_is_answered_with_the_address_of_its_outcome(
         page = local.client.get(sent.headers["location"])
         assert page.status_code == status
         assert says in page.text
+
+
+def test_a_refusal_leads_back_to_its_form_and_to_no_other_server(local: Any) -> None:
+    fields = {"proof": local.proof(), "machine": "HU40-T", "text": "belt", "at": "yesterday"}
+    for referer, wanted in (
+        ("http://127.0.0.1:8765/machine?name=HU40-T&colour=day", "/machine?name=HU40-T&amp;colour=day"),
+        ("http://127.0.0.1:8765//elsewhere.example/x", "/"),
+        ("", None),
+    ):
+        headers = {"Referer": referer} if referer else {}
+        page = local.sent("/machine/event", data=fields, headers=headers).text
+        assert re.findall(r'<a href="([^"]*)">back to the form', page) == ([] if wanted is None else [wanted])
+    gone = local.client.get("/refused?why=guessed")
+    assert gone.status_code == 404
+    assert "not held any more" in gone.text
 
 
 def test_what_somebody_filled_in_is_shown_to_nobody_else(imported: Path, serve: Any, tmp_path: Path) -> None:

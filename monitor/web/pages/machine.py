@@ -213,10 +213,10 @@ def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
 def _whole_days(since: str, until: str) -> dict[str, str]:
     """The period from the beginning of one day to the end of another. Raises InputError for what is no date."""
     try:
-        first, last = date.fromisoformat(since), date.fromisoformat(until)
-    except ValueError as error:
+        first, end = date.fromisoformat(since), date.fromisoformat(until) + timedelta(days=1)
+    except (ValueError, OverflowError) as error:
         raise InputError(f"write dates such as 2026-03-02: {error}") from error
-    return {"since": f"{first}T00:00:00Z", "until": f"{last + timedelta(days=1)}T00:00:00Z"}
+    return {"since": f"{first}T00:00:00Z", "until": f"{end}T00:00:00Z"}
 
 
 def _period(name: str, since: str, until: str) -> dict[str, Any]:
