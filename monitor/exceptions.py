@@ -65,17 +65,20 @@ class BusyError(StoreError):
 class Fault:
     """One fault of an input file.
 
-    ``line`` counts from 1 (the header is line 1); ``column`` is the column's or key's name. Either may be
-    None where the fault has none.
+    ``line`` counts from 1 (the header is line 1); ``column`` is the column's or key's name; ``sheet`` is that of a
+    workbook with several tables. Each may be None where the fault has none.
     """
 
     file: str
     line: int | None
     column: str | None
     message: str
+    sheet: str | None = None
 
     def __str__(self) -> str:
         text = self.file
+        if self.sheet is not None:
+            text += f", sheet {self.sheet}"
         if self.line is not None:
             text += f", line {self.line}"
         if self.column is not None:
@@ -96,10 +99,10 @@ class CampaignError(InputError):
         self.faults = tuple(dict.fromkeys(faults))
         count = len(self.faults)
         lines = [f"{folder} was refused, nothing of it was kept: {count} fault{'s' if count != 1 else ''}."]
-        alike: dict[tuple[str, str | None, str], list[Fault]] = {}
+        alike: dict[tuple[str, str | None, str | None, str], list[Fault]] = {}
         for fault in self.faults:
             kind = self._OWN_WORDS.sub("", fault.message)
-            alike.setdefault((fault.file, fault.column, kind), []).append(fault)
+            alike.setdefault((fault.file, fault.sheet, fault.column, kind), []).append(fault)
         groups: list[list[Fault]] = []
         for group in alike.values():
             groups += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]

@@ -30,6 +30,7 @@ GROUND = {
     "sources",
     "bounded",
     "stopping",
+    "progress",
     "on_demand",
     "group_sums",
 }

@@ -83,6 +83,8 @@ class Answer(Generic[Content]):
             rows = shown(main_table(self.content))
         except InputError:
             return self._sentence()
+        if rows.empty and self._sentence():
+            return self._sentence()
         return f"{self._sentence()}\n{rows.to_string(max_rows=20, line_width=120)}".strip()
 
     def _repr_html_(self) -> str:
@@ -91,7 +93,9 @@ class Answer(Generic[Content]):
 
         parts = [f"<p>{escape(self._sentence())}</p>"] if self._sentence() else []
         try:
-            parts.append(shown(main_table(self.content))._repr_html_())  # type: ignore[operator]
+            rows = shown(main_table(self.content))
+            if not (rows.empty and parts):
+                parts.append(rows._repr_html_())  # type: ignore[operator]
         except InputError:
             parts.append(f"<p>{escape(self._summary())}</p>")
         if self._draw is not None:

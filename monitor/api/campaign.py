@@ -31,38 +31,51 @@ class Campaign:
         self.method = method
 
     def runs(self) -> pd.DataFrame:
-        """Return the runs with their conditions, by number of the run; times in UTC and by the shop's clock."""
+        """Return the runs (n runs, indexed by number) with their conditions: a column for each, in the unit that its
+        name ends in (``ambient_degC`` in °C); times in UTC and by the shop's clock."""
         return run_table(self._ask("runs", campaign=self.name))
 
     def readings(self) -> pd.DataFrame:
-        """Return every reading: axes in mm and degrees; ``attrs["meanings"]`` says what the columns are."""
+        """Return every reading (n rows, one a touch or reading): axes in mm and degrees; ``attrs["units"]`` has the
+        units of the columns, ``attrs["meanings"]`` says what they are."""
         return table_of(self._ask("readings", campaign=self.name))
 
     def parameters(self, model: str | None = None, *, wide: bool = True) -> pd.DataFrame:
-        """Identify every run and return its parameters: a column each, ``u(...)`` beside it, ``attrs["units"]``.
+        """Identify every run and return its parameters (n runs, 2 m): a column for each of the m parameters and its
+        standard uncertainty in ``u(...)`` beside it, in the unit of ``attrs["units"]`` (µm, µrad, µm/m).
 
-        ``wide=False``: a row for every run and parameter, with value, u and unit.
+        ``wide=False``: (n m, 5), a row for every run and parameter, with run, parameter, value, u and unit. Raises
+        NotFoundError for a model that does not exist.
         """
         return parameter_table(self._ask("identify", campaign=self.name, model=model), wide=wide)
 
     def statistics(self, **options: Any) -> Answer[StatisticsAnswer]:
-        """Compare the runs: scatter by day and pooled, homogeneity, components of variance (``StatisticsRequest``)."""
+        """Compare the runs: scatter by day and pooled, homogeneity, components of variance (``StatisticsRequest``).
+
+        ``parameters`` has the numbers by parameter, each in its ``unit`` (µm, µrad, µm/m). Raises InputError.
+        """
         return drawn(self._ask, "statistics", campaign=self.name, **options)
 
     def compare(self, model: str | None = None) -> Answer[CompareAnswer]:
-        """Compare the model with the measurements: where does it fail?"""
+        """Compare the model with the measurements: where does it fail? Residuals in µm (of a curve in its own unit)."""
         return drawn(self._ask, "compare", campaign=self.name, model=model)
 
     def explain(self, model: str | None = None, **options: Any) -> Answer[ExplainAnswer]:
-        """Search for the physical effects that the model lacks (``ExplainRequest``)."""
+        """Search for the physical effects that the model lacks (``ExplainRequest``).
+
+        ``missing`` has one record an effect: ``amplitude`` with standard uncertainty ``u`` in ``unit``, the largest
+        displacement ``peak_um`` in µm, the RMS before and after in µm.
+        """
         return drawn(self._ask, "explain", campaign=self.name, model=model, **options)
 
     def add(
         self, effect: str, name: str | None = None, *, to: str | None = None, note: str = ""
     ) -> Answer[ChangeModelAnswer]:
-        """Add an effect to the model ``to`` (by default the method's own); the answer has the error before and after.
+        """Add an effect to the model ``to`` (by default the method's own); the answer has the error before and after in
+        ``history``, RMS in µm on the fitted and on held-out runs.
 
-        ``name`` is that of the new model; without one the name ``to`` means the new version from now on.
+        ``name`` is that of the new model; without one the name ``to`` means the new version from now on. Raises
+        EffectError for an effect that cannot be read.
         """
         model = self.method if to is None else to
         return Answer(
@@ -70,11 +83,16 @@ class Campaign:
         )
 
     def uncertainty(self, run: int | None = None, **options: Any) -> Answer[UncertaintyAnswer]:
-        """Evaluate the uncertainty of one run, the last by default, after JCGM 102 (``UncertaintyRequest``)."""
+        """Evaluate the uncertainty of one run, the last by default, after JCGM 102:2011 (``UncertaintyRequest``).
+
+        ``guf`` (and ``mcm``) have estimate, u and expanded uncertainty by parameter in the display unit of ``units``
+        (µm, µrad, µm/m); ``covariance`` is (m, m) in products of these units. Raises InputError, DataError.
+        """
         return Answer(self._ask("uncertainty", campaign=self.name, run=run, **options))
 
     def map(self, run: int | None = None, **options: Any) -> Answer[VolumetricAnswer]:
-        """Evaluate the volumetric error over the strokes with its uncertainty (``VolumetricRequest``)."""
+        """Evaluate the volumetric error over the strokes with its uncertainty (``VolumetricRequest``): vectors and
+        lengths in µm at places in mm and degrees. Raises InputError for a machine that has no strokes to map."""
         return drawn(self._ask, "map", campaign=self.name, run=run, **options)
 
     def certificate(

@@ -79,11 +79,11 @@ class Database:
         return Answer(answer)
 
     def machines(self) -> pd.DataFrame:
-        """Return the machines: topology, manufacturer, number of campaigns, latest run."""
+        """Return the machines, a row each: topology, manufacturer, number of campaigns, moment of the latest run."""
         return table_of(self._ask("machines"))
 
     def campaigns(self) -> pd.DataFrame:
-        """Return the campaigns in the order of import."""
+        """Return the campaigns, a row each, in the order of import: machine, method, number of runs."""
         return main_table(self._ask("campaigns"))
 
     def campaign(self, name: str) -> Campaign:
@@ -98,11 +98,16 @@ class Database:
         return Answer(self._ask("models"))
 
     def trend(self, machine: str, **options: Any) -> Answer[TrendAnswer]:
-        """Follow the parameters of a machine: drift, changes, alarms, forecast (``TrendRequest``)."""
+        """Follow the parameters of a machine: drift, changes, alarms, forecast (``TrendRequest``).
+
+        ``parameters`` has a record a parameter, values in its ``unit`` (µm, µrad, µm/m), slopes in that unit a year.
+        Raises NotFoundError for a machine that does not exist.
+        """
         return drawn(self._ask, "trend", machine=machine, **options)
 
     def fleet(self, **options: Any) -> Answer[FleetAnswer]:
-        """List every machine and parameter, the most urgent first (``FleetRequest``)."""
+        """List every machine and parameter, a row each, the most urgent first; values in the ``unit`` of the row
+        (``FleetRequest``)."""
         return Answer(self._ask("fleet", **options))
 
     def report(
@@ -112,7 +117,8 @@ class Database:
         return Answer(self._ask("report", week=week, out=Path(out), **options))
 
     def sql(self, query: str, limit: int | None = None) -> pd.DataFrame:
-        """Return the rows of a query that only reads. Raises InputError for any other."""
+        """Return the rows of a query that only reads, ``limit`` at most; ``attrs["units"]`` has the unit of each column
+        whose name ends in one. Raises InputError for any other query."""
         return table_of(self._ask("sql", query=query, limit=limit))
 
     def ask(self, question: str, **options: Any) -> Answer[Any]:

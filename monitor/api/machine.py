@@ -50,7 +50,10 @@ class Machine:
         target: Point = (0.0, 0.0, 0.0),
         **readings: float | Sequence[float] | Array,
     ) -> Array:
-        """Return the vector from target to tool tip (n, 3) in mm, in the frame of the last work axis."""
+        """Return the vector from target to tool tip at n poses: (n, 3) in mm, in the frame of the last work axis.
+
+        Arguments as for ``deviation``; without ``errors`` the nominal machine. Raises InputError, EffectError.
+        """
         return self._poses(errors or {}, tool, target, readings).vector_mm
 
     def _poses(

@@ -184,24 +184,45 @@ def _shows_progress() -> bool:
 
 @contextmanager
 def working(activity: str) -> Iterator[None]:
-    """Show a sign of life on a terminal for what takes longer than a second; nothing elsewhere."""
+    """Show a sign of life on a terminal, with a bar and the time left once the work tells how far it is; nothing
+    elsewhere."""
     if not _shows_progress():
         yield
         return
     # Loaded on a terminal alone: a verb in a pipe or a job shows no progress.
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from monitor.progress import listening
 
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
-        progress.add_task(activity)
-        yield
+        task = progress.add_task(activity, total=None)
+
+        def tell(share: float) -> None:
+            progress.columns = (
+                TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+                TimeRemainingColumn(),
+            )  # fmt: skip
+            progress.update(task, total=1.0, completed=share)
+
+        with listening(tell):
+            yield
 
 
 @contextmanager
-def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each."""
+def stepping(activity: str, total: int, *, behind: bool = False) -> Iterator[Callable[[str], None]]:
+    """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each, or
+    behind each (``behind``), so that the last call fills the bar."""
     if not _shows_progress():
         yield lambda name: None
         return
@@ -215,12 +236,12 @@ def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
         TimeRemainingColumn,
     )
 
-    started = itertools.count()
+    counted = itertools.count(int(behind))
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)
         yield lambda name: progress.update(
-            task, description=f"{activity} {escape(name)}", completed=next(started)
+            task, description=f"{activity} {escape(name)}", completed=next(counted)
         )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.foreign_units import foreign_unit, sexagesimal
 
 SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "space": " "}
 DECIMALS = {"comma": ",", "point": "."}
@@ -57,8 +57,13 @@ def is_number(cell: str) -> bool:
 
 
 def is_data(cells: Sequence[str]) -> bool:
-    """Return whether a line is one of numbers: two or more cells, the half of them numbers."""
-    return len(cells) > 1 and 2 * sum(map(is_number, cells)) >= len([cell for cell in cells if cell]) > 0
+    """Return whether a line is one of numbers: two or more cells, the half of them numbers.
+
+    Two or more angles in degrees, minutes and seconds count too; one alone may be the time of day of a head.
+    """
+    numbers, angles = sum(map(is_number, cells)), sum(sexagesimal(cell) is not None for cell in cells)
+    numbers += angles if angles > 1 else 0
+    return len(cells) > 1 and 2 * numbers >= len([cell for cell in cells if cell]) > 0
 
 
 def separator_of(lines: Sequence[str]) -> str | None:

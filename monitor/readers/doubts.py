@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from monitor.readers.axes_doubts import mistaken_axes
 from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
 from monitor.units import CENTIMETRE, DEGREE, INCH, METRE, MICROMETRE, TENTH_MILLIMETRE
@@ -59,6 +60,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _travel,
             _angles,
             _places,
+            _columns,
             _units_of_runs,
             _statements,
             _temperatures,
@@ -154,6 +156,24 @@ def _places(campaign: Campaign) -> Iterator[str]:
     yield (
         f"{head}: it looks as if {columns} {'were' if len(off.axes) > 1 else 'was'} {UNIT_WORDS[off.unit]}"
         + (", or the declared places in another unit than mm" if len(off.axes) > 1 else "")
+    )
+
+
+def _columns(campaign: Campaign) -> Iterator[str]:
+    """Columns of linear axes that are exchanged, or have the other sign."""
+    mistaken = mistaken_axes(campaign)
+    if mistaken is None:
+        return
+    columns = _and([f"{axis.lower()}_mm" for axis in mistaken.axes])
+    yield (
+        f"at the pose with all rotary axes at zero the {mistaken.count} steps between {mistaken.noun} are the declared "
+        + (
+            f"ones only with the other sign of {columns}: check the sign of [machine.axes.{mistaken.axes}] and of the "
+            "column"
+            if mistaken.turned
+            else f"ones only with {columns} exchanged: check the order of the columns"
+        )
+        + ", and whether the artefact stands as it is declared"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -36,7 +37,12 @@ _SPELLINGS: Mapping[ForeignUnit, tuple[str, ...]] = MappingProxyType({
     ForeignUnit("inch", "length", Decimal("25.4")): ("in", "inch", "inches", "zoll", '"'),
     ForeignUnit("mil", "length", Decimal("0.0254")): ("mil", "mils", "thou"),
     ForeignUnit("µin", "length", Decimal("25.4e-6")): ("uin", "µin", "μin", "microinch", "microinches"),
-    ForeignUnit("deg", "angle", _DEGREE): ("deg", "°", "degree", "degrees", "grad_deg"),
+    ForeignUnit("deg", "angle", _DEGREE): (
+        "deg", "°", "degree", "degrees", "grad_deg", "d:m:s", "dms", "dd:mm:ss",
+    ),
+    ForeignUnit("hours of angle", "angle", 15 * _DEGREE): (
+        "hours of angle", "hour angle", "hourangle", "h:m:s", "hms", "hh:mm:ss",
+    ),
     ForeignUnit("arcmin", "angle", _DEGREE / 60): ("arcmin", "'", "′"),
     ForeignUnit("arcsec", "angle", _DEGREE / 3600): ("arcsec", "″", "arcsecond", "arcseconds", "arc-sec", "sec of arc"),
     ForeignUnit("rad", "angle", Decimal(1)): ("rad", "radian", "radians"),
@@ -57,6 +63,13 @@ _SPELLINGS: Mapping[ForeignUnit, tuple[str, ...]] = MappingProxyType({
 _BY_SPELLING = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 #: The decimals of a length or a temperature are kept to the last digit; a factor with pi is none.
 _EXACT = ("length", "time", "pressure", "share")
+#: ``-05:12:33.4``, ``5 12 33``, ``05h12m33.4s``, ``05d 12' 33"``: degrees or hours, minutes, seconds of an angle.
+_SEXAGESIMAL = re.compile(
+    r"(?P<sign>[+-]?)\s*(?P<whole>[0-9]{1,3})\s*(?P<mark>[:hd°\s])\s*(?P<minutes>[0-9]{1,2})"
+    r"(?:\s*[:m'′\s]\s*(?P<seconds>[0-9]{1,2}(?:[.,][0-9]{0,12})?))?\s*[ms'′\"″]{0,2}"
+)
+#: The units that have minutes and seconds, and the letters that say which it is.
+_MARKS = {"deg": "d°", "hours of angle": "h"}
 
 
 def foreign_unit(text: str) -> ForeignUnit | None:
@@ -92,9 +105,10 @@ class Conversion:
 
     def cell(self, text: str) -> str:
         """Return a number in the other unit; what is no number comes back as it is, for the reader to refuse."""
-        if self.source == self.target and self.scale == 1 and not self.offset:
+        parts = sexagesimal(text, self.source.name) if self.source.name in _MARKS else None
+        if parts is None and self.source == self.target and self.scale == 1 and not self.offset:
             return text
-        number = decimal_of(text)
+        number = decimal_of(text) if parts is None else parts
         if number is None:
             return text
         if self.source == self.target:
@@ -112,6 +126,29 @@ def decimal_of(text: str) -> Decimal | None:
         return None
     # Numbers beyond these are no measurement, and their digits would fill memory.
     return number if number.is_finite() and (not number or abs(number.adjusted()) < 30) else None
+
+
+def sexagesimal(text: str, unit: str | None = None) -> Decimal | None:
+    """Return degrees or hours of a cell with minutes and seconds; None where it is none, or where those reach 60.
+
+    The sign counts for all parts: -00:30:00 is half a degree below zero. Of a ``unit`` the letter of another is none.
+    """
+    match = _SEXAGESIMAL.fullmatch(text.strip())
+    if match is None or match["mark"] in "".join(
+        mark for name, mark in _MARKS.items() if unit not in (None, name)
+    ):
+        return None
+    minutes, seconds = Decimal(match["minutes"]), Decimal((match["seconds"] or "0").replace(",", "."))
+    if minutes >= 60 or seconds >= 60:
+        return None
+    # Thirds of a degree have no end; twelve decimals are below any encoder.
+    size = round(Decimal(match["whole"]) + minutes / 60 + seconds / 3600, 12)
+    return -size if match["sign"] == "-" else size
+
+
+def as_angle(unit: ForeignUnit) -> ForeignUnit:
+    """Return the unit of an angle: hours there are hours of angle, 15 degrees each; any other as it is."""
+    return _BY_SPELLING["hourangle"] if unit.name == "h" else unit
 
 
 def plain(number: Decimal) -> str:

@@ -53,8 +53,14 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
 
 
 def renamed(faults: Iterable[Fault], files: Mapping[str, str]) -> list[Fault]:
-    """Return the faults under the names of the files that their tables were read from."""
-    return [replace(fault, file=files.get(fault.file, fault.file)) for fault in faults]
+    """Return the faults under the names of the files that their tables were read from, with the sheet of the workbook
+    that holds all tables."""
+    return [_renamed(fault, files.get(fault.file, fault.file)) for fault in faults]
+
+
+def _renamed(fault: Fault, file: str) -> Fault:
+    sheet = fault.file.removesuffix(".csv") if file == WORKBOOK and fault.file != WORKBOOK else fault.sheet
+    return replace(fault, file=file, sheet=sheet)
 
 
 def plain_csv(text: str) -> str:

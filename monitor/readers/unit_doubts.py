@@ -19,6 +19,8 @@ from monitor.units import Unit, mistaken_for_mm
 DISTANCE_TOLERANCE = 0.05
 #: Rows of a run whose distances are taken: all pairs of a million rows would need 4 TB. Plans have 60 to 10 000.
 MOST_ROWS = 2000
+#: A rotary axis that is sent to zero reads some thousandths of a degree at most.
+ZERO_RAD = 1e-4
 #: Pairs beyond the tolerance from which on it is no single ball that was moved.
 TELLING_SHARE = 0.2
 #: Spans of one plan repeat to some hundredths of a millimetre on millimetres and more, a run broken off covers less.
@@ -51,10 +53,11 @@ class RunInUnit:
 def off_places(campaign: Campaign) -> OffPlaces | None:
     """Distances between balls, modules or points at one pose against the declared or nominal ones, in the first run: no
     rotary axis has a part in them. None where they agree, or nothing is declared."""
-    declared = _declared(campaign)
+    declared = declared_places(campaign)
     if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
         return None
-    steps, nominal = _pairs(campaign, declared.places)
+    steps, declared_steps = pairs(campaign, declared.places)
+    nominal = np.linalg.norm(declared_steps, axis=1)
     if not len(nominal):
         return None
     share = _share_off(steps, nominal, np.ones(3))
@@ -69,8 +72,9 @@ def off_places(campaign: Campaign) -> OffPlaces | None:
     return OffPlaces(declared.noun, ratio, len(nominal), share, "", None)
 
 
-def _declared(campaign: Campaign) -> DeclaredPlaces | None:
-    """The places of the artefact; of a workpiece without, the nominal ones in the rows."""
+def declared_places(campaign: Campaign) -> DeclaredPlaces | None:
+    """Return the places of the artefact; of a workpiece without, the nominal ones in the rows; None where there are
+    none."""
     rules = method_rules().get(campaign.method)
     declared = None if rules is None else rules.declared(campaign.artefact)
     probings = campaign.probings
@@ -82,8 +86,9 @@ def _declared(campaign: Campaign) -> DeclaredPlaces | None:
     return DeclaredPlaces("points", dict(zip(probings.target.tolist(), nominal, strict=True)))
 
 
-def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
+def pairs(campaign: Campaign, declared: Mapping[str, Array], *, at_zero: bool = False) -> tuple[Array, Array]:
+    """Return the steps (n, 3) of the readings of X, Y, Z between targets probed at one pose of the first run, and the
+    declared ones (n, 3), in mm; ``at_zero``: at the pose with all rotary axes at zero alone."""
     probings = campaign.probings
     rows = np.flatnonzero(probings.run == probings.run[0])[:MOST_ROWS]
     fixed = [
@@ -97,11 +102,13 @@ def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Ar
     has_place = np.array([name in declared for name in probings.target[rows].tolist()])
     read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
     at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    if at_zero:
+        has_place &= np.all([np.abs(values) < ZERO_RAD for values in fixed], axis=0)
     first, second = np.triu_indices(len(rows), 1)
     at_one_pose = has_place[first] & has_place[second] & (pose[first] == pose[second])
     first, second = first[at_one_pose], second[at_one_pose]
-    nominal = np.linalg.norm(at[first] - at[second], axis=1)
-    apart = nominal > 0.0
+    nominal = at[first] - at[second]
+    apart = np.any(nominal != 0.0, axis=1)
     return (read[first] - read[second])[apart], nominal[apart]
 
 

@@ -108,6 +108,10 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
     )
 
 
+#: Of an error of a simulated machine in display units: a tenth of a metre, or some 6 degrees.
+LARGEST_ERROR = 1e5
+
+
 @dataclass(frozen=True)
 class SimulateMachineRequest:
     """A virtual campaign of a machine of a ``topology``, with the errors that are named and no others.
@@ -130,6 +134,12 @@ class SimulateMachineRequest:
             raise InputError(f"--noise {self.noise_um}: the noise of a reading must be above 0 µm")
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
+        for effect, sizes in self.errors.items():
+            if not all(abs(size) <= LARGEST_ERROR for size in sizes):
+                raise InputError(
+                    f"{effect} = {', '.join(f'{size:g}' for size in sizes)}: an error is a number of at most "
+                    f"{LARGEST_ERROR:g} µm, µrad or µm/m"
+                )
 
 
 @dataclass(frozen=True)

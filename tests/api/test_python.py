@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -111,6 +112,16 @@ def test_an_answer_is_shown_with_its_numbers(db: mm.Database) -> None:
     empty = [name for name in columns if trend.table()[name].isna().all()]
     assert empty
     assert not any(f" {name} " in text for name in empty)
+
+
+def test_an_answer_without_rows_is_its_sentence(db: mm.Database) -> None:
+    nothing = db.campaign("five-days").explain()
+    assert nothing.missing == ()
+    assert "DataFrame" not in repr(nothing)
+    assert "Nothing is missing that this plan can see" in repr(nothing)
+    page = nothing._repr_html_()
+    assert "<table" not in page
+    assert "<svg" in page
 
 
 def test_sql_reads_and_never_writes(db: mm.Database, tmp_path: Path) -> None:
@@ -224,6 +235,12 @@ def test_a_simulated_machine_that_cannot_be_is_refused(tmp_path: Path) -> None:
         mm.simulate(tmp_path / "a", "w C B X b Z Y (C1) t", method="tracker")
     with pytest.raises(InputError, match="days = 0: a campaign has 1 to 366 days"):
         mm.simulate(tmp_path / "a", "w C B X b Z Y (C1) t", days=0)
+    for size in (math.nan, -math.inf, 1e6):
+        with pytest.raises(
+            InputError,
+            match=f"EC0B = {size:g}: an error is a number of at most 100000 µm".replace("+", r"\+"),
+        ):
+            mm.simulate(tmp_path / "a", "w C B X b Z Y (C1) t", errors={"EC0B": size})
     with pytest.raises(InputError, match="errors needs topology"):
         mm.simulate(tmp_path / "a", errors={"EC0B": 1.0})
     assert not (tmp_path / "a").exists()

@@ -5,10 +5,11 @@
 is the ellipsoid of the stated covariance at 95 % (chi-square, JCGM 102, 6.5.2). ``--heavy``: noise of Student's t with
 three degrees of freedom and the same standard deviation; ``--drift``: the machine grows by 2 µm in X in the R-test's
 hour; ``--pitch``: the effect of the example, which the model lacks; ``--bar``: the ball bar alone, in three planes.
-``--told``: how often `explain` finds something, `compare` says that something is missing and `contributions` that
-instruments disagree.
-``--session``: three runs of a day with one bar, the first with a laser too; ``--apart``: the same with a length for
-every run, as until 23 November 2026.
+``--told``: how often `explain` finds something, `compare` says that something is missing or that instruments disagree,
+and `contributions` has an E_n above 1; ``--first``: the first seed.
+``--session``: three runs of a day with one bar, the first with a laser too; ``--days``: the same on three days;
+``--apart``: the same with a length for every run. The mean of the runs with the bar alone is looked at as well, with
+the uncertainty by which `trend` compares campaigns.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.records import Verdict
+from monitor.statistics.normalised_error import result_of_runs
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
@@ -78,20 +80,27 @@ def campaign_of(folder: Path, seed: int, options: argparse.Namespace, cycles: in
     return read_campaign(folder), expected(truth)
 
 
-def sessions(seeds: int, apart: bool) -> None:
-    """Print the rates of days of three runs: of each run by itself."""
+def sessions(seeds: int, apart: bool, days: bool) -> None:
+    """Print the rates of three runs with one bar: of each by itself, and of the mean of those with the bar alone."""
     names = PARAMETERS[4:]
     limit = scipy.stats.chi2.ppf(0.95, len(names))
     inside, distance, u = np.zeros(3, dtype=int), np.zeros(3), np.zeros((3, len(names)))
+    of_mean = np.zeros((2, len(names)), dtype=int)
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         truths = [truth_of(rng) for _ in range(3)]
         with tempfile.TemporaryDirectory() as folder:
-            campaign = read_campaign(shop.session(Path(folder) / "day", rng, truths, 10.0))
+            campaign = read_campaign(shop.session(Path(folder) / "day", rng, truths, 10.0, days=days))
         problem = campaign_method(campaign).problem_of(campaign)
-        solution = solve_problem(replace(problem, session=None) if apart else problem)
+        solution = solve_problem(replace(problem, shares_bars=False) if apart else problem)
         columns = [problem.base_names.index(name) for name in names]
         assert solution.local_free[:, columns].all()
+        errors = solution.local[:, columns] - np.array([expected(truth)[4:] for truth in truths])
+        each = np.sqrt(solution.local_covariance[:, columns, columns])
+        for number in range(len(names)):
+            off_mean, u_mean = result_of_runs(errors[1:, number], each[1:, number])
+            divided = np.sqrt(np.sum(each[1:, number] ** 2)) / 2.0
+            of_mean[:, number] += [abs(off_mean) <= 1.96 * stated for stated in (u_mean, divided)]
         for run, truth in enumerate(truths):
             off = solution.local[run, columns] - expected(truth)[4:]
             covariance = solution.local_covariance[run][np.ix_(columns, columns)]
@@ -107,23 +116,34 @@ def sessions(seeds: int, apart: bool) -> None:
             f"distance {distance[run]:.2f}; u in µrad, µm/m: "
             + ", ".join(f"{name} {1e6 * of:.2f}" for name, of in zip(names, u[run], strict=True))
         )
+    for how, counts in zip(("as trend states it", "as if the runs were independent"), of_mean, strict=True):
+        print(
+            f"mean of runs 2 and 3 inside 1.96 u, u {how}: "
+            + ", ".join(f"{name} {count} of {seeds}" for name, count in zip(names, counts, strict=True))
+        )
 
 
 def told(options: argparse.Namespace) -> None:
     """Print in how many campaigns `explain`, `compare` and `contributions` say that model or instrument is wrong."""
-    counts = {"explain": 0, "compare": 0, "contributions, E_n above 1": 0}
-    for seed in range(options.seeds):
+    counts = {
+        "explain": 0,
+        "compare": 0,
+        "compare, instruments disagree": 0,
+        "contributions, E_n above 1": 0,
+    }
+    for seed in range(options.first, options.first + options.seeds):
         with tempfile.TemporaryDirectory() as folder:
             campaign, _ = campaign_of(Path(folder) / "shop", seed, options, 1, 10.0)
             with Database(Path(folder) / "shop.duckdb") as db:
                 import_campaign(db, campaign)
-                verdict = compare(db, CompareRequest("shop")).comparison.verdict
+                comparison = compare(db, CompareRequest("shop"))
                 shares = instruments(db, InstrumentsRequest("shop"))
                 explanation = explain(db, ExplainRequest("shop")).explanation
         assert isinstance(explanation, MachineExplanation)
         largest = max((pair.e_n for each in shares.parameters for pair in each.agreement), default=0.0)
         counts["explain"] += bool(explanation.missing)
-        counts["compare"] += verdict is Verdict.SOMETHING_IS_MISSING
+        counts["compare"] += comparison.comparison.verdict is Verdict.SOMETHING_IS_MISSING
+        counts["compare, instruments disagree"] += comparison.instruments_disagree is not None
         counts["contributions, E_n above 1"] += largest > 1.0
     for what, count in counts.items():
         low, high = scipy.stats.binomtest(int(count), options.seeds).proportion_ci(method="exact")
@@ -134,11 +154,12 @@ def main() -> None:
     """Print the rates."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=300)
-    for name in ("--heavy", "--drift", "--pitch", "--bar", "--session", "--apart", "--told"):
+    parser.add_argument("--first", type=int, default=0)
+    for name in ("--heavy", "--drift", "--pitch", "--bar", "--session", "--days", "--apart", "--told"):
         parser.add_argument(name, action="store_true")
     options = parser.parse_args()
     if options.session:
-        sessions(options.seeds, options.apart)
+        sessions(options.seeds, options.apart, options.days)
         return
     if options.told:
         told(options)

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
 
 def _rows(file: str) -> list[dict[str, str]]:
     with Path(file).open(encoding="utf-8", newline="") as text:
@@ -159,3 +161,12 @@ def test_plan_separates_what_a_pose_can_and_says_what_none_can(typed: Any, fille
     assert never["separate"]["verdict"] == "no pose that this machine reaches tells them apart"
     plain = typed("plan", "five-days", "--separate", "EBB:harmonic2,EBB:harmonic3", db=filled)
     assert "this plan tells them apart already" in plain.out
+
+
+def test_plan_for_two_names_with_a_comma_names_the_option_that_was_meant(typed: Any, tmp_path: Path) -> None:
+    db = tmp_path / "instruments.duckdb"
+    assert typed("import", EXAMPLES / "r-test", db=db).status == 0
+    answer = typed("plan", "r-test", "--for", "EA0C,EB0C", db=db)
+    assert (answer.status, answer.out) == (2, "")
+    assert "--for EA0C,EB0C: it takes one parameter and may be repeated" in answer.err
+    assert "are named by --separate EA0C,EB0C" in answer.err

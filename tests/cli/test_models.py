@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from monitor.exceptions import DataError
 from monitor.methods import ChainMethod, methods
 
 REVERSAL = "EXX:reversal"
@@ -89,14 +91,32 @@ def test_a_model_that_cannot_be_shown_on_its_campaign_is_not_kept(typed: Any, db
     ]
 
 
-@pytest.mark.slow
-def test_an_effect_that_the_readings_do_not_determine_is_to_blame_not_the_file(typed: Any, db: Path) -> None:
-    answer = typed(
-        "model", "add", "EZC1:const@warmup", "--to", "samba", "--as", "m", "--campaign", "five-days", db=db
-    )
+def test_an_effect_that_does_not_fit_is_to_blame_not_the_file(
+    typed: Any, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the model fits without the effect, the message is about the effect."""
+
+    def fitted(database: Any, version: Any, campaign: str | None) -> tuple[()]:
+        if version.effects:
+            raise DataError("did not converge: the readings contradict the machine file")
+        return ()
+
+    monkeypatch.setattr("monitor.workflow.model.change.fitted_version", fitted)
+    answer = typed("model", "add", REVERSAL, "--to", "samba", "--as", "m", "--campaign", "five-days", db=db)
     assert (answer.status, answer.out) == (2, "")
-    assert "EZC1:const@warmup could not be fitted: beside the effects of model samba" in answer.err
+    assert "EXX:reversal could not be fitted: beside the effects of model samba" in answer.err
     assert "contradict" not in answer.err
+
+
+@pytest.mark.slow
+def test_an_effect_that_the_readings_do_not_show_is_added_with_a_size_within_its_uncertainty(
+    typed: Any, db: Path
+) -> None:
+    line = ("model", "add", "EZC1:const@warmup", "--to", "samba", "--as", "m", "--campaign", "five-days")
+    assert typed(*line, db=db).status == 0
+    out = typed("identify", "five-days", "--model", "m", db=db).out
+    size, u = (float(word) for word in re.search(r"EZC1:const@warmup: (\S+) ± (\S+) µm", out).groups())  # type: ignore[union-attr]
+    assert abs(size) < u
 
 
 def test_a_model_before_any_comparison_has_no_history_yet(typed: Any, examples: Path, tmp_path: Path) -> None:

@@ -199,6 +199,27 @@ def test_a_terminal_gets_a_sign_of_life_that_goes_away(terminal: Any, filled: Pa
     assert "by axis" in seen
 
 
+def test_a_monte_carlo_on_a_terminal_shows_how_far_it_is(terminal: Any, filled: Path) -> None:
+    asked = ("uncertainty", "five-days", "--run", 20, "--method", "mcm", "--digits", 1)
+    seen = without_codes(terminal("--db", filled, *asked))
+    # A bar, the share, the time gone and the time left.
+    shares = [
+        int(share) for share in re.findall(r"propagating .* (\d+)% \d:\d\d:\d\d [-\d]:[-\d]+:[-\d]+", seen)
+    ]
+    assert shares
+    assert shares == sorted(shares)
+    assert "Monte Carlo" in seen
+
+
+def test_the_bar_of_what_is_told_behind_each_piece_is_full_at_the_end(terminal: Any, filled: Path) -> None:
+    seen = without_codes(terminal("--db", filled, "identify", columns=120))
+    counted = [
+        (int(done), int(all_of)) for done, all_of in re.findall(r"identifying \S+ .* (\d+)/(\d+) ", seen)
+    ]
+    assert counted
+    assert counted[-1][0] == counted[-1][1]
+
+
 def test_a_narrow_terminal_breaks_words_and_no_number(terminal: Any, filled: Path) -> None:
     shown = without_codes(terminal("--db", filled, "stats", "five-days", columns=40))
     row = r"E\w+ +µ\S+ +(?:machine|axis \w)(?: itself)? +-?[\d.]+ +[\d.]+ +[\d.]+ +0\.\d{4} +(?:0\.\d{4}|< 0\.0001)\s"

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from monitor.discovery.curve.explain import CurveExplanation, explain_curve
+from monitor.discovery.curve.plausible import is_plausible
 from monitor.effects.curve import parse_curve_effect
 from monitor.effects.curve.shapes.loop import directions
 from monitor.exceptions import EffectError
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
+from monitor.methods.model import Model
 from monitor.readers import read_campaign
-from monitor.records import CurveCampaign
+from monitor.records import CurveCampaign, Instrument
 
 TOML = """format = 1
 campaign = "{name}"
@@ -78,6 +81,39 @@ def test_a_smooth_bend_stays_a_polynomial(seed: int, tmp_path: Path) -> None:
     assert [effect.effect for effect in explained(tmp_path / "gauge", "x_mm", x, "y_um", y).missing] == [
         "x_mm:poly2"
     ]
+
+
+@pytest.mark.parametrize("seed", [101, 104, 109])
+def test_cycles_whose_period_nothing_determines_are_no_findings(seed: int, tmp_path: Path) -> None:
+    """The law of a thermistor is an exponential, and next to one in what is left; was: cycles such as 100 ± 1432 and
+    40 ± 1031 °C beside it, each undetermined beside the other."""
+    rng = np.random.default_rng(seed)
+    celsius = np.linspace(0.0, 100.0, 40)
+    ohm = 1e4 * np.exp(3950.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15)) * (1.0 + rng.normal(0.0, 1e-3, 40))
+    missing = explained(tmp_path / "ntc", "t_degC", celsius, "r_ohm", ohm).missing
+    assert missing[0].effect.startswith("t_degC:exp~")
+    for effect in missing:
+        assert (
+            effect.searched is None
+            or effect.searched.u is None
+            or effect.searched.u < effect.searched.value / 2
+        )
+
+
+@pytest.mark.parametrize(("periods", "plausible"), [(("30", "30.02"), False), (("30", "20"), True)])
+def test_two_cycles_that_nearly_cancel_are_no_findings(periods: tuple[str, str], plausible: bool) -> None:
+    """Cycles of 30 and 30.02 over 90 are told apart by 1 % of their size: noise gives each a size hundreds of times as
+    large as what it takes away."""
+    rng = np.random.default_rng(1)
+    x = np.linspace(0.0, 90.0, 200)
+    # What cycles of 30 and of 20 add up to, and what two neighbours can only do against each other.
+    y = np.sin(2 * np.pi * x / 30) + np.sin(2 * np.pi * x / 20) + 0.1 * x * np.cos(2 * np.pi * x / 30)
+    curve = CurveCampaign(
+        "made", "curve", Instrument("made"), "y", "y ~ 1", {"y": y + rng.normal(0.0, 0.01, 200), "x": x}, {},
+        {"x": "mm", "y": "um"}, None, np.arange(2, 202),
+    )  # fmt: skip
+    fitted = fit(problem_of(curve, Model("both", added=tuple(f"x:sin{period}" for period in periods))))
+    assert [is_plausible(fitted, index) for index in (0, 1)] == [plausible] * 2
 
 
 def test_the_direction_is_that_of_the_last_change() -> None:

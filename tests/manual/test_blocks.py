@@ -73,6 +73,16 @@ def blocks_not_run(page: Path) -> set[tuple[str, str]]:
     return {(page.name, lines[0]) for begin, _, lines in readme.fences(text) if begin in marked}
 
 
+@pytest.mark.parametrize("page", [*PAGES, CHECKOUT / "README.md"], ids=lambda page: page.name)
+def test_every_table_has_its_head(page: Path) -> None:
+    lines = re.sub(r"^```.*?^```", "", text_of(page), flags=re.MULTILINE | re.DOTALL).splitlines()
+    begins = [
+        at for at, line in enumerate(lines) if line.startswith("|") and not lines[at - 1].startswith("|")
+    ]
+    # An empty line between two rows ends the table: what follows would be shown as text with bars.
+    assert [lines[at] for at in begins if not re.match(r"\|( :?-+:? \|)+$", lines[at + 1])] == []
+
+
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if page.name != RUN_BY_README], ids=lambda page: page.name
 )

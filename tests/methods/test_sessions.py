@@ -1,4 +1,4 @@
-"""One bar in several runs of a day has one length: against a least squares of numpy over all runs at once."""
+"""One bar in several runs of a campaign has one length: against a least squares of numpy over all runs at once."""
 
 from __future__ import annotations
 
@@ -21,14 +21,13 @@ from tests.simulator import four_instruments as shop
 GAINS = ("EXX", "EYY", "EZZ")
 
 
-@pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> InstrumentProblem:
-    """A run with laser and bar, and two with the same bar alone."""
+@pytest.fixture(scope="module", params=[False, True], ids=["one day", "three days"])
+def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> InstrumentProblem:
+    """A run with laser and bar, and two with the same bar alone; on one day, and on a day each."""
     rng = np.random.default_rng(5)
-    folder = shop.session(
-        tmp_path_factory.mktemp("day") / "day", rng, [truth_of(rng) for _ in range(3)], 20.0
-    )
-    return problem_at(folder)
+    truths = [truth_of(rng) for _ in range(3)]
+    folder = tmp_path_factory.mktemp("shop") / "week"
+    return problem_at(shop.session(folder, rng, truths, 20.0, days=request.param))
 
 
 def problem_at(folder: Path) -> InstrumentProblem:
@@ -44,7 +43,7 @@ def test_one_length_is_the_least_squares_of_all_runs(session: InstrumentProblem)
     assert stays is not None
     (length,) = stays.columns
     solution = solve_problem(session)
-    at = replace(session, session=None).linearise(solution.local, solution.common)
+    at = replace(session, shares_bars=False).linearise(solution.local, solution.common)
     runs, numbers, unknowns = at.local.shape
     prior = numbers - len(session.extra_names) + int(stays.rows[0])
     design, residual = np.zeros((runs * numbers, runs * unknowns + 1)), at.residual.copy()
@@ -74,7 +73,7 @@ def test_one_length_is_the_least_squares_of_all_runs(session: InstrumentProblem)
 
 def test_a_laser_in_one_run_calibrates_the_bar_of_the_others(session: InstrumentProblem) -> None:
     """Of runs with the bar alone the gains have a fourth of the u that a length of their own leaves them."""
-    joint, single = (solve_problem(problem) for problem in (session, replace(session, session=None)))
+    joint, single = (solve_problem(problem) for problem in (session, replace(session, shares_bars=False)))
     for gain in GAINS:
         column = session.base_names.index(gain)
         u = [np.sqrt(solution.local_covariance[1:, column, column]) for solution in (joint, single)]
@@ -99,14 +98,37 @@ def test_a_run_beside_the_others_has_the_same_numbers_by_itself(session: Instrum
     assert np.allclose(whole[number], np.diag(solution.local_covariance[run - 1])[bases][number], rtol=1e-6)
 
 
-def test_runs_of_other_days_have_a_bar_of_their_own(tmp_path: Path) -> None:
-    """Nobody knows whether the bar was put together anew: then every run has its length, as before."""
+def test_a_bar_that_is_set_anew_is_an_instrument_of_its_own(tmp_path: Path) -> None:
+    """Setups that name another bar on the second day share nothing with the first: two lengths, each run its own."""
     rng = np.random.default_rng(6)
-    folder = shop.session(tmp_path / "days", rng, [truth_of(rng)] * 2, 30.0)
-    text = (
-        (folder / "runs.csv")
-        .read_text()
-        .replace("2,2026-03-02T09:00:00+00:00,1", "2,2026-03-03T09:00:00+00:00,2")
+    folder = shop.session(tmp_path / "days", rng, [truth_of(rng)] * 2, 30.0, days=True)
+    one_bar = problem_at(folder)
+    toml, csv = folder / "campaign.toml", folder / "probings.csv"
+    text = toml.read_text(encoding="utf-8")
+    head, *setups = text.split("\n[[setups]]\n")
+    bars = [setup for setup in setups if 'instrument = "ball bar"' in setup]
+    anew = [
+        bar.replace('id = "bar', 'id = "new-bar').replace('"ball bar"', '"ball bar, set anew"')
+        for bar in bars
+    ]
+    toml.write_text("\n[[setups]]\n".join([head, *setups, *anew]), encoding="utf-8")
+    lines = csv.read_text(encoding="utf-8").splitlines()
+    csv.write_text(
+        "\n".join(line.replace(",bar-", ",new-bar-") if line.startswith("2,") else line for line in lines)
+        + "\n",
+        encoding="utf-8",
     )
-    (folder / "runs.csv").write_text(text)
-    assert problem_at(folder).stays is None
+    two_bars = problem_at(folder)
+    assert one_bar.stays is not None
+    assert two_bars.stays is not None
+    assert (len(one_bar.stays.columns), len(two_bars.stays.columns)) == (1, 2)
+    joint, anew_fit = solve_problem(one_bar), solve_problem(two_bars)
+    single = solve_problem(replace(one_bar, shares_bars=False))
+    for gain in GAINS:
+        column = one_bar.base_names.index(gain)
+        u = [np.sqrt(solution.local_covariance[:, column, column]) for solution in (joint, anew_fit, single)]
+        assert u[0][1] < 0.5 * u[2][1]
+        assert u[1] == pytest.approx(u[2], rel=1e-6)
+        assert anew_fit.local[:, column] == pytest.approx(
+            single.local[:, column], abs=1e-6 * float(u[2].min())
+        )

@@ -214,3 +214,55 @@ def test_a_run_that_is_still_to_come_is_named_with_what_to_do(altered: Callable[
         r"run 4 started at 21\d\d-\d\d-\d\d \d\d:\d\d, which is still to come \(1 of 4 runs\)", sentence
     )
     assert "correct started_at in runs.csv" in sentence
+
+
+def arranged(folder: Path, change: Callable[[float, float, float], tuple[float, float, float]]) -> Path:
+    """The folder with X, Y and Z of every row of ``probings.csv`` changed together."""
+    names = ("x_mm", "y_mm", "z_mm")
+    with (folder / "probings.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        x, y, z = (float(row[name]) for name in names)
+        row.update({name: f"{value:.9f}" for name, value in zip(names, change(x, y, z), strict=True)})
+    with (folder / "probings.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+@pytest.mark.parametrize("example", ["five-days", "free-form-pocket"])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x, y, z: (y, x, z), "only with x_mm and y_mm exchanged"),
+        (lambda x, y, z: (z, y, x), "only with x_mm and z_mm exchanged"),
+        (lambda x, y, z: (z, x, y), "only with x_mm, y_mm and z_mm exchanged"),
+        (
+            lambda x, y, z: (x, -y, z),
+            r"only with the other sign of y_mm: check the sign of \[machine\.axes\.Y\]",
+        ),
+    ],
+)
+def test_exchanged_columns_are_named_at_import(
+    altered: Callable[..., Path],
+    example: str,
+    change: Callable[[float, float, float], tuple[float, float, float]],
+    words: str,
+) -> None:
+    folder = arranged(altered(example), change)
+    (doubt,) = of(folder)
+    assert re.search(words, doubt)
+
+
+@pytest.mark.parametrize("axis", ["X", "Y", "Z"])
+def test_a_sign_is_no_mistake_where_the_machine_file_states_it(
+    altered: Callable[..., Path], axis: str
+) -> None:
+    column = {f"{axis.lower()}_mm": lambda value: -value}
+    # The readings and their statement together are right, either alone is not.
+    folder = altered("five-days", column, (f"{axis} = {{ sign = 1 }}", f"{axis} = {{ sign = -1 }}"))
+    assert of(folder) == ()
+    shutil.copy(EXAMPLES / "five-days" / "probings.csv", folder / "probings.csv")
+    (doubt,) = of(folder)
+    assert f"only with the other sign of {axis.lower()}_mm" in doubt

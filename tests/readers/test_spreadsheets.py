@@ -131,6 +131,21 @@ def test_faults_of_a_workbook_name_its_file_and_row(tmp_path: Path) -> None:
         read_campaign(folder)
 
 
+def test_faults_of_a_workbook_of_all_tables_name_the_sheet_too(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "tilting-table", tmp_path / "tilting-table"))
+    as_workbook(folder, single=True)
+    book = openpyxl.load_workbook(folder / "campaign.xlsx")
+    for sheet, line, name in (("runs", 3, "ambient_degC"), ("probings", 3, "x_mm")):
+        column = next(cell.column for cell in book[sheet][1] if cell.value == name)
+        book[sheet].cell(row=line, column=column, value="none")
+    book.save(folder / "campaign.xlsx")
+    with pytest.raises(CampaignError) as refusal:
+        read_campaign(folder)
+    shown = str(refusal.value)
+    assert "  campaign.xlsx, sheet runs, line 3, column ambient_degC: 'none' is not a number" in shown
+    assert "  campaign.xlsx, sheet probings, line 3, column x_mm: 'none' is not a number" in shown
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [(b"PK\x03\x04 no workbook", "this is no workbook of Excel"), (b"text", "this is no workbook of Excel")],

@@ -133,7 +133,7 @@ def test_incomplete_certificate_is_refused_with_the_whole_list(make_record: Make
         r"  unique number of the certificate \(ISO/IEC 17025:2017, 7\.8\.2\.1 d\)\n"
         r"  opinions and interpretations or that it does not apply: write \[statements\] opinions "
         r"\(ISO/IEC 17025:2017, 7\.8\.4\.1 f\)\n"
-        r"these keys are in the laboratory's file"
+        r"the keys are those of the laboratory's file where no other is named"
     )
     with pytest.raises(IncompleteCertificateError, match=expected):
         check_complete(record)

@@ -142,9 +142,15 @@ def dial(chain: SimulatedChain, rng: np.random.Generator) -> tuple[str, list[Row
 
 
 def session(
-    folder: Path, rng: np.random.Generator, truths: Sequence[Mapping[str, float]], step: float = 5.0
+    folder: Path,
+    rng: np.random.Generator,
+    truths: Sequence[Mapping[str, float]],
+    step: float = 5.0,
+    *,
+    days: bool = False,
 ) -> Path:
-    """Write one day: a run with laser and bar, then runs with the same bar alone, each of a machine of its own."""
+    """Write one day: a run with laser and bar, then runs with the same bar alone, each of a machine of its own; with
+    ``days`` every run is on a day of its own."""
     off = rng.normal(0.0, BAR_U)
     text, rows = "", []
     for run, truth in enumerate(truths, start=1):
@@ -154,8 +160,10 @@ def session(
             parts.insert(0, laser(chain, rng, 1))
             text = "".join(setups for setups, _ in parts)
         rows += [{"run": run, **row} for _, of in parts for row in of]
-    started = [f"2026-03-02T{8 + run:02d}:00:00+00:00" for run in range(len(truths))]
-    return chain.write(folder, text, rows, started=started, days=[1] * len(truths))
+    count = len(truths)
+    numbers = list(range(1, count + 1)) if days else [1] * count
+    started = [f"2026-03-{1 + day:02d}T{8 + run:02d}:00:00+00:00" for run, day in enumerate(numbers)]
+    return chain.write(folder, text, rows, started=started, days=numbers)
 
 
 def _setup(name: str, reading: str, instrument: str, u: float, keys: str) -> str:

@@ -7,6 +7,7 @@ import pytest
 from scipy.special import erfinv
 
 from monitor.exceptions import DataError, RefusedResultError
+from monitor.progress import listening
 from monitor.uncertainty import (
     BlockSampler,
     Inputs,
@@ -73,6 +74,27 @@ def test_standard_errors_are_those_of_the_sequences_one_by_one():
     assert result.estimate == pytest.approx(every.mean(axis=0), abs=1e-12)
     assert result.covariance == pytest.approx(np.cov(every, rowvar=False), rel=1e-10, abs=1e-20)
     assert np.array_equal(result.sample, every)
+
+
+@pytest.mark.parametrize(("digits", "max_trials"), [(1, 10_000_000), (3, 10_000_000), (5, 150_000)])
+def test_the_share_told_while_it_runs_is_that_of_the_trials_and_moves_no_number(digits, max_trials):
+    options = MonteCarloOptions(digits=digits, max_trials=max_trials)
+    alone = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, options)
+    shares = []
+    with listening(shares.append):
+        result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, options)
+    assert np.array_equal(result.sample, alone.sample)
+    assert np.array_equal(result.covariance, alone.covariance)
+    assert len(shares) == result.sequences - 1
+    assert all(0.0 <= share <= 1.0 for share in shares)
+    # What is left is foretold from the scatter of the sequences: from the second half on within a factor of two.
+    true = np.arange(1, result.sequences) / result.sequences
+    later = true > 0.5
+    assert np.all(np.array(shares)[later] > true[later] / 2.0)
+    assert np.all(np.array(shares)[later] < 2.0 * true[later])
+    nobody_listens = len(shares)
+    adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, MonteCarloOptions(digits=1))
+    assert len(shares) == nobody_listens
 
 
 def test_tolerances_that_cannot_be_reached_end_at_max_trials_and_say_so():

@@ -14,8 +14,10 @@ import scipy
 from monitor.exceptions import DataError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign
+from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
-from monitor.workflow.explain.request import ExplainRequest
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
+from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.instruments.answer import InstrumentsAnswer
@@ -25,6 +27,7 @@ from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
+from tests.answers import report
 from tests.simulator import four_instruments as shop
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -101,6 +104,21 @@ def test_laser_and_ball_bar_disagree_where_the_pitch_is_hidden(shared: Instrumen
     assert bar.value - laser.value == pytest.approx(apart, abs=4.0 * bar.u)
 
 
+def test_compare_says_that_instruments_disagree(db: Database, shared: InstrumentsAnswer) -> None:
+    """The worst E_n of `contributions`, where chance does not make it; with the pitch in the model nothing is said, nor
+    where one instrument measured."""
+    apart = compare(db, CompareRequest("four-instruments")).instruments_disagree
+    assert apart is not None
+    worst = max((pair for each in shared.parameters for pair in each.agreement), key=lambda pair: pair.e_n)
+    assert (apart.run, apart.parameter, {apart.first, apart.second}) == (1, "EXX", {LASER, BAR})
+    assert (apart.first, apart.second) == (worst.first, worst.second)
+    assert apart.e_n == pytest.approx(worst.e_n, rel=1e-3)
+    assert apart.by_chance < 1e-6
+    assert compare(db, CompareRequest("r-test")).instruments_disagree is None
+    add_effect(db, AddEffectRequest("EBX:poly1", "instruments", "level", campaign="four-instruments"))
+    assert compare(db, CompareRequest("four-instruments", "level")).instruments_disagree is None
+
+
 def test_only_the_combination_shows_the_pitch(db: Database) -> None:
     for name in NAMES[1:]:
         assert explain(db, ExplainRequest(name)).explanation.missing == ()
@@ -128,6 +146,18 @@ def test_a_run_that_is_not_there_and_a_method_of_one_instrument_are_refused(db: 
     import_campaign(db, read_campaign(EXAMPLES / "tilting-table"))
     with pytest.raises(DataError, match="one instrument measured all of it"):
         instruments(db, InstrumentsRequest("tilting-table"))
+
+
+def test_the_health_report_of_several_instruments_names_what_the_combination_shows(
+    db: Database, tmp_path: Path
+) -> None:
+    """The campaign with all four says what is missing and stands in the report of its machine, in HTML and PDF."""
+    options = ReportOptions(campaigns=("four-instruments",))
+    answer = report(db, "2026-W10", "CENTRE-4", tmp_path, options=options, workers=1)
+    (machine,) = answer["machines"]
+    assert machine["state"] == "model fails"
+    assert "EBX:poly1" in str(machine)
+    assert {Path(file).suffix for file in answer["files"]} == {".html", ".pdf"}
 
 
 def test_two_instruments_make_one_history_and_their_step_is_an_e_n(tmp_path: Path) -> None:

@@ -17,11 +17,14 @@ from monitor.workflow.explain.compare_answer import (
     MachinePart,
 )
 from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.instruments.answer import Disagreement
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
 # A robot has a thousand indexations; more than these are no table to read.
 MOST_PARTS = 20
+#: Of disagreements that chance makes more rarely no digits are shown: normal tails are not known so far out.
+LEAST_PERCENT = 0.001
 #: The breakdowns of a machine that are shown, and those that are cut to the worst parts.
 SHOWN, CUT = ("axis", "target", "indexation", "run"), ("target", "indexation")
 EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
@@ -43,9 +46,22 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     residual_output.summary(answer.comparison)
+    if answer.instruments_disagree is not None:
+        _disagreement(answer.comparison.campaign, answer.instruments_disagree)
     _breakdown(answer)
     residual_output.files(answer.figures)
     return 0
+
+
+def _disagreement(campaign: str, apart: Disagreement) -> None:
+    percent = 100.0 * apart.by_chance
+    chance = f"at most {percent:.1g} %" if percent >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
+    output.say(
+        f"{apart.parameter} in run {apart.run}: {apart.first} and {apart.second} disagree, E_n = {apart.e_n:.2f}, the "
+        f"largest of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "
+        f"`monitor contributions {campaign} --run {apart.run}` says what "
+        f"each says alone, `monitor explain {campaign}` what may be missing"
+    )
 
 
 def _breakdown(answer: CompareAnswer) -> None:

@@ -9,12 +9,10 @@ from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.workflow.instruments.answer import InstrumentsAnswer
-from monitor.workflow.instruments.instruments import instruments
+from monitor.workflow.instruments.instruments import DOUBTFUL, instruments
 from monitor.workflow.instruments.request import InstrumentsRequest
 
 SMALLEST_PART = 0.01
-#: A disagreement that comes out by chance more often than this is said to be doubtful.
-DOUBTFUL = 0.01
 EXAMPLE = "monitor contributions four-instruments"
 
 

@@ -65,7 +65,7 @@ def _all(options: Namespace) -> int:
     request = IdentifyAllRequest(options.model, options.workers, options.cluster)
     with opened(options) as db:
         total = len(ask(db, campaigns).campaigns)
-        with output.stepping("identifying", total) as progress:
+        with output.stepping("identifying", total, behind=True) as progress:
             answer = ask(db, identify_all, request, progress=progress)
     if options.json:
         output.document(answer)

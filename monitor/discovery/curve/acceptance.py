@@ -11,6 +11,7 @@ import numpy as np
 
 from monitor.discovery.curve.candidates import at_best_value
 from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
+from monitor.discovery.curve.plausible import is_plausible
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.evidence import Evidence, Pool, pool_of, weigh_beside
@@ -18,6 +19,7 @@ from monitor.discovery.search.projection import orthonormal_to_full_precision, w
 from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
 from monitor.methods.curve.catalogue import POWERS
+from monitor.methods.curve.fit import fit
 from monitor.records import Array
 
 #: Fewer cycles than these over the range of an input can be a bend.
@@ -59,7 +61,12 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
             return False
         if not self.stands(others, candidate) or not self._lowers_bic(others, candidate):
             return False
-        return not self._is_a_bend(others, candidate) and self.predicts(others, candidate)
+        if self._is_a_bend(others, candidate) or not self.predicts(others, candidate):
+            return False
+        fitted = fit(
+            self.scene.curve.fit.settled.with_effects([other.effect for other in (*others, candidate)])
+        )
+        return is_plausible(fitted, len(fitted.effects) - 1)
 
     def at_best_value(self, selected: Sequence[CurveCandidate], index: int) -> CurveCandidate:
         """The selected candidate at an index with its period or constant at the best value."""
@@ -176,9 +183,9 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
 
         The lower powers that come along with a power count too.
         """
-        fit, rows = self.scene.curve.fit, self.scene.curve.problem.order
-        columns = fit.settled.columns([*fit.settled.effects, *effects])[2][rows]
-        return _remainder(fit.problem.curve.measured[rows], columns)
+        settled, rows = self.scene.curve.fit.settled, self.scene.curve.problem.order
+        columns = settled.columns([*settled.effects, *effects])[2][rows]
+        return _remainder(settled.curve.measured[rows], columns)
 
     def _is_a_bend(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
         """Whether a polynomial in the same input does as well at its price as a cycle, an exponential, a step or

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.evidence.acceptance import LARGEST_RATIO
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
@@ -22,6 +21,7 @@ from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
@@ -160,7 +160,7 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
         size, u = _amplitude(effect, sizes.estimate[part], sizes.covariance[part, part])
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
         peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
-        cancels = peak > LARGEST_RATIO * scene.fit.sigma * float(np.sqrt(removed / scene.fit.readings))
+        cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)
         if (u > 0 and abs(size) / u < SMALLEST_RATIO) or cancels:
             weak.append(index)
     return max(weak, key=lambda index: -findings[index].evidence.score, default=None)

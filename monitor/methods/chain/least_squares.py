@@ -34,7 +34,9 @@ ROUNDING = 1e-5
 MOST_ITERATIONS = 50
 # Where much is left and the model bends, whole steps of Gauss and Newton go past the point, each further than the last
 # (Fletcher, Practical Methods of Optimization, 1987, 6.1). Steps above this size that raise the sum of squares by more
-# than rounding are halved, and those after them begin so.
+# than rounding are halved, and those after them begin so. Steps below a standard deviation that are less than half of
+# the last one go nowhere else: there the sum may rise by what the derivatives leave out (products of errors), and
+# halving would stop short of the point.
 SMALLEST_HALVED, ROUNDING_OF_SUM = 1e-3, 1e-11
 # Halved steps take a tenth off the rest where whole ones take a fifth.
 DAMPED_TIMES = 4
@@ -194,11 +196,11 @@ def solve(
         in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
         size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
-        factor = damping
+        factor, shrinks = damping, damping == 1.0 and size < min(1.0, before / 2.0)
         for _ in range(MOST_HALVINGS):
             trial = linearise(local + factor * step_local, common + factor * of_common.step)
             trial_cost = float(np.sum(trial.residual**2))
-            if trial_cost <= cost * (1.0 + ROUNDING_OF_SUM) or size < SMALLEST_HALVED:
+            if trial_cost <= cost * (1.0 + ROUNDING_OF_SUM) or shrinks or size < SMALLEST_HALVED:
                 break
             factor /= 2.0
         if size < 1.0:

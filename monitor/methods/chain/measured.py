@@ -128,11 +128,11 @@ class MeasuredChain(ABC):
 
     @property
     def stays(self) -> Stays | None:
-        """Own unknowns that several runs of a session have in common; None where there are none."""
+        """Own unknowns that all runs have in common; None where there are none."""
         return None
 
     def beside_others(self, solution: Solution, run: int) -> Self:
-        """The problem for ``run`` to be looked at by itself, knowing what the other runs of its session say."""
+        """The problem for ``run`` to be looked at by itself, knowing what the other runs say."""
         return self
 
     @property

@@ -1,8 +1,8 @@
-"""Own unknowns that stay for a session: runs of one day are measured with one bar, whose length is one number.
+"""Own unknowns that stay for a session: the runs of a campaign are measured with one bar, whose length is one number.
 
-The solver knows unknowns of a run and unknowns of all runs. An unknown that stays is one of the latter: a column for
-every session, and what is known of it beforehand counts once. Its column is first freed of what the other unknowns of
-each run do alike (a bar's length and all gains together), or its rank would be judged by that.
+The solver knows unknowns of a run and unknowns of all runs. An unknown that stays is one of the latter, and what is
+known of it beforehand counts once. Its column is first freed of what the other unknowns of each run do alike (a bar's
+length and all gains together), or its rank would be judged by that.
 """
 
 from __future__ import annotations
@@ -26,46 +26,31 @@ from monitor.records import Array
 
 @dataclass(frozen=True)
 class Stays:
-    """Which unknowns stay: ``columns`` (t,) among those of a run (p,), ``rows`` (t,) of what is known of them, counted
-    among the calibrated quantities of a run, and the ``session`` (R,) of every run, from 0."""
+    """Which unknowns stay: ``columns`` (t,) among those of a run (p,), and ``rows`` (t,) of what is known of them,
+    counted among the calibrated quantities of a run."""
 
     columns: npt.NDArray[np.int64]
     rows: npt.NDArray[np.int64]
-    session: npt.NDArray[np.int64]
-
-    @property
-    def sessions(self) -> int:
-        """How many sessions there are."""
-        return int(self.session.max()) + 1
-
-    def of_sessions(self, local: Array) -> Array:
-        """The unknowns that stay (S, t), the mean of the runs of a session, of all unknowns (R, p)."""
-        totals = np.zeros((self.sessions, len(self.columns)))
-        np.add.at(totals, self.session, local[:, self.columns])
-        return totals / np.bincount(self.session)[:, None]
 
     def as_common(self, at: Linearisation, calibrated: int) -> Linearisation:
-        """Derivatives with the columns that stay among the common ones, behind these: one a session and unknown.
+        """Derivatives with the columns that stay among the common ones, behind these.
 
-        ``calibrated`` are the last rows of each run; what is known of an unknown that stays weighs in each run of a
-        session by the part that makes it count once.
+        ``calibrated`` are the last rows of each run; what is known of an unknown that stays weighs in each run by the
+        part that makes it count once.
         """
         residual, local = at.residual.copy(), at.local.copy()
-        share = 1.0 / np.sqrt(np.bincount(self.session)[self.session])
+        share = 1.0 / np.sqrt(len(residual))
         rows = residual.shape[1] - calibrated + self.rows
-        residual[:, rows] *= share[:, None]
-        local[:, rows] *= share[:, None, None]
-        runs, numbers = residual.shape
-        columns = np.zeros((runs, numbers, self.sessions, len(self.columns)))
-        columns[np.arange(runs), :, self.session] = local[:, :, self.columns]
+        residual[:, rows] *= share
+        local[:, rows] *= share
+        columns = local[:, :, self.columns]
         local[:, :, self.columns] = 0.0
-        common = np.concatenate([at.common, columns.reshape(runs, numbers, -1)], axis=2)
-        return Linearisation(residual, local, common)
+        return Linearisation(residual, local, np.concatenate([at.common, columns], axis=2))
 
 
 @dataclass(frozen=True)
 class KnownFromOthers:
-    """What the calibration and the other runs of its session say of unknowns of one run: they are ``values`` (t,), with
+    """What the calibration and the other runs say of unknowns of one run: they are ``values`` (t,), with
     the inverse covariance ``root.T @ root``; ``columns`` (t,) and ``rows`` (t,) as in ``Stays``."""
 
     columns: npt.NDArray[np.int64]
@@ -83,17 +68,17 @@ def solve_sessions(
     most: int,
 ) -> Solution:
     """As ``solve``, with unknowns that stay. ``last`` has them among its common columns, behind the others."""
-    count, at_start = len(common), stays.of_sessions(local)
+    count, at_start = len(common), local[:, stays.columns].mean(axis=0)
     begin = local.copy()
-    begin[:, stays.columns] = at_start[stays.session]
+    begin[:, stays.columns] = at_start
     first = stays.as_common(linearise(begin, common), calibrated)
     space = eliminate(first.local)
-    # (R, p, S t): how the other unknowns of a run answer those that stay, so that little of the readings changes.
+    # (R, p, t): how the other unknowns of a run answer those that stay, so that little of the readings changes.
     answer = -space.inverse @ (np.swapaxes(space.basis, 1, 2) @ first.common[:, :, count:])
 
     def whole(of_runs: Array, shared: Array) -> Array:
-        unknowns = of_runs + answer @ (shared[count:] - at_start.ravel())
-        unknowns[:, stays.columns] = shared[count:].reshape(at_start.shape)[stays.session]
+        unknowns = of_runs + answer @ (shared[count:] - at_start)
+        unknowns[:, stays.columns] = shared[count:]
         return np.asarray(unknowns)
 
     def freed(of_runs: Array, shared: Array) -> Linearisation:
@@ -102,7 +87,7 @@ def solve_sessions(
         columns[:, :, count:] += at.local @ answer
         return replace(at, common=columns)
 
-    solution = solve(freed, begin, np.concatenate([common, at_start.ravel()]), most)
+    solution = solve(freed, begin, np.concatenate([common, at_start]), most)
     at_end = whole(solution.local, solution.common)
     last = stays.as_common(linearise(at_end, solution.common[:count]), calibrated)
     return _restored(replace(solution, local=at_end, last=last), stays, count)
@@ -113,11 +98,11 @@ def _restored(solution: Solution, stays: Stays, count: int) -> Solution:
     runs, unknowns = solution.local.shape
     others = np.setdiff1d(np.arange(unknowns), stays.columns)
     space = eliminate(solution.last.local[:, :, others])
-    # An unknown that stays is that of its session; all others answer it and the common ones.
-    number = count + stays.session[:, None] * len(stays.columns) + np.arange(len(stays.columns))
+    # An unknown that stays is the same in every run; all others answer it and the common ones.
+    number = count + np.arange(len(stays.columns))
     response = np.zeros((runs, unknowns, len(solution.common)))
     response[:, others] = -space.inverse @ (np.swapaxes(space.basis, 1, 2) @ solution.last.common)
-    response[np.arange(runs)[:, None], stays.columns, number] = 1.0
+    response[:, stays.columns, number] = 1.0
     covariance = response @ solution.common_covariance @ np.swapaxes(response, 1, 2)
     covariance[:, others[:, None], others] += space.inverse @ np.swapaxes(space.inverse, 1, 2)
     null_space = np.zeros((runs, unknowns, unknowns))
@@ -139,11 +124,9 @@ def _restored(solution: Solution, stays: Stays, count: int) -> Solution:
 def known_from_others(solution: Solution, stays: Stays, index: int, calibrated: int) -> KnownFromOthers:
     """What a run has from outside: with it the run by itself has the solution and, the common unknowns held, the
     uncertainty that it has beside the others. ``calibrated`` as in ``as_common``."""
-    first = len(solution.common) + stays.session[index] * len(stays.columns)
-    of_session = slice(first, first + len(stays.columns))
     last = solution.last
-    # What the run's other unknowns leave of the columns of its session; zero in other sessions.
-    remainder = project_out(eliminate(last.local).basis, last.common[:, :, of_session])
+    # What the other unknowns of each run leave of the columns that stay.
+    remainder = project_out(eliminate(last.local).basis, last.common[:, :, len(solution.common) :])
     of_readings = remainder[index].copy()
     of_readings[last.residual.shape[1] - calibrated + stays.rows] = 0.0
     flat = remainder.reshape(-1, len(stays.columns))

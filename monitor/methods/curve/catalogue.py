@@ -14,6 +14,9 @@ from monitor.methods.curve.problem import CurveProblem
 POWERS = (1, 2, 3)
 #: A calendar period is looked for from so many cycles on.
 FEWEST_CYCLES = 1.5
+#: A loop is looked for where at least this share of the steps goes either way: series that only rise, one after the
+#: other, fall once a series, and their "loop" would be the parabola itself.
+LEAST_OF_A_LOOP = 0.1
 
 
 def catalogue(problem: CurveProblem) -> Iterator[CurveEffect]:
@@ -47,7 +50,8 @@ def _loop(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
     steps = np.diff(problem.inputs.numbers[name])
     clock = problem.inputs.numbers[_clock(problem)]
     in_order = not rows_are_sorted(problem) and bool(np.all(np.diff(clock) >= 0.0))
-    turns_back = bool((steps > 0.0).any() and (steps < 0.0).any())
+    rarer = min(np.count_nonzero(steps > 0.0), np.count_nonzero(steps < 0.0))
+    turns_back = rarer >= LEAST_OF_A_LOOP * len(steps)
     if name != _clock(problem) and in_order and turns_back:
         yield CurveEffect(name, "loop")
 

@@ -64,7 +64,8 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
         parts=parts,
         setups=used,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
-        session=_sessions(campaign, context),
+        # A bar that is stated with its uncertainty is one bar in the whole campaign, however many days that takes.
+        shares_bars=True,
         absent=tuple(absent.items()),
     )
 
@@ -80,13 +81,6 @@ def _absent(context: Context, added: tuple[ParsedEffect, ...]) -> dict[str, str]
             except EffectError as error:
                 reasons[effect.text] = str(error)
     return reasons
-
-
-def _sessions(campaign: Campaign, context: Context) -> npt.NDArray[np.int64]:
-    """The session (R,) of every run that has rows: runs of one day are one."""
-    days = {run.run: run.day for run in campaign.runs}
-    of_runs = [days.get(int(run), -int(run)) for run in np.unique(context.run)]
-    return np.asarray(np.unique(of_runs, return_inverse=True)[1], dtype=np.int64)
 
 
 def _parts(

@@ -51,8 +51,8 @@ class InstrumentProblem(ChainProblem):
 
     ``setups`` are those that have rows, ``gear_ratios`` those that the machine file gives. ``separated`` (R, p, p) is
     the projector of ``linearise`` where it was computed before; none is applied where the problem ``is_whole``.
-    ``session`` (R,) numbers the sessions that runs belong to, None where every run stands by itself; ``from_others`` is
-    what such a run knows from the others of its session.
+    ``shares_bars``: whether the runs have their bars in common; ``from_others`` is what a run by itself knows of them
+    from the others.
     """
 
     parts: tuple[Part, ...] = ()
@@ -60,7 +60,7 @@ class InstrumentProblem(ChainProblem):
     gear_ratios: tuple[tuple[str, float], ...] = ()
     separated: Array | None = None
     is_whole: bool = False
-    session: npt.NDArray[np.int64] | None = None
+    shares_bars: bool = False
     from_others: KnownFromOthers | None = None
     absent: tuple[tuple[str, str], ...] = ()
 
@@ -394,8 +394,8 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def stays(self) -> Stays | None:
-        """The lengths of bars that are known beforehand: one bar has one length in all runs of a session."""
-        if self.session is None or len(np.unique(self.session)) == len(self.session):
+        """The lengths of bars that are known beforehand: one bar has one length in all runs."""
+        if not self.shares_bars or len(self.runs) < 2:
             return None
         staying = {
             int(columns[index])
@@ -405,20 +405,20 @@ class InstrumentProblem(ChainProblem):
         }
         rows = [number for number, (index, _) in enumerate(self._priors) if index in staying]
         columns = np.array([self._priors[row][0] for row in rows], dtype=np.int64) + len(self.base_names)
-        return Stays(columns, np.array(rows), self.session) if rows else None
+        return Stays(columns, np.array(rows)) if rows else None
 
     def beside_others(self, solution: Solution, run: int) -> Self:
-        """The problem for ``run`` by itself, which knows of its bars what the other runs of its session say."""
+        """The problem for ``run`` by itself, which knows of its bars what the other runs say."""
         if self.stays is None:
             return self
         index = int(np.searchsorted(self.runs, run))
         from_others = known_from_others(solution, self.stays, index, len(self.extra_names))
-        return replace(self, session=None, from_others=from_others)
+        return replace(self, shares_bars=False, from_others=from_others)
 
     def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
         """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
         separated = self._separated_of(rows, run)
-        problem = replace(super().taken(rows, run), separated=separated, session=None)
+        problem = replace(super().taken(rows, run), separated=separated, shares_bars=False)
         index = np.searchsorted(problem.runs, run)
         parts = []
         for part in self.parts:

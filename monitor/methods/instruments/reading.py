@@ -115,7 +115,7 @@ class Reading(Protocol):
     holdable: ClassVar[tuple[str, ...]]
     #: Whether a reading counts from the first row of the run.
     relative: ClassVar[bool]
-    #: Unknowns of what is the same in all runs of a session (a bar), where they are known beforehand.
+    #: Unknowns of what is the same in all runs of a campaign (a bar), where they are known beforehand.
     staying: ClassVar[tuple[str, ...]]
 
     @classmethod

@@ -9,14 +9,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from decimal import Decimal
 from typing import Any
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.export import ExportFormat
 from monitor.readers.faults import one_of, quoted
-from monitor.readers.foreign_units import foreign_unit, unit_names
+from monitor.readers.mapping.column_source import ColumnSource, column_source
 from monitor.readers.mapping.dates import ORDERS, Dates
+from monitor.readers.mapping.pointing import Pointing, read_pointing
 from monitor.readers.registry import export_formats
 from monitor.readers.toml_table import Table
 
@@ -24,30 +24,13 @@ FILE = "mapping.toml"
 _OFFSET = re.compile(r"[+-][0-9]{2}:[0-9]{2}|Z")
 #: Columns that this reader numbers itself.
 _NUMBERED = ("run", "sequence")
-#: A scale beyond this is a slip: a mile in micrometres.
-_LARGEST_FACTOR = 2e9
-
-
-@dataclass(frozen=True)
-class ColumnSource:
-    """Where the cells of a column come from: a ``column`` of the file, or a ``constant``.
-
-    Numbers are carried from ``unit`` (None: the file states it), multiplied by ``scale`` and moved by ``shift``; a
-    ``deviation`` is added to the travel of the axes.
-    """
-
-    column: str | None = None
-    constant: str | None = None
-    unit: str | None = None
-    scale: Decimal = Decimal(1)
-    shift: Decimal = Decimal(0)
-    deviation: bool = False
 
 
 @dataclass(frozen=True)
 class Entry:
     """One ``[[exports]]``: the files that ``pattern`` names, their format, and the source of each campaign's column.
 
+    ``pointing`` has the columns of angles that say where a line of sight pointed, None where no angles are mapped;
     ``where`` keeps the rows whose cells are those texts; ``positions`` is a file that says where the axes stood;
     ``interval`` (s) is the time from row to row where no column has it; an ``optional`` entry may have no file.
     ``table`` is for faults.
@@ -60,10 +43,16 @@ class Entry:
     setup: str | None
     run: int
     columns: Mapping[str, ColumnSource]
+    pointing: Pointing | None
     where: Mapping[str, str]
     positions: str | None
     interval: float
     optional: bool
+
+    @property
+    def angles(self) -> Mapping[str, ColumnSource]:
+        """The sources of the angles and the weather from which directions are computed; none where no angles are."""
+        return {} if self.pointing is None else self.pointing.sources
 
 
 @dataclass(frozen=True)
@@ -97,6 +86,7 @@ def _entry(table: Table) -> Entry | None:
     if optional is not None and not isinstance(optional, bool):
         table.fault("optional", f"{quoted(optional)} is neither; write true or false")
     columns = _columns(table.table("columns"))
+    pointing = read_pointing(table.table("direction"))
     where = _where(table.table("where"))
     settings = None if form is None else form.settings(table)
     table.finish()
@@ -104,8 +94,8 @@ def _entry(table: Table) -> Entry | None:
         return None
     defaults = {name: ColumnSource(column) for name, column in form.columns.items() if name not in columns}
     return Entry(
-        table, pattern, form, settings, setup, 1 if run is None else run, {**defaults, **columns}, where, positions,
-        interval or 1.0, bool(optional),
+        table, pattern, form, settings, setup, 1 if run is None else run, {**defaults, **columns}, pointing, where,
+        positions, interval or 1.0, bool(optional),
     )  # fmt: skip
 
 
@@ -139,48 +129,15 @@ def _columns(table: Table | None) -> dict[str, ColumnSource]:
         return {}
     sources: dict[str, ColumnSource] = {}
     for name in table.data:
-        value = table.data[name]
         if name in _NUMBERED:
             table.raw(name, required=False, example="")
             table.fault(
                 name, "rows and runs are numbered here; write run = 2 beside file, and leave this out"
             )
-        elif isinstance(value, dict):
-            inner = table.table(name)
-            source = None if inner is None else _source(inner)
-            if source is not None:
-                sources[name] = source
-        elif isinstance(value, str):
-            column = table.text(name, example='"Position"')
-            if column is not None:
-                sources[name] = ColumnSource(column)
-        else:
-            number = table.number(name, largest=1e9, unit="the unit of the column's name", example="0.0")
-            if number is not None:
-                sources[name] = ColumnSource(constant=repr(number))
+        elif (source := column_source(table, name)) is not None:
+            sources[name] = source
     table.finish()
     return sources
-
-
-def _source(table: Table) -> ColumnSource | None:
-    before = len(table.faults)
-    column = table.text("column", required=True, example='"Position"')
-    unit = table.text("unit", example='"mm"')
-    if unit is not None and foreign_unit(unit) is None:
-        table.fault("unit", f"{quoted(unit)} is no unit that is known; there are {unit_names()}")
-    sign = table.sign("sign")
-    factor = table.number("factor", largest=_LARGEST_FACTOR, unit="1", example="0.5")
-    if factor == 0.0:
-        table.fault("factor", "0 leaves nothing of the column; write the constant instead")
-    offset = table.number("offset", largest=1e9, unit="the unit of the column's name", example="0.0")
-    deviation = table.raw("deviation", required=False, example="true")
-    if deviation is not None and not isinstance(deviation, bool):
-        table.fault("deviation", f"{quoted(deviation)} is neither; write true or false")
-    table.finish()
-    if len(table.faults) > before:
-        return None
-    scale = Decimal(sign or 1) * Decimal(repr(1.0 if factor is None else factor))
-    return ColumnSource(column, None, unit, scale, Decimal(repr(offset or 0.0)), bool(deviation))
 
 
 def _where(table: Table | None) -> dict[str, str]:

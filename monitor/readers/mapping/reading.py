@@ -19,6 +19,7 @@ from monitor.readers.exports import table as plain_table
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.mapping.mapping_file import FILE, Entry, ExportMapping, read_mapping
+from monitor.readers.mapping.pointing import DIRECTION
 from monitor.readers.mapping.rows import TARGET, TIME, Rows, Wanted, joined, rows_of
 from monitor.readers.mapping.understood import UnderstoodFile, columns_of
 from monitor.readers.setups_file import FORMATS
@@ -174,7 +175,9 @@ def _wanted(entry: Entry, head: Head) -> Wanted | None:
     if setup is None:
         return None
     form = FORMATS[setup.reading]
-    return Wanted(machine, axes, setup, form.columns, form.optional)
+    computed = () if entry.pointing is None else DIRECTION
+    columns = tuple(name for name in form.columns if name not in computed)
+    return Wanted(machine, axes, setup, columns, form.optional)
 
 
 def _setup(entry: Entry, setups: Sequence[Setup]) -> Setup | None:
@@ -352,5 +355,5 @@ def _understood(part: _Part) -> UnderstoodFile:
     return UnderstoodFile(
         part.file.name, SourceFile(part.file.name, part.file.content).sha256, part.entry.format.name,
         part.export.layout, part.entry.setup, part.entry.run, len(part.rows), part.export.started, facts,
-        columns_of(part.rows.cells, sources, axes),
+        columns_of({**part.rows.angles, **part.rows.cells}, sources, axes),
     )  # fmt: skip

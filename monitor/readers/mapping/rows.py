@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
 import numpy as np
@@ -16,14 +16,18 @@ from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import (
     Conversion,
     ForeignUnit,
+    as_angle,
     decimal_of,
     foreign_unit,
     plain,
     unit_names,
     unit_of_column,
 )
-from monitor.readers.mapping.mapping_file import ColumnSource, Entry
+from monitor.readers.mapping.column_source import ColumnSource
+from monitor.readers.mapping.mapping_file import Entry
+from monitor.readers.mapping.pointing import DIRECTION, Pointing, beyond, in_words, too_low, vectors
 from monitor.readers.mapping.travel import travel
+from monitor.readers.toml_table import Table
 from monitor.records import Machine, Setup
 
 TIME = "time_s"
@@ -57,11 +61,15 @@ class Origin:
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows (n) of one file: cells by campaign's column, the line of each, where each column came from."""
+    """The rows (n) of one file: cells by campaign's column, the line of each, where each column came from.
+
+    ``angles`` are what directions were computed from: shown to people, in no campaign.
+    """
 
     cells: Mapping[str, Sequence[str]]
     lines: Sequence[int]
     origins: Mapping[str, Origin]
+    angles: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -80,9 +88,10 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
     for name, source in sorted(
         sources.items(), key=lambda pair: (pair[0] not in first, pair[0] in wanted.columns)
     ):
-        filled = _filled(entry, file, export, name, source)
+        filled = _filled(entry.table.section("columns"), file, export, name, source)
         if filled is not None:
             cells[name], origins[name] = filled
+    pointed = None if entry.pointing is None else _pointed(entry, entry.pointing, file, export, wanted)
     if len(faults) > before:
         return None
     for name, source in sources.items():
@@ -92,7 +101,72 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
                 cells[name] = summed
                 how = f"{origins[name].how}, added to the travel of the axes"
                 origins[name] = replace(origins[name], how=how)
-    return None if len(faults) > before else Rows(cells, export.lines, origins)
+    if len(faults) > before:
+        return None
+    if pointed is None:
+        return Rows(cells, export.lines, origins)
+    return Rows({**cells, **pointed.cells}, export.lines, {**origins, **pointed.origins}, pointed.angles)
+
+
+def _pointed(entry: Entry, pointing: Pointing, file: str, export: Export, wanted: Wanted) -> Rows | None:
+    """Return the directions of a file of angles; None with the faults noted, of rows by their lines."""
+    table = entry.table.section("direction")
+    mapped = [name for name in DIRECTION if name in entry.columns]
+    if wanted.setup is None or wanted.setup.reading != "direction":
+        table.fault(None, 'angles of a line of sight belong to a setup with reading = "direction"')
+        return None
+    if mapped:
+        table.fault(None, f"{mapped[0]} is computed from these angles; leave it out of [exports.columns]")
+        return None
+    sources = _angles(table, pointing, file, export)
+    if sources is None:
+        return None
+    numbers = {name: np.array([float(cell) for cell in cells]) for name, (cells, _) in sources.items()}
+    directions = vectors(pointing, numbers)
+    for row in np.flatnonzero(too_low(pointing, directions)).tolist():
+        table.faults.add(
+            file, export.lines[row], sources[pointing.second][1].column,
+            "lower than 10 degrees above the horizon, where refraction is not computed here; leave the row out, or map "
+            'angles with it (refraction = "applied")',
+        )  # fmt: skip
+    origins = {name: Origin(None, None, in_words(pointing)) for name in DIRECTION}
+    origins |= {name: origin for name, (_, origin) in sources.items()}
+    written = [[f"{value:.12f}" for value in column] for column in directions.T.tolist()]
+    angles = {name: cells for name, (cells, _) in sources.items()}
+    return Rows(dict(zip(DIRECTION, written, strict=True)), export.lines, origins, angles)
+
+
+def _angles(
+    table: Table, pointing: Pointing, file: str, export: Export
+) -> dict[str, tuple[Sequence[str], Origin]] | None:
+    """Return the numbers of the angles and of the weather by name, and where they came from; None with faults noted."""
+    before = len(table.faults)
+    filled: dict[str, tuple[Sequence[str], Origin]] = {}
+    for name, source in pointing.sources.items():
+        column = _filled(table, file, export, name, source)
+        if column is not None:
+            _check(table, file, export.lines, (name, column[1]), column[0])
+            filled[name] = column
+    return None if len(table.faults) > before else filled
+
+
+def _check(
+    table: Table, file: str, lines: Sequence[int], named: tuple[str, Origin], cells: Sequence[str]
+) -> None:
+    """Note what no angle or weather can be, by line where it is a cell."""
+    name, origin = named
+    example = "; write 75.255 or 75:15:18.0, minutes and seconds below 60" if name.endswith("_deg") else ""
+    for line, cell in zip(lines, cells, strict=True):
+        number = decimal_of(cell)
+        fault = (
+            f"{quoted(cell)} is no finite number{example}" if number is None else beyond(name, float(number))
+        )
+        if fault is None:
+            continue
+        if origin.column is None:
+            table.fault(name, fault)
+            break
+        table.faults.add(file, line, f"{origin.column} ({name})", fault)
 
 
 def matching(export: Export, name: str) -> str | None:
@@ -135,7 +209,7 @@ def _sources(entry: Entry, file: str, export: Export, wanted: Wanted) -> dict[st
     sources = dict(entry.columns)
     asked = [axis.column for axis in wanted.axes] + list(wanted.columns)
     # What was mapped to another column is not taken a second time: the x of a tracker is no reading of the axis X.
-    taken = {matching(export, source.column or "") for source in sources.values()}
+    taken = {matching(export, source.column or "") for source in (*sources.values(), *entry.angles.values())}
     for name in [*asked, TIME, TARGET]:
         if name in sources:
             continue
@@ -157,12 +231,11 @@ def _sources(entry: Entry, file: str, export: Export, wanted: Wanted) -> dict[st
 
 
 def _filled(
-    entry: Entry, file: str, export: Export, name: str, source: ColumnSource
+    table: Table, file: str, export: Export, name: str, source: ColumnSource
 ) -> tuple[Sequence[str], Origin] | None:
-    """Return the cells of one column in its unit, and where they came from; None with the fault noted."""
+    """Return the cells of one column in its unit, and where they came from; None with the fault noted in ``table``."""
     if source.constant is not None:
         return [source.constant] * len(export.lines), Origin(None, None, "the same in every row")
-    table = entry.table.section("columns")
     column = matching(export, source.column or "")
     if column is None:
         table.fault(name, _no_column(file, source.column or "", export))
@@ -174,7 +247,7 @@ def _filled(
             table.fault(name, f"{name} has no unit; leave unit out")
             return None
         return cells, Origin(column, None, f"column {column}")
-    unit = _unit_in_file(entry, file, export, name, replace(source, column=column), target)
+    unit = _unit_in_file(table, file, export, name, replace(source, column=column), target)
     if unit is None:
         return None
     conversion = Conversion(unit, target, source.scale, source.shift)
@@ -187,12 +260,12 @@ def _filled(
 
 
 def _unit_in_file(
-    entry: Entry, file: str, export: Export, name: str, source: ColumnSource, target: ForeignUnit
+    table: Table, file: str, export: Export, name: str, source: ColumnSource, target: ForeignUnit
 ) -> ForeignUnit | None:
     """Return the unit of a column of a file; None with the fault noted where nobody or two different ones state it."""
-    table, column = entry.table.section("columns"), source.column or ""
+    column = source.column or ""
     stated = export.units.get(column)
-    unit = foreign_unit(stated or source.unit or "")
+    unit = _of_quantity(foreign_unit(stated or source.unit or ""), target)
     if unit is None:
         table.fault(
             name,
@@ -200,7 +273,11 @@ def _unit_in_file(
             f'"{column}", unit = "{target.name}" }}, with the unit that the instrument used',
         )
         return None
-    if stated is not None and source.unit is not None and foreign_unit(source.unit) != unit:
+    if (
+        stated is not None
+        and source.unit is not None
+        and _of_quantity(foreign_unit(source.unit), target) != unit
+    ):
         table.fault(
             name,
             f"{file} states {stated} for column {quoted(column)}, the mapping says {source.unit}; leave unit out here "
@@ -215,6 +292,11 @@ def _unit_in_file(
         )
         return None
     return unit
+
+
+def _of_quantity(unit: ForeignUnit | None, target: ForeignUnit) -> ForeignUnit | None:
+    """Return a unit, hours of a column of angles as hours of angle."""
+    return as_angle(unit) if unit is not None and target.quantity == "angle" else unit
 
 
 def _with_travel(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.exceptions import DataError, RefusedResultError
+from monitor.progress import is_awaited, told
 from monitor.records import Array
 from monitor.stopping import checkpoint
 from monitor.uncertainty.coverage_regions.coverage import (
@@ -145,6 +146,8 @@ def adaptive_monte_carlo(
                 tolerances = _tolerances(summary, options)
                 if last or _stable(total, tolerances):
                     break
+            if is_awaited():
+                told(_share_done(total, options))
     _refuse_where_it_matters(total, summary, tolerances)
     return _result(total, tolerances, sampler, names, units, options)
 
@@ -170,6 +173,21 @@ def _tolerances(summary: Summary, options: MonteCarloOptions) -> Tolerances:
         for value in (summary.lambda_max, summary.k_p, summary.k_q)
     ]
     return Tolerances(tolerances_of(summary.u, options.digits) / options.tighten, *rest)
+
+
+def _share_done(total: Accumulator, options: MonteCarloOptions) -> float:
+    """Return the share of the trials that are done of those needed: standard errors fall with the root of their number.
+
+    An estimate, which moves with the scatter of the sequences; 0 before two of them.
+    """
+    if len(total.rows) < 2:
+        return 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times_too_large = 2.0 * total.standard_errors() / _tolerances(total.quick(), options).as_row()
+    # What neither scatters nor has a tolerance is done.
+    worst = float(np.nanmax(times_too_large, initial=0.0))
+    needed = max(len(total.rows) * worst**2, options.min_sequences)
+    return max(len(total.rows) / needed, total.trials / options.max_trials)
 
 
 def _stable(total: Accumulator, tolerances: Tolerances) -> bool:

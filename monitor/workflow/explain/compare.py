@@ -9,7 +9,9 @@ from pathlib import Path
 from monitor.discovery import Fit, compare as compare_fit
 from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
+from monitor.methods import campaign_method
 from monitor.methods.curve.fit import CurveFit
+from monitor.methods.method import Instruments, Unable
 from monitor.store import Database, save_analysis
 from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison
@@ -17,6 +19,7 @@ from monitor.workflow.explain.machine_answer import machine_comparison
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
+from monitor.workflow.instruments.instruments import disagreement
 from monitor.workflow.models import label
 
 #: Draws the figures of an answer into a folder and returns the names of the files.
@@ -35,7 +38,7 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
     answer, draw = (
         _compare_curve(fit.fit, model)
         if isinstance(fit.fit, CurveFit)
-        else _compare_machine(fit.fit, request.campaign, model)
+        else _compare_machine(fit.fit, request.campaign, model, campaign_method(fit.campaign).instruments)
     )
     save_analysis(
         db, "comparison", to_document(answer), method=fit.campaign.method, campaign=request.campaign,
@@ -44,7 +47,9 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
     return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
 
 
-def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer, Draw]:
+def _compare_machine(
+    fit: Fit, campaign: str, model: str, ability: Instruments | Unable
+) -> tuple[CompareAnswer, Draw]:
     comparison = compare_fit(fit, campaign, model)
 
     def draw(folder: Path) -> Sequence[str]:
@@ -53,7 +58,9 @@ def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer
 
         return comparison_figures(comparison, fit, folder)
 
-    return CompareAnswer(machine_comparison(comparison, fit.problem), fit.problem.target_word), draw
+    apart = disagreement(fit.problem, fit.solution, ability)
+    answer = CompareAnswer(machine_comparison(comparison, fit.problem), apart, fit.problem.target_word)
+    return answer, draw
 
 
 def _compare_curve(fit: CurveFit, model: str) -> tuple[CompareAnswer, Draw]:

@@ -14,6 +14,7 @@ from monitor.documents import INLINED, OMITTED
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise
+from monitor.workflow.instruments.answer import Disagreement
 
 
 @dataclass(frozen=True)
@@ -138,8 +139,12 @@ class CurveComparison:
 
 @dataclass(frozen=True)
 class CompareAnswer:
-    """The comparison; ``target_word`` is what a machine's method calls its targets, None for a curve."""
+    """The comparison; ``target_word`` is what a machine's method calls its targets, None for a curve.
+
+    ``instruments_disagree`` is there where instruments say of one parameter what chance does not explain.
+    """
 
     comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
+    instruments_disagree: Disagreement | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -39,6 +39,20 @@ class Agreement:
 
 
 @dataclass(frozen=True)
+class Disagreement:
+    """The largest E_n of so many ``comparisons`` between the instruments of a ``run``, where chance alone makes it as
+    large in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound)."""
+
+    run: int
+    parameter: str
+    first: str
+    second: str
+    e_n: float
+    comparisons: int
+    by_chance: float
+
+
+@dataclass(frozen=True)
 class ParameterShares:
     """A parameter of the joint fit: ``parts`` are what each instrument adds to u as a standard uncertainty (u² is the
     sum of their squares); ``known_beforehand`` is the part of lengths and beams that the setups state.

@@ -10,14 +10,17 @@ import numpy as np
 
 from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
-from monitor.methods.chain.problem import solve_problem
-from monitor.methods.method import Instruments, InstrumentShare
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.method import Instruments, InstrumentShare, Unable
+from monitor.records import Array
 from monitor.store import Database
 from monitor.units import Unit
 from monitor.workflow.identify.fitting import machine_problem
 from monitor.workflow.instruments.answer import (
     Agreement,
     AloneValue,
+    Disagreement,
     InstrumentFit,
     InstrumentsAnswer,
     ParameterShares,
@@ -29,6 +32,8 @@ from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: Coverage factor of E_n.
 K = 2.0
+#: A disagreement that comes out by chance more often than this is doubtful: the level at which `compare` judges.
+DOUBTFUL = 0.01
 
 
 def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
@@ -47,18 +52,8 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
             f"campaign {campaign.name} has no run {run}; it has runs {', '.join(map(str, problem.runs))}"
         )
     solution = solve_problem(problem)
-    index = int(np.searchsorted(problem.runs, run))
     of_all, beforehand = ability.shares(problem, solution, run)
-    frames = refers_to(problem.base_names, problem.context.chain)
-    parameters, open_ones = [], []
-    for number, name in enumerate(problem.base_names):
-        if not solution.local_free[index, number]:
-            open_ones.append(name)
-            continue
-        value = float(solution.local[index, number])
-        unit = problem.base_units[name]
-        shares = _parameter(name, unit, value, number, of_all, float(beforehand[number]))
-        parameters.append(replace(shares, refers_to=frames.get(name)))
+    parameters, open_ones = _parameters(problem, solution, run, of_all, beforehand)
     return InstrumentsAnswer(
         campaign=campaign.name,
         run=run,
@@ -72,10 +67,53 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
             )
             for share in of_all
         ),
-        parameters=tuple(parameters),
-        not_determined=tuple(open_ones),
+        parameters=parameters,
+        not_determined=open_ones,
         by_chance=_by_chance([pair.e_n for shares in parameters for pair in shares.agreement]),
     )
+
+
+def disagreement(
+    problem: ChainProblem, solution: Solution, ability: Instruments | Unable
+) -> Disagreement | None:
+    """The worst E_n between instruments in the last run of a fit; None where chance explains it, or nothing is
+    compared.
+
+    Nothing is fitted anew: what an instrument says alone is one step from the joint point.
+    """
+    if not isinstance(ability, Instruments):
+        return None
+    run = int(problem.runs[-1])
+    of_all, beforehand = ability.shares(problem, solution, run)
+    parameters, _ = _parameters(problem, solution, run, of_all, beforehand)
+    pairs = [(shares.parameter, pair) for shares in parameters for pair in shares.agreement]
+    by_chance = _by_chance([pair.e_n for _, pair in pairs])
+    if by_chance is None or by_chance > DOUBTFUL:
+        return None
+    parameter, worst = max(pairs, key=lambda compared: compared[1].e_n)
+    return Disagreement(run, parameter, worst.first, worst.second, worst.e_n, len(pairs), by_chance)
+
+
+def _parameters(
+    problem: ChainProblem,
+    solution: Solution,
+    run: int,
+    of_all: tuple[InstrumentShare, ...],
+    beforehand: Array,
+) -> tuple[tuple[ParameterShares, ...], tuple[str, ...]]:
+    """The parameters of a run that have a number, each shared out among its instruments, and those that have none."""
+    index = int(np.searchsorted(problem.runs, run))
+    frames = refers_to(problem.base_names, problem.context.chain)
+    parameters, open_ones = [], []
+    for number, name in enumerate(problem.base_names):
+        if not solution.local_free[index, number]:
+            open_ones.append(name)
+            continue
+        value = float(solution.local[index, number])
+        unit = problem.base_units[name]
+        shares = _parameter(name, unit, value, number, of_all, float(beforehand[number]))
+        parameters.append(replace(shares, refers_to=frames.get(name)))
+    return tuple(parameters), tuple(open_ones)
 
 
 def _by_chance(e_n: list[float]) -> float | None:

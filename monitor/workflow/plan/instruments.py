@@ -248,6 +248,11 @@ def _asked(
                     f"--for {name}: an uncertainty is wanted by --wanted {plain}={uncertainty or '1.5'}, "
                     f"and --for names parameters: {', '.join(names)}"
                 )
+            if "," in name:
+                raise InputError(
+                    f"--for {name}: it takes one parameter and may be repeated; two effects that are to be told apart "
+                    f"are named by --separate {name}"
+                )
             raise InputError(
                 f"there is no parameter '{name}'; {did_you_mean(name, names)}there are {', '.join(names)}"
             )

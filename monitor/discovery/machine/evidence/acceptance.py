@@ -29,6 +29,7 @@ from monitor.discovery.search.evidence import (
     weigh_beside,
 )
 from monitor.discovery.search.memory import Memory
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
@@ -36,9 +37,6 @@ from monitor.discovery.search.sign_flips import p_value_by_flips
 
 # Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
 BLOCK = 15
-# Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
-# the trial of power are at most 32 times as large.
-LARGEST_RATIO = 100.0
 # More than this part of what is seen of an effect is what was stated beforehand.
 OF_STATEMENTS = 0.5
 # So many effects within the shape of another are named at most.
@@ -194,8 +192,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         size = candidate.columns.shape[1]
         fitted = amplitudes(self.scene, [*others, candidate])
         peak = float(np.linalg.norm(candidate.raw @ fitted.estimate[-size:], axis=1).max())
-        taken = self.scene.fit.sigma * float(np.sqrt(self._explained(others, candidate)))
-        if peak > LARGEST_RATIO * taken / float(np.sqrt(self.scene.fit.readings)):
+        removed = self.scene.fit.sigma**2 * self._explained(others, candidate)
+        if nearly_cancelled(peak, removed, self.scene.fit.readings):
             return False
         sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)

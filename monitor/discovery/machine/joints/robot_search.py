@@ -20,6 +20,7 @@ from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.search.candidate import side_by_side
 from monitor.discovery.search.evidence import pool_of
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import ScanResult, except_for, findings_without_rivals
 from monitor.discovery.search.steps import step_by_step
@@ -113,8 +114,8 @@ def _stands(pursuit: Pursuit, candidate: ChainCandidate, new: Array, level: floa
     columns = without(pursuit.basis, candidate.columns[pursuit.order])
     sizes = np.linalg.pinv(columns, rcond=1e-6) @ pursuit.residual
     peak = float(np.linalg.norm(candidate.raw @ sizes, axis=1).max())
-    taken = pursuit.fit.sigma * float(np.linalg.norm(new.T @ pursuit.residual))
-    return peak <= LARGEST_RATIO * taken / float(np.sqrt(pursuit.fit.readings))
+    removed = pursuit.fit.sigma**2 * float(np.sum((new.T @ pursuit.residual) ** 2))
+    return not nearly_cancelled(peak, removed, pursuit.fit.readings, LARGEST_RATIO)
 
 
 def _contains(whole: ChainCandidate, part: ChainCandidate) -> bool:

@@ -12,11 +12,11 @@ from itertools import combinations
 
 import numpy as np
 
-from monitor.discovery.machine.evidence.acceptance import LARGEST_RATIO
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes import Poly
@@ -50,7 +50,7 @@ def _all_but_cancel(
         beside = [*others, *powers[:index], *powers[index + 1 :]]
         removed = weigh_beside(scene, [power], beside)[0].explained
         peak = float(np.linalg.norm(power.raw[..., 0] * size, axis=1).max())
-        if peak > LARGEST_RATIO * scene.fit.sigma * float(np.sqrt(removed / scene.fit.readings)):
+        if nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings):
             return True
     return False
 

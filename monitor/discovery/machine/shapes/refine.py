@@ -15,6 +15,7 @@ from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.missing import Searched
+from monitor.discovery.search.plausible import is_determined
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, Context, with_time_constant
@@ -28,8 +29,6 @@ from monitor.records import Array
 GRID_FACTOR = TIME_CONSTANTS_S[1] / TIME_CONSTANTS_S[0]
 # Relative step of the numerical derivative by the searched value.
 STEP = 1e-3
-# A time constant whose uncertainty exceeds half of it, as neighbours on its grid differ, is not determined.
-LARGEST_RELATIVE_U = 0.5
 # Twice the logarithm of the likelihood ratio that a value exceeds in 5 % (chi-square with one degree of freedom).
 LIMIT = 3.84
 # Values that are tried for a limit differ by this factor.
@@ -186,7 +185,7 @@ def _with_limit(
         return refined
     if searched.unit != "min":
         return replace(refined, searched=searched if searched.u is not None else None)
-    if searched.u is not None and searched.u < LARGEST_RELATIVE_U * searched.value:
+    if searched.u is not None and is_determined(searched.value, searched.u):
         return refined
     at_least = _at_least(scene, selected, index, searched.value)
     return replace(refined, searched=replace(searched, u=None, at_least=at_least))

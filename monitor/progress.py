@@ -1,0 +1,36 @@
+"""Tells whoever waits for a computation how far it is: a share from 0 to 1.
+
+A face that shows progress begins with ``listening``; a loop that can say how much is left tells it. Where nobody
+listens nothing is told, and nothing should be computed to be told: ``is_awaited`` says so.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+_THREAD = threading.local()
+
+
+@contextmanager
+def listening(tell: Callable[[float], None]) -> Iterator[None]:
+    """Let ``tell`` hear how far what this thread does in the block is."""
+    outer = getattr(_THREAD, "tell", None)
+    _THREAD.tell = tell
+    try:
+        yield
+    finally:
+        _THREAD.tell = outer
+
+
+def is_awaited() -> bool:
+    """Return whether anybody listens to what this thread does."""
+    return getattr(_THREAD, "tell", None) is not None
+
+
+def told(share: float) -> None:
+    """Tell that a ``share`` of the work is done, 0 to 1."""
+    tell: Callable[[float], None] | None = getattr(_THREAD, "tell", None)
+    if tell is not None:
+        tell(min(max(share, 0.0), 1.0))
