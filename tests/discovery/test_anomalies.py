@@ -83,6 +83,7 @@ def test_a_noisier_run_has_no_bad_points_for_that(virtual_campaigns, explained):
         readings[told["run"] == 7] += 2e-3 * rng.standard_normal(62)
     answer = explained(campaign)
     assert answer.suspect == ()
+    assert answer.scatter == ()
     assert answer.moves == ()
     assert answer.missing == ()
 
@@ -112,6 +113,7 @@ def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns
     assert abs(found.amplitude - 2e-7) < 3 * found.u
     assert "not recorded" in found.description.cause
     assert answer.suspect == ()
+    assert answer.scatter == ()
     assert answer.moves == ()
     assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
 

@@ -24,7 +24,7 @@ def shake(campaign: Campaign, told: dict[str, Any], ball: str, size_um: float, s
 
 @pytest.mark.parametrize("ball", ["1", "2", "3", "4"])
 def test_a_ball_that_shakes_is_named_with_how_much(virtual_campaigns, seeds, ball):
-    """Hidden: 6 µm beside 1 µm of the probe, so 6.08 times as much; of 5 runs as well as of 8."""
+    """Hidden: 6 µm beside 1 µm of the probe, so 6.08 times as much; of 4 runs as well as of 8."""
     times = []
     for seed in seeds(20, 2):
         for days in (1, 2):
