@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from monitor.exceptions import EffectError
+from monitor.exceptions import EffectError, NotConvergedError
+from monitor.methods.chain import problem as chain_problem
+from monitor.methods.chain.added_effects import STARTS_S
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
 from monitor.methods.samba.method import METHOD as samba, problem_of
@@ -88,13 +90,27 @@ def test_a_model_names_an_effect_once(simulated: Callable[..., Any]) -> None:
         samba.identify(campaign, Model("twice", added=("EA0B:const",)))
 
 
-def test_a_time_constant_that_no_reading_shows_is_held_and_the_effect_keeps_its_size() -> None:
+def test_a_time_constant_that_no_reading_shows_is_held_and_the_effect_keeps_its_size(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Where no search for a time constant settles, the size is that of the effect with the held one, to 1e-6 of its
     standard uncertainty; before, the model could not be fitted, although `explain` may have named the effect."""
     campaign = read_campaign(EXAMPLES / "nothing-hidden")
+    searches: list[int] = []
+
+    def settles_with_a_held_one(*arguments: Any) -> Any:
+        searches.append(len(searches))
+        if len(searches) == 1:
+            raise NotConvergedError("did not converge")
+        return best_of(*arguments)
+
+    best_of = chain_problem._best_of
+    monkeypatch.setattr(chain_problem, "_best_of", settles_with_a_held_one)
     searching = solve_problem(problem_of(campaign, Model("warm", added=("EXC1:const@warmup",))))
+    assert searches == [0, 1]
     assert searching.common_free.tolist() == [True, False]
     minutes = round(float(np.exp(searching.common[1])) / 60.0, 6)
+    assert minutes in [seconds / 60.0 for seconds in STARTS_S]
     fixed = solve_problem(problem_of(campaign, Model("warm", added=(f"EXC1:const@warmup{minutes:g}min",))))
     u = float(np.sqrt(fixed.common_covariance[0, 0]))
     assert abs(searching.common[0] - fixed.common[0]) < 1e-6 * u
