@@ -108,6 +108,14 @@ def test_an_effect_that_does_not_fit_is_to_blame_not_the_file(
     assert "contradict" not in answer.err
 
 
+def test_an_effect_that_a_model_has_changes_nothing_for_anybody(typed: Any, db: Path) -> None:
+    assert typed("model", "add", REVERSAL, "--to", "samba", "--as", "twice", db=db).status == 0
+    answer = typed("model", "add", REVERSAL, "--to", "twice", db=db)
+    assert (answer.status, answer.out) == (2, "")
+    assert "has EXX:reversal already" in answer.err
+    assert "for everybody" not in answer.err
+
+
 @pytest.mark.slow
 def test_an_effect_that_the_readings_do_not_show_is_added_with_a_size_within_its_uncertainty(
     typed: Any, db: Path

@@ -54,13 +54,11 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
 def affected(db: Database, request: AddEffectRequest) -> AffectedAnswer:
     """For whom adding an effect changes the model that is meant: for nobody under a new name.
 
-    Nothing is written. Raises EffectError, NotFoundError.
+    Nothing is written. Raises EffectError, InputError, NotFoundError.
     """
     parent = resolve(db, request.to)
     # What would be refused changes nothing for anybody.
-    subjects = subjects_of(db, parent)
-    for effect in request.effects:
-        subjects.canonical(effect, request.campaign)
+    _planned(db, request)
     if request.new_name is not None and request.new_name != parent.name:
         return AffectedAnswer(request.new_name, 1, False, (), ())
     latest = load_model(db, parent.name)
