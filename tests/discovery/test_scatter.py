@@ -56,6 +56,15 @@ def test_ordinary_campaigns_have_no_ball_that_scatters(virtual_campaigns, seeds)
             assert scattering(fit(problem_of(campaign))) is None
 
 
+def test_of_runs_that_are_copies_no_ball_scatters(virtual_campaigns):
+    """Readings that repeat to the last digit have no scatter to hold one against; it was divided by."""
+    campaign, _ = virtual_campaigns.virtual(9400, days=1)
+    for axis in "XYZ":
+        readings = campaign.probings.readings[axis]
+        readings[:] = np.tile(readings[: len(readings) // 4], 4)
+    assert scattering(fit(problem_of(campaign))) is None
+
+
 def test_an_explanation_names_the_ball_alone(virtual_campaigns, explained):
     """It was 40 bad points. How much the ball scatters is said to 15 %."""
     campaign, told = virtual_campaigns.virtual(9400, days=2)

@@ -27,6 +27,9 @@ FALSE_ALARM = 1e-4
 # Two targets say that one scatters more, not which of them is as it should be.
 FEWEST_TARGETS = 3
 FEWEST_TOUCHES = 8
+# Runs that repeat one another to less than a thousandth of what is stated are copies, or simulated without noise:
+# beside them nothing is seen to scatter more.
+LEAST_OF_STATED = 1e-6
 # A wreck among the touches of a target is no scatter: a touch counts at most as one of this probability.
 TAIL = 1e-4
 
@@ -108,11 +111,13 @@ def scattering(fit: Fit, named: Collection[str] = ()) -> Scatter | None:
 
 
 def _scatter(fit: Fit, squares: _Squares, target: str, tests: int, alike: bool) -> Scatter | None:
+    of_target = squares.target == target
+    typical = squares.typical
+    if float(np.median(typical[~of_target])) < LEAST_OF_STATED:
+        return None
     variance = _variance_beside_others(squares, target, stated_alike=alike)
     if variance < LEAST_TIMES**2:
         return None
-    of_target = squares.target == target
-    typical = squares.typical
     ranked = scipy.stats.mannwhitneyu(
         typical[of_target], typical[~of_target], alternative="greater", method="asymptotic"
     )
