@@ -19,8 +19,8 @@ from environment import CHECKOUT, EXTRAS
 # What a user installs on top of the wheel, by the names under which it is imported: the modules that need it are
 # imported late, and may fail without it. Everything else has to be declared.
 OF_EXTRAS = (
-    "asn1crypto", "cryptography", "dask", "distributed", "fastapi", "lxml", "multipart", "openpyxl", "pkcs11", "plotly",
-    "pydantic", "pyhanko", "pyhanko_certvalidator", "shtab", "starlette", "uvicorn",
+    "asn1crypto", "cryptography", "dask", "distributed", "fastapi", "h11", "lxml", "multipart", "openpyxl", "pkcs11",
+    "plotly", "pydantic", "pyhanko", "pyhanko_certvalidator", "shtab", "starlette", "uvicorn",
 )  # fmt: skip
 IMPORT_ALL = f"""
 import importlib, pkgutil, monitor
