@@ -4,7 +4,7 @@ Whatever a method measures, its problem says what is left of every row at given 
 linear axes of a touch or the columns of an instrument, are moved until just the noise is left.
 
 Effects see the poses of the plan, where the pattern's own errors let the measured axes stop, and not the readings that
-are sought: which way an axis came to its pose is the plan's, and a reading moved by a micrometre must not turn it round.
+are sought: which way an axis came to its pose is the plan's; a reading moved by a micrometre must not turn it round.
 """
 
 from __future__ import annotations
@@ -145,9 +145,7 @@ class Likeness:
         sigma = np.where(np.isfinite(self.problem.sigma), self.problem.sigma, 1.0)
         return float(np.max(np.abs(remaining) / sigma, initial=0.0))
 
-    def _inverse(
-        self, probings: Probings, local: Array, common: Array, effects: tuple[Effect, ...]
-    ) -> Array:
+    def _inverse(self, probings: Probings, local: Array, common: Array, effects: tuple[Effect, ...]) -> Array:
         """The shortest moves (n, k, d) of the numbers of the columns for a row that changes by 1 mm."""
         slopes = np.stack(
             [self._slope(probings, column, local, common, effects) for column in self.columns], axis=-1
