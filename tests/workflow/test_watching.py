@@ -105,11 +105,11 @@ def test_what_was_killed_goes_on_without_doing_anything_twice(
     path: Path, arrived: Path, where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def killed(*arguments: object, **more: object) -> None:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("killed here")
 
     with monkeypatch.context() as patch:
         patch.setattr(watching, where, killed)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt, match="killed here"):
             look(path, arrived)
     (campaign,) = look(path, arrived).arrived
     assert (campaign.state, campaign.identified) == ("unchanged", True)
