@@ -268,7 +268,7 @@ class NoiseDesign:
 
         Of several runs only what they do not share counts; their means take their part of the degrees of freedom.
         """
-        readings, rest = self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+        readings, rest = self._parts_of(residual)
         if self._resemblance(readings) < NOTICED:
             return None
         criterion = dict(zip(GRID, self._criteria(readings, rest).tolist(), strict=True))
@@ -287,6 +287,16 @@ class NoiseDesign:
         # makes an effect.
         slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
         return max((best, *slow), key=slowness)
+
+    def likelihoods(self, residual: Array) -> list[tuple[Correlation | None, float]]:
+        """Every correlation that is tried with the restricted likelihood of residuals (R, N), the largest of them 1."""
+        criteria = self._criteria(*self._parts_of(residual))
+        relative = np.exp(-0.5 * (criteria - criteria.min()))
+        return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
+
+    def _parts_of(self, residual: Array) -> tuple[Array, Array]:
+        """What of residuals (R, N) says how neighbours resemble each other."""
+        return self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
 
     @cached_property
     def _runs(self) -> npt.NDArray[np.int64]:
