@@ -13,6 +13,7 @@ from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth,
 from monitor.reporting.health.sentences import (
     CheckKind,
     LimitWithoutMap,
+    MachineNamed,
     NextCheck,
     NotMeasured,
     RunNamed,
@@ -24,6 +25,7 @@ from monitor.store import (
     MachineHistory,
     RecordedRun,
     campaign_tolerances,
+    machine_descriptions,
     machine_events,
     machine_history,
     machine_runs,
@@ -97,6 +99,17 @@ class MachineWeek:
     def runs_of_week(self) -> list[RecordedRun]:
         """The runs that began in the week."""
         return [run for run in self.runs if self.week.holds(run.local_start)]
+
+
+def named_machines(db: Database) -> list[MachineName]:
+    """Return every machine that counts, by name."""
+    machines = []
+    for machine in machine_descriptions(db):
+        description = MachineNamed(
+            machine.manufacturer, machine.model, machine.serial_number, machine.topology
+        )
+        machines.append(MachineName(machine.machine, description, machine.location))
+    return machines
 
 
 def read_week(db: Database, name: MachineName, week: Week, options: ReportOptions) -> MachineWeek:

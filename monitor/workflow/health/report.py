@@ -29,7 +29,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
-from monitor.reporting.health.sentences import MachineNamed, NothingMeasured
+from monitor.reporting.health.sentences import NothingMeasured
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.store import (
     Database,
@@ -37,14 +37,19 @@ from monitor.store import (
     campaign_machines,
     check_campaigns,
     last_anchor,
-    machine_descriptions,
     save_analysis,
 )
 from monitor.store.catalogue import check_machine
 from monitor.uncertainty.workers.engine import Engine, in_order
 from monitor.workflow.certificate.files import why_not
 from monitor.workflow.engines import engine_of
-from monitor.workflow.health.machine import MachineName, MachineWeek, machine_health, read_week
+from monitor.workflow.health.machine import (
+    MachineName,
+    MachineWeek,
+    machine_health,
+    named_machines,
+    read_week,
+)
 from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.task import Task, computed
@@ -75,7 +80,7 @@ def report(
         raise InputError(
             f"--week {week.name} begins on {week.first}, and today is {today}: nothing can be said of it"
         )
-    every = _machines(db)
+    every = named_machines(db)
     machines = _selected(db, every, request)
     try:
         request.out.mkdir(parents=True, exist_ok=True)  # before minutes of computing
@@ -99,17 +104,6 @@ def report(
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
     return _answer(fleet, week, files, looks)
-
-
-def _machines(db: Database) -> list[MachineName]:
-    """Every machine that counts, by name."""
-    machines = []
-    for machine in machine_descriptions(db):
-        description = MachineNamed(
-            machine.manufacturer, machine.model, machine.serial_number, machine.topology
-        )
-        machines.append(MachineName(machine.machine, description, machine.location))
-    return machines
 
 
 def _selected(db: Database, every: list[MachineName], request: ReportRequest) -> list[MachineName]:
