@@ -310,7 +310,9 @@ class NoiseDesign:
     def _numbers(self) -> float:
         """How many numbers were read."""
         rows = self.rows
-        read = rows.numbers * self._weighted if rows.read is None else rows.by_neighbours(rows.read)[self._runs]
+        read = (
+            rows.numbers * self._weighted if rows.read is None else rows.by_neighbours(rows.read)[self._runs]
+        )
         return float(np.sum(read))
 
     def _of_one_series(self, lag: int) -> Array:

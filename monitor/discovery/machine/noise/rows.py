@@ -16,6 +16,7 @@ from monitor.machine import MOTION
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 
+
 @dataclass(frozen=True)
 class Rows:
     """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
@@ -69,7 +70,7 @@ def rows_of(problem: ChainProblem) -> Rows:
 def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
     """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
     no vectors of as many joints."""
-    chain, measured = problem.context.chain, list(problem.measured_joints)
+    measured = problem.measured_joints
     if len(measured) != 3 or problem.sigma.shape[1] != 3:
         return None
     moved = _directions(problem, by_error)
