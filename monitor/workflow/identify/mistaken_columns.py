@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
@@ -20,7 +20,7 @@ def with_mistake(
     """
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
-        return DataError(". ".join((str(refusal), *exchanged)))
+        return _with_sentences(refusal, exchanged)
     # Loaded here: only readings that contradict the file need the search.
     from monitor.discovery import find_mistakes
     from monitor.reporting.machine_finding import mistake_sentence
@@ -28,4 +28,8 @@ def with_mistake(
 
     mistakes = find_mistakes(campaign, problem_of, None)
     said = (mistake_sentence(mistakes_found(mistakes)),) if mistakes else column_doubts(campaign)
-    return DataError(". ".join((str(refusal), *said))) if said else refusal
+    return _with_sentences(refusal, said) if said else refusal
+
+
+def _with_sentences(refusal: DataError, said: Sequence[str]) -> DataError:
+    return DataError(". ".join((str(refusal), *(sentence[0].upper() + sentence[1:] for sentence in said))))
