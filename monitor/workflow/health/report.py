@@ -19,6 +19,7 @@ from typing import BinaryIO
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
+from monitor.reporting.health.attention import LOOKED_AT, attention
 from monitor.reporting.health.records import (
     ALARMS,
     Fleet,
@@ -61,8 +62,6 @@ KIND = "health"
 #: many machines, since a process starts in the time in which a machine or two are computed.
 MOST_WORKERS = 4
 MACHINES_A_WORKER = 4
-#: Machines that the first page draws: the most urgent, as many as leave room for the table.
-ATTENTION = 3
 
 
 def report(
@@ -93,13 +92,15 @@ def report(
         rows = _reported(db, machines, week, request, engine, progress)
         # Once all runs of the week are identified.
         looks = weekly_notices(db, week).of_machines({row.machine for row, _ in rows}, week.name)
+        drawn, alike = attention(stored_health(db, number) for _, number in rows[:LOOKED_AT])
         fleet = Fleet(
             week.name, week.first, week.last, moment, f"machine-health-monitor {__version__}", options.risk,
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
             noticed=tuple((notice.machine, weekly_sentence(notice)) for notice in looks.notices),
-            attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
+            attention=drawn,
+            alike=alike,
             anchor=last_anchor(db),
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
