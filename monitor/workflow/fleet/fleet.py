@@ -20,6 +20,7 @@ from monitor.store import (
     fleet_sums,
     latest_frames,
     latest_tolerances,
+    machines_with_runs,
     not_identified,
     refuted_machines,
     tolerance_types,
@@ -149,6 +150,10 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
         models_lacking=(unexplained_machines(db) or None) if request.model is None else None,
+        without_numbers=tuple(
+            name for name in machines_with_runs(db) if name not in set(sums.machine.tolist())
+        )
+        or None,
     )
 
 
