@@ -187,6 +187,7 @@ if TYPE_CHECKING:
     from monitor.store.type_tolerances import type_in_use as type_in_use
     from monitor.store.verification import (
         Verification as Verification,
+        unrecorded as unrecorded,
         verify_audit as verify_audit,
     )
     from monitor.store.withdrawals import (
@@ -235,7 +236,7 @@ else:
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",
             "turns": "Holder Patience",
             "type_tolerances": "type_in_use",
-            "verification": "Verification verify_audit",
+            "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",
         },
     )
