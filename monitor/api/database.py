@@ -174,7 +174,7 @@ def simulate(
     ``{"EC0B": 20, "EXX:poly1": 15}``, and ``method`` (its own plan), ``days``, ``noise_um`` and ``seed``. Without:
     ``effect`` is hidden in the virtual machine of the project, with ``peak_um``; ``noise_um``, ``seed``, ``robot``.
     ``like`` a campaign folder of yours: a campaign a month, of ``machines`` (names), from ``start`` ("2026-01-12") on
-    for ``months``, with ``drifts`` such as ``[("EY0A", 0.3)]`` (a month, in the parameter's unit; a third entry names one
+    for ``months``, with ``drifts`` such as ``[("EY0A", 0.3)]`` (a month, in the unit shown; a third entry names one
     machine), ``events`` such as ``[("2026-05-01", "EB0C", 9.0, "M3")]``, ``effect``, ``peak_um``, ``steady``, ``seed``.
     Raises InputError for another option or a value that cannot be, TopologyError, EffectError, and DataError for a
     machine on which the plan cannot be measured.
