@@ -58,7 +58,13 @@ def test_touches_follow_those_of_their_own_direction():
     begins = np.diff(axis[order], prepend=-1) != 0
     steps = np.where(begins, 1, np.diff(order, prepend=0)).astype(float)
     rows = Rows(
-        np.ones((1, 14), dtype=bool), 1, sign[None, :, None, None], begins[None], None, order[None], steps[None]
+        np.ones((1, 14), dtype=bool),
+        1,
+        sign[None, :, None, None],
+        begins[None],
+        None,
+        order[None],
+        steps[None],
     )
     whitening = Whitening(rows, correlation)
     filtered = np.array([whitening(unit[None])[0] for unit in np.eye(14)]).T

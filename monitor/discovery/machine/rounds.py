@@ -81,13 +81,16 @@ class ChainSearch:
         one that leaves out the suspects so far."""
         latest, settled = self._settled(first, beside_curves, None)
         # Of one run, effects may take up noise that walks, or noise an effect, and either stands under its own noise.
-        correlation = None if len(self.problem.runs) > 1 or beside_curves is not None else correlation_under(first)
+        correlation = (
+            None if len(self.problem.runs) > 1 or beside_curves is not None else correlation_under(first)
+        )
         if correlation is not None and latest.refined:
             other, other_settled = self._settled(first, beside_curves, correlation)
             if self._cost(other) < self._cost(latest):
                 latest, settled = other, other_settled
         reached = {
-            Limit.EFFECTS: len(latest.refined) >= (MOST_EFFECTS if beside_curves is None else MOST_BESIDE_CURVES),
+            Limit.EFFECTS: len(latest.refined)
+            >= (MOST_EFFECTS if beside_curves is None else MOST_BESIDE_CURVES),
             Limit.BAD_POINTS: len(latest.suspects.bad) >= MOST_BAD_POINTS,
             Limit.ROUNDS: not settled,
         }

@@ -38,7 +38,9 @@ class NoiseDoubt:
         fit = self._scene.fit
         likelihoods = fit.noise_design.likelihoods(fit.solution.last.residual)
         best = sorted(likelihoods, key=lambda each: -each[1])[:MOST_CORRELATIONS]
-        kept = [(correlation, weight) for correlation, weight in best if weight >= SMALLEST_WEIGHT * best[0][1]]
+        kept = [
+            (correlation, weight) for correlation, weight in best if weight >= SMALLEST_WEIGHT * best[0][1]
+        ]
         total = sum(weight for _, weight in kept)
         return [(weight / total, fit.with_correlation(correlation)) for correlation, weight in kept]
 

@@ -254,8 +254,8 @@ class NoiseDesign:
         return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
 
     def deviance(self, residual: Array, correlation: Correlation | None) -> float:
-        """Minus twice the logarithm of the restricted likelihood of residuals (R, N) under a correlation of the grid, at
-        the variance that makes it largest."""
+        """Minus twice the logarithm of the restricted likelihood of residuals (R, N) under a correlation of the grid,
+        at the variance that makes it largest."""
         index = GRID.index(GRID[0] if correlation is None else correlation)
         number = float(self._number[index])
         return float(self._criteria(*self._parts_of(residual))[index]) - number * float(np.log(number))
@@ -317,7 +317,9 @@ class NoiseDesign:
     def _numbers(self) -> float:
         """How many numbers were read."""
         rows = self.rows
-        read = rows.numbers * self._weighted if rows.read is None else rows.by_neighbours(rows.read)[self._runs]
+        read = (
+            rows.numbers * self._weighted if rows.read is None else rows.by_neighbours(rows.read)[self._runs]
+        )
         return float(np.sum(read))
 
     def _of_one_series(self, lag: int) -> Array:
