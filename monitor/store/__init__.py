@@ -14,6 +14,7 @@ from monitor.store.machine_models import (
     machine_model as machine_model,
     machine_models as machine_models,
     machines_of_method as machines_of_method,
+    machines_with_runs as machines_with_runs,
     not_identified as not_identified,
     save_machine_model as save_machine_model,
 )
@@ -186,6 +187,7 @@ if TYPE_CHECKING:
     from monitor.store.type_tolerances import type_in_use as type_in_use
     from monitor.store.verification import (
         Verification as Verification,
+        unrecorded as unrecorded,
         verify_audit as verify_audit,
     )
     from monitor.store.withdrawals import (
@@ -234,7 +236,7 @@ else:
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",
             "turns": "Holder Patience",
             "type_tolerances": "type_in_use",
-            "verification": "Verification verify_audit",
+            "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",
         },
     )

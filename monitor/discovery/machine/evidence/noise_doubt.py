@@ -38,11 +38,9 @@ class NoiseDoubt:
         fit = self._scene.fit
         likelihoods = fit.noise_design.likelihoods(fit.solution.last.residual)
         best = sorted(likelihoods, key=lambda each: -each[1])[:MOST_CORRELATIONS]
-        kept = [
-            (correlation, weight) for correlation, weight in best if weight >= SMALLEST_WEIGHT * best[0][1]
-        ]
-        total = sum(weight for _, weight in kept)
-        return [(weight / total, fit.with_correlation(correlation)) for correlation, weight in kept]
+        likely = [each for each in best if each[1] >= SMALLEST_WEIGHT * best[0][1]]
+        total = sum(weight for _, weight in likely)
+        return [(weight / total, fit.with_correlation(correlation)) for correlation, weight in likely]
 
     def p_value(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
         """Return the mean p-value of an effect beside others over the correlations, its searched values not counted."""
@@ -51,10 +49,10 @@ class NoiseDoubt:
 
 def _p_value(fit: Fit, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
     """The p-value of F of an effect beside others under the noise of a fit."""
-    made = [each.columns.T for each in columns_of(fit, [effect.basis for effect in (*others, candidate)])]
-    basis = orthonormal(np.concatenate([fit.nuisance.shared, *made[:-1]], axis=1))
+    designs = [each.columns.T for each in columns_of(fit, [effect.basis for effect in (*others, candidate)])]
+    basis = orthonormal(np.concatenate([fit.nuisance.shared, *designs[:-1]], axis=1))
     residual: Array = without(basis, fit.white.reshape(-1, 1))[:, 0]
-    columns = orthonormal(without(basis, made[-1]))
+    columns = orthonormal(without(basis, designs[-1]))
     rank = columns.shape[1]
     freedom = fit.degrees_of_freedom + fit.nuisance.shared_rank - basis.shape[1] - rank
     explained = float(np.sum((columns.T @ residual) ** 2))
