@@ -14,6 +14,7 @@ from monitor.store.machine_models import (
     machine_model as machine_model,
     machine_models as machine_models,
     machines_of_method as machines_of_method,
+    machines_with_runs as machines_with_runs,
     not_identified as not_identified,
     save_machine_model as save_machine_model,
 )

@@ -40,8 +40,9 @@ class VerifyAnswer:
 
     ``anchored_entry`` is the entry that the hash kept elsewhere is of. ``recomputed`` is how many identifications were
     computed anew, of ``recomputable`` that this version made; ``of_other_versions`` made others, which are not computed
-    anew. ``seed`` drew them; None where there was nothing to draw. ``signed_certificates`` is how many of the stored documents bear a signature,
-    ``trusted_signatures`` how many of these are of a trusted signer; None where nobody was named as such.
+    anew. ``seed`` drew them; None where there was nothing to draw. ``signed_certificates`` is how many of the stored
+    documents bear a signature, ``trusted_signatures`` how many of these are of a trusted signer; None where nobody
+    was named as such.
     """
 
     ok: bool

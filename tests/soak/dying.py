@@ -82,7 +82,9 @@ def _calls() -> int:
 
 def _arm(death: Death) -> None:
     if death.call:
-        ctypes.CDLL(None).die_before(ctypes.c_long(death.call), ctypes.c_int(max(1, int(1024 * death.share)) if death.torn else 0))
+        ctypes.CDLL(None).die_before(
+            ctypes.c_long(death.call), ctypes.c_int(max(1, int(1024 * death.share)) if death.torn else 0)
+        )
     elif death.processor_s:
         # Counts all threads of the process; nobody catches the signal.
         signal.setitimer(signal.ITIMER_PROF, death.processor_s)

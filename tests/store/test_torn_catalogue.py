@@ -92,9 +92,7 @@ class Crash:
 
 
 @pytest.fixture
-def crash(
-    tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
-) -> Crash:
+def crash(tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch) -> Crash:
     return Crash(tmp_path, make_campaign("one"), monkeypatch)
 
 
@@ -131,7 +129,10 @@ def test_who_may_only_read_a_torn_catalogue_is_told_who_puts_it_right(
     with monkeypatch.context() as patch:
         # As for a user who may not write: the file is not opened, and nothing put back.
         patch.setattr(kept_blocks.os, "open", _read_only(os.open))
-        with pytest.raises(StoreError, match=r"half a block .* may write the file"), LakeDatabase(crash.address):
+        with (
+            pytest.raises(StoreError, match=r"half a block .* may write the file"),
+            LakeDatabase(crash.address),
+        ):
             pass
     assert crash.catalogue.read_bytes() == torn
     crash.check()

@@ -22,7 +22,9 @@ def options(parser: ArgumentParser) -> None:
         help="only entries with all these words in time, user, action, subject or key",
     )
     parser.add_argument(
-        "--check", action="store_true", help="name entries that were edited, removed or put elsewhere, and what has none"
+        "--check",
+        action="store_true",
+        help="name entries that were edited, removed or put elsewhere, and what has none",
     )
 
 

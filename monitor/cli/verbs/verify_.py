@@ -26,7 +26,10 @@ def options(parser: ArgumentParser) -> None:
         help="how many identifications to compute anew from the stored readings (default 3)",
     )  # fmt: skip
     parser.add_argument(
-        "--seed", type=int, metavar="N", help="draw these as an earlier verification did that printed its seed"
+        "--seed",
+        type=int,
+        metavar="N",
+        help="draw these as an earlier verification did that printed its seed",
     )
     parser.add_argument(
         "--trust", type=Path, metavar="FILE",
@@ -38,7 +41,11 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
         trusted = options.trust or configuration().trusted_signers
-        answer = ask(db, keeping.verify, keeping.VerifyRequest(options.anchor, options.recompute, trusted, options.seed))
+        answer = ask(
+            db,
+            keeping.verify,
+            keeping.VerifyRequest(options.anchor, options.recompute, trusted, options.seed),
+        )
     if options.json:
         output.document(answer)
     else:

@@ -120,7 +120,9 @@ def _left_for_later(answer: WatchAnswer) -> list[str]:
 
 def _written(answer: WatchAnswer) -> list[str]:
     """The states of the report's machines, its files, and to whom a letter went."""
+    from monitor.reporting.health.records import state_in_words
+
     report = answer.report
-    lines = [] if report is None else [f"{row.machine}: {row.state}" for row in report.machines]
+    lines = [] if report is None else [f"{row.machine}: {state_in_words(row)}" for row in report.machines]
     lines += [] if report is None else report.files
     return [*lines, *(f"sent to {address}" for address in answer.mailed_to)]

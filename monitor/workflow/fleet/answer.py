@@ -58,6 +58,7 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
     part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
+    ``without_numbers`` are machines of which no run has numbers under that model, which no row stands for.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from.
     """
 
@@ -71,3 +72,4 @@ class FleetAnswer:
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     models_refuted: Mapping[str, RefutedCampaign] | None = field(default=None, metadata=OMITTED)
+    without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

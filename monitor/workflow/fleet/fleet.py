@@ -20,6 +20,7 @@ from monitor.store import (
     fleet_sums,
     latest_frames,
     latest_tolerances,
+    machines_with_runs,
     not_identified,
     refuted_machines,
     tolerance_types,
@@ -126,6 +127,10 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
+        without_numbers=tuple(
+            name for name in machines_with_runs(db) if name not in set(sums.machine.tolist())
+        )
+        or None,
     )
 
 
