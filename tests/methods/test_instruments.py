@@ -646,7 +646,7 @@ FAULTS = (
 def test_a_folder_with_a_fault_is_refused_with_what_would_be_right(
     file: str, before: str, after: str, words: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(CampaignError) as caught:
+    with pytest.raises(CampaignError, match="was refused, nothing of it was kept") as caught:
         read_campaign(damaged(tmp_path / "damaged", (file, before, after)))
     assert words in " ".join(str(fault.message) for fault in caught.value.faults)
 
