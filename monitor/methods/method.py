@@ -180,10 +180,29 @@ class SharesOf(Protocol):
 
 
 @dataclass(frozen=True)
+class SetupDrift:
+    """What a ``number`` of a ``setup`` ran off from its first row of a ``run`` to its last, beside what a fit knows.
+
+    ``size`` and ``u`` in mm, of ``angular`` readings what they come to at one metre; ``p`` is how often chance alone
+    makes one as large.
+    """
+
+    run: int
+    setup: str
+    number: str
+    size: float
+    u: float
+    p: float
+    angular: bool
+
+
+@dataclass(frozen=True)
 class Instruments(Able):
-    """Several instruments measure one machine; ``shares`` says what each of them does for a run."""
+    """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``drifts`` which of
+    their setups run off with the time."""
 
     shares: SharesOf
+    drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]
 
 
 @dataclass(frozen=True)

@@ -117,9 +117,11 @@ def _setup(setup: Setup) -> Iterator[str]:
     yield from ("", "[[setups]]", f"id = {_text(setup.id)}", f"reading = {_text(setup.reading)}")
     if setup.instrument is not None:
         yield f"instrument = {_text(setup.instrument)}"
+    unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
     if setup.standard_uncertainty is not None:
-        unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
         yield f"standard_uncertainty_{name} = {decimal_in(unit)(setup.standard_uncertainty)}"
+    if setup.drift_uncertainty is not None:
+        yield f"drift_standard_uncertainty_{name} = {decimal_in(unit)(setup.drift_uncertainty)}"
     if setup.turn_uncertainty is not None:
         yield f"standard_uncertainty_urad = {decimal_in(MICRORADIAN)(setup.turn_uncertainty)}"
     yield f"tool_point_mm = {_numbers(setup.tool_point)}"
@@ -139,6 +141,8 @@ def _setup(setup: Setup) -> Iterator[str]:
     yield from (f"{key} = {_text(getattr(setup, key))}" for key in ("side", "frame") if key in form.allows)
     if setup.known:
         yield f"known = [{', '.join(map(_text, setup.known))}]"
+    if setup.certificate is not None:
+        yield f"certificate = {_text(setup.certificate)}"
 
 
 def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:

@@ -23,6 +23,7 @@ IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 LARGEST_URAD = 1e5
 _LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
 _DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
+_DRIFT_UNCERTAINTY = "drift_standard_uncertainty"
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -31,7 +32,8 @@ BRANCHES: tuple[Branch, ...] = ("tool", "work")
 class ReadingFormat:
     """What a kind of reading asks of the file: its ``columns`` (those of ``optional`` may be empty or missing), whether
     they are angles, the keys that it needs, those that it allows, the unknowns that may be ``known``, and whether it
-    ``turns``: an orientation besides lengths, with an uncertainty of its own."""
+    ``turns``: an orientation besides lengths, with an uncertainty of its own; ``drifts``: whether its zero may be
+    stated to drift within a run."""
 
     columns: tuple[str, ...]
     angular: bool = False
@@ -40,6 +42,7 @@ class ReadingFormat:
     allows: tuple[str, ...] = ()
     holdable: tuple[str, ...] = ()
     turns: bool = False
+    drifts: bool = True
 
 
 ONE_LENGTH, ONE_ANGLE = ("reading_um",), ("reading_urad",)
@@ -58,13 +61,15 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
     "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), holdable=("zero",)),
     "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), holdable=("zero",)),
     "direction": ReadingFormat(
-        ("direction_x", "direction_y", "direction_z"), angular=True, needs=("tool_direction",), holdable=("frame",)
+        ("direction_x", "direction_y", "direction_z"), angular=True, needs=("tool_direction",), holdable=("frame",),
+        drifts=False,
     ),
     "point": ReadingFormat(
         POINTS, optional=("point_z_mm",), allows=("tool_direction",), holdable=("frame", "targets")
     ),
     "pose": ReadingFormat(
-        (*POINTS, *QUATERNION), allows=("tool_direction",), holdable=("frame", "targets"), turns=True
+        (*POINTS, *QUATERNION), allows=("tool_direction",), holdable=("frame", "targets"), turns=True,
+        drifts=False,
     ),
 })  # fmt: skip
 
@@ -119,6 +124,7 @@ def _setup(table: Table) -> Setup | None:
         known=_known(table, form),
         turn_uncertainty=_stated(table, "urad") if form.turns else None,
         certificate=table.text("certificate"),
+        drift_uncertainty=_drift(table, form) if form.drifts else None,
     )
     table.finish()
     return None if len(table.faults) > before else setup
@@ -147,14 +153,25 @@ def _uncertainty(table: Table, form: ReadingFormat) -> float | None:
     return _stated(table, right)
 
 
-def _stated(table: Table, name: str) -> float | None:
+def _drift(table: Table, form: ReadingFormat) -> float | None:
+    """The standard uncertainty of the drift over a run in mm or rad; None where it is not stated."""
+    right, wrong = ("urad", "um") if form.angular else ("um", "urad")
+    other = f"{_DRIFT_UNCERTAINTY}_{wrong}"
+    if other in table.data:
+        table.raw(other, required=False, example="")
+        what = "an angle" if form.angular else "a length"
+        table.fault(other, f"the reading is {what}: write {_DRIFT_UNCERTAINTY}_{right}")
+    return _stated(table, right, _DRIFT_UNCERTAINTY, "2.0")
+
+
+def _stated(
+    table: Table, name: str, stem: str = "standard_uncertainty", example: str = "0.5"
+) -> float | None:
     """A standard uncertainty in mm or rad, written in ``um`` or ``urad``; None where it is not stated."""
     unit, largest = (
         (MICRORADIAN, LARGEST_URAD) if name == "urad" else (MICROMETRE, MICROMETRE.to_display(FARTHEST_MM))
     )
-    value = table.number(
-        f"standard_uncertainty_{name}", positive=True, largest=largest, unit=name, example="0.5"
-    )
+    value = table.number(f"{stem}_{name}", positive=True, largest=largest, unit=name, example=example)
     return None if value is None else unit.to_internal(value)
 
 

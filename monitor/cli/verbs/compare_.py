@@ -17,7 +17,7 @@ from monitor.workflow.explain.compare_answer import (
     MachinePart,
 )
 from monitor.workflow.explain.request import CompareRequest
-from monitor.workflow.instruments.answer import Disagreement
+from monitor.workflow.instruments.answer import Disagreement, RunsWithTime
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
@@ -48,14 +48,32 @@ def run(options: Namespace) -> int:
     residual_output.summary(answer.comparison)
     if answer.instruments_disagree is not None:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
+    for drift in answer.run_with_time or ():
+        _drift(answer.comparison.campaign, drift)
     _breakdown(answer)
     residual_output.files(answer.figures)
     return 0
 
 
+def _chance(by_chance: float) -> str:
+    """How often chance does such a thing, in words."""
+    percent = 100.0 * by_chance
+    return f"at most {percent:.1g} %" if percent >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
+
+
+def _drift(campaign: str, drift: RunsWithTime) -> None:
+    number = f" ({drift.number})" if drift.number != "reading" else ""
+    output.say(
+        f"setup {drift.setup}{number} in run {drift.run} runs with the time: {drift.size:+.3g} {drift.unit} from its "
+        f"first row to its last, u = {drift.u:.2g} {drift.unit}, one of {drift.comparisons} looked at; chance alone "
+        f"makes one as large in {_chance(drift.by_chance)} of campaigns. It drifts, or the model lacks what the plan "
+        f"went through in order: `monitor explain {campaign}` weighs both; a drift belongs into u, as "
+        "drift_standard_uncertainty_um or _urad of the setup"
+    )
+
+
 def _disagreement(campaign: str, apart: Disagreement) -> None:
-    percent = 100.0 * apart.by_chance
-    chance = f"at most {percent:.1g} %" if percent >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
+    chance = _chance(apart.by_chance)
     output.say(
         f"{apart.parameter} in run {apart.run}: {apart.first} and {apart.second} disagree, E_n = {apart.e_n:.2f}, the "
         f"largest of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "

@@ -45,7 +45,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     chain = chain_of(campaign.machine)
     context = context_of(campaign, chain)
     number = campaign.probings.channels[SETUP].astype(np.int64) - 1
-    parts = _parts(chain, context, setups, number)
+    parts = _parts(campaign, chain, context, number)
     used = tuple(setups[index] for index in np.unique(number))
     texts = replace(model, base=model.base or instrument_base(chain, used))
     # A level alone sees no location error: then no effect is free in every run.
@@ -84,13 +84,13 @@ def _absent(context: Context, added: tuple[ParsedEffect, ...]) -> dict[str, str]
 
 
 def _parts(
-    chain: Chain, context: Context, setups: tuple[Setup, ...], number: npt.NDArray[np.int64]
+    campaign: Campaign, chain: Chain, context: Context, number: npt.NDArray[np.int64]
 ) -> tuple[Part, ...]:
     """Every setup that has rows. The outer frame of the first direction is the machine's; another one floats."""
     runs = np.searchsorted(np.unique(context.run), context.run)
     parts: list[Part] = []
     for index in np.unique(number):
-        setup = setups[index]
+        setup = campaign.artefact.setups[index]
         kind = readings()[setup.reading]
         at = np.flatnonzero(number == index)
         rows = Rows(
@@ -100,6 +100,7 @@ def _parts(
             measured=np.column_stack([_column(context, name)[at] for name in kind.columns]),
             positions=context.positions[at],
             nominal=context.nominal[at],
+            elapsed=_elapsed(context.time[at], runs[at]),
             guess=np.zeros((len(at), 0)),
         )
         reading: Reading
@@ -107,8 +108,31 @@ def _parts(
         if isinstance(reading, Direction) and "frame" not in setup.known:
             floating = any(isinstance(part.reading, Direction) for part in parts)
             reading = replace(reading, floating=floating)
-        parts.append(Part(setup.id, reading, rows, at, setup.instrument or ""))
+        drift = setup.drift_uncertainty
+        if drift is not None:
+            _refuse_one_moment(campaign, setup, rows)
+            drift *= LEVER if kind.angular else 1.0
+        parts.append(Part(setup.id, reading, rows, at, setup.instrument or "", drift))
     return tuple(parts)
+
+
+def _elapsed(time: Array, run: npt.NDArray[np.int64]) -> Array:
+    """The times (m,) from 0 at the first row of their run to 1 at the last; 0 where all rows have one time."""
+    elapsed = np.zeros(len(time))
+    for number in np.unique(run):
+        of_run = run == number
+        since = time[of_run] - time[of_run].min()
+        elapsed[of_run] = since / max(float(since.max()), np.finfo(np.float64).tiny)
+    return elapsed
+
+
+def _refuse_one_moment(campaign: Campaign, setup: Setup, rows: Rows) -> None:
+    """DataError where rows of a setup that drifts all have one time."""
+    if len(rows) > 1 and not rows.elapsed.any():
+        raise DataError(
+            f"campaign {campaign.name}, setup {setup.id}: it states a drift, and all its rows have the same time_s; "
+            "write when each row was measured, or leave the drift out"
+        )
 
 
 def _places(context: Context, parts: tuple[Part, ...]) -> Array:

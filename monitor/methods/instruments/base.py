@@ -205,6 +205,7 @@ def _generic_problem(
             measured=rng.uniform(-PLACES, PLACES, (count, len(kind.columns))),
             positions=positions,
             nominal=np.tile(nominal, (count, 1)),
+            elapsed=np.zeros(count),
             guess=np.zeros((count, 0)),
         )
         reading, rows = kind.of(placed, rows)

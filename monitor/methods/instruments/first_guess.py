@@ -24,15 +24,15 @@ LINES = frozenset({"zero", "slope"})
 def guess_with_lines(part: Part, runs: int, nominal: Orientation) -> Array:
     """The first guess (R, q) of the unknowns of a setup; ``nominal`` is how the sides of a machine without errors stand
     at all rows."""
-    guess = part.reading.start(runs)
-    lines = [index for index, name in enumerate(part.reading.unknowns) if name in LINES]
+    guess = part.start(runs)
+    lines = [index for index, name in enumerate(part.unknowns) if name in LINES]
     if not lines:
         return guess
     rows, values = part.rows, guess[part.rows.run]
     none = np.zeros((len(rows), len(rows.chain.joints), 2, 6))
     pose = evaluate(rows.chain, rows.positions, none, *part.reading.ends(values, rows))
     stance = stance_at(pose.residual, nominal, part.at)
-    shown = part.reading.shown(replace(stance, nominal=stance), values, rows)
+    shown = part.shown(replace(stance, nominal=stance), values)
     assert shown.by_own is not None
     for run in np.unique(rows.run):
         of_run = rows.run == run

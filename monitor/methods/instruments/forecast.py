@@ -182,7 +182,7 @@ class InstrumentForecast:
         if setup.reading == "direction":
             rows = Rows(
                 self.chain, np.zeros(count, dtype=np.int64), np.full(count, setup.id), np.zeros((count, 3)),
-                test.positions, np.full((count, 3), np.nan), np.zeros((count, 0)),
+                test.positions, np.full((count, 3), np.nan), np.zeros(count), np.zeros((count, 0)),
             )  # fmt: skip
             return Direction(setup).pointed(rows)
         if setup.reading == "point":

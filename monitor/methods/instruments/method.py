@@ -11,6 +11,7 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.drifts import drifts
 from monitor.methods.instruments.forecast import InstrumentForecast
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.shares import shares
@@ -65,7 +66,7 @@ METHOD = ChainMethod(
     base_effects=usual_base,
     trial_rows=150,
     taken_up=without_numbers,
-    instruments=Instruments(shares),
+    instruments=Instruments(shares, drifts),
     standards=StandardTests(standard_tests),
     plan=InstrumentPlan(InstrumentForecast),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),

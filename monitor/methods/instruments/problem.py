@@ -70,7 +70,7 @@ class InstrumentProblem(ChainProblem):
         several = len(self.parts) > 1
         names: dict[int, str] = {}
         for part, columns in zip(self.parts, self.own_columns, strict=True):
-            for name, column in zip(part.reading.unknowns, columns.tolist(), strict=True):
+            for name, column in zip(part.unknowns, columns.tolist(), strict=True):
                 names.setdefault(column, f"{part.id} {name}" if several else name)
         return tuple(names.values())
 
@@ -81,8 +81,8 @@ class InstrumentProblem(ChainProblem):
         return tuple(
             np.array(
                 [
-                    column_of.setdefault((name, part.reading.shared.get(name, index)), len(column_of))
-                    for name in part.reading.unknowns
+                    column_of.setdefault((name, part.shared(name, index)), len(column_of))
+                    for name in part.unknowns
                 ],
                 dtype=np.int64,
             )
@@ -212,7 +212,7 @@ class InstrumentProblem(ChainProblem):
         vectors = evaluate(context.chain, context.positions, errors, work, tool).residual
         inverse = np.zeros((len(self.context), 3, self.sigma.shape[1]))
         for part, values in self._with_own(self.own_start):
-            shown = part.reading.shown(self._stance_of(part, vectors, self._nominal), values, part.rows)
+            shown = part.shown(self._stance_of(part, vectors, self._nominal), values)
             along = shown.along if shown.along is not None else shown.by_shift
             assert along is not None
             inverse[part.at, :, : along.shape[1]] = np.linalg.pinv(along)
@@ -252,7 +252,7 @@ class InstrumentProblem(ChainProblem):
         by_error = np.zeros((count, numbers, len(context.chain.joints), 2, 6)) if jacobian else None
         for (part, values), columns in zip(self._with_own(nuisance), self.own_columns, strict=True):
             at = part.at
-            shown = part.reading.shown(self._stance_of(part, pose.residual, sides), values, part.rows)
+            shown = part.shown(self._stance_of(part, pose.residual, sides), values)
             kinds = shown.residual.shape[1]
             residual[at, :kinds] = np.nan_to_num(shown.residual)
             if shown.by_own is not None:
@@ -363,7 +363,7 @@ class InstrumentProblem(ChainProblem):
         u_of = {
             int(columns[index]): u
             for part, columns in zip(self.parts, self.own_columns, strict=True)
-            for index, u in part.reading.prior()
+            for index, u in part.prior()
         }
         return tuple(u_of.items())
 
@@ -400,7 +400,7 @@ class InstrumentProblem(ChainProblem):
         staying = {
             int(columns[index])
             for part, columns in zip(self.parts, self.own_columns, strict=True)
-            for index, name in enumerate(part.reading.unknowns)
+            for index, name in enumerate(part.unknowns)
             if name in part.reading.staying
         }
         rows = [number for number, (index, _) in enumerate(self._priors) if index in staying]

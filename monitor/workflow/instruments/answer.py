@@ -53,6 +53,22 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
+class RunsWithTime:
+    """A ``number`` of a ``setup`` that runs off with the time, by ``size`` from its first row of a ``run`` to its last,
+    beside what the model says, with standard uncertainty ``u``, both in ``unit``; chance alone makes one as large among
+    so many ``comparisons`` in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound)."""
+
+    run: int
+    setup: str
+    number: str
+    unit: str
+    size: float
+    u: float
+    comparisons: int
+    by_chance: float
+
+
+@dataclass(frozen=True)
 class ParameterShares:
     """A parameter of the joint fit: ``parts`` are what each instrument adds to u as a standard uncertainty (u² is the
     sum of their squares); ``known_beforehand`` is the part of lengths and beams that the setups state.
