@@ -27,7 +27,10 @@ class AxisAt:
 
 @dataclass(frozen=True)
 class GrossReadingNoted(Sentence):
-    """A reading that is wrong beyond doubt: where it stands in the file; ``others`` may be the wrong one instead."""
+    """A reading that is wrong beyond doubt: where it stands in the file; ``others`` may be the wrong one instead.
+
+    ``is_along_surface``: the touch stands elsewhere on its surface than in the other runs.
+    """
 
     run: int
     sequence: int
@@ -37,6 +40,7 @@ class GrossReadingNoted(Sentence):
     size: float
     axis: str
     others: tuple[int, ...]
+    is_along_surface: bool = False
 
     def __str__(self) -> str:
         stands = f" at {' '.join(map(str, self.pose))}" if self.pose else ""
@@ -44,9 +48,14 @@ class GrossReadingNoted(Sentence):
         size = f"{MICROMETRE.to_display(self.size):+.3g} µm" if small else f"{self.size:+.3g} mm"
         others = ", ".join(map(str, self.others))
         instead = f" (or sequence {others}: these readings cannot say which)" if others else ""
+        holds = (
+            "the other runs touched the surface elsewhere, and only a flat one hides that"
+            if self.is_along_surface
+            else "no number of this run holds"
+        )
         return (
             f"run {self.run}: sequence {self.sequence}, {self.target_word} {self.target}{stands}, is off by {size} in "
-            f"{self.axis}{instead}: no number of this run holds; correct or remove the row in probings.csv, withdraw "
+            f"{self.axis}{instead}: {holds}; correct or remove the row in probings.csv, withdraw "
             "the campaign and import it again"
         )
 

@@ -21,6 +21,15 @@ import numpy.typing as npt
 import scipy
 
 from monitor.machine import MOTION
+from monitor.methods.chain.along_surface import along_surface
+from monitor.methods.chain.deviation import (
+    FEWEST_RUNS,
+    LEAST_TIMES,
+    MOST_PART,
+    MOST_ROWS,
+    Deviation,
+    plan_touches,
+)
 from monitor.methods.chain.least_squares import Linearisation, RunSpace, Solution, space_of_run
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
@@ -30,10 +39,6 @@ from monitor.records import Array
 SHARE = 0.3
 #: Probability that the noise of all rows together has such a row: far below what any later test asks for.
 LEVEL = 1e-6
-#: A gross row is off by so many stated standard uncertainties: where nothing but rounding is left, some row is largest.
-LEAST_TIMES = 8.0
-#: More than so many rows of one run, and this part of them, are no single mistakes.
-MOST_ROWS, MOST_PART = 10, 0.1
 #: Directions in which less than this part of a row's variance is left are followed by the run's own unknowns. Without a
 #: ball of the bar the whole run may shrink to a point, gains of -1: of such a row 2e-6 are left.
 CHECKED = 1e-3
@@ -42,27 +47,12 @@ CHECKED = 1e-3
 USUAL_PART = 0.01
 #: By so much narrower is that expectation (1 µrad, 1 µm/m) where the run would rather be no machine than bear a row.
 HELD = 1e3
-#: So many runs with the same targets are needed before the others say that one is wrong.
-FEWEST_RUNS = 3
 #: Within a run two rows may be wrong alike; the second is as likely where it lowers the sum of squares as much.
 AS_LIKELY = 0.95
 #: The same touch, off by the same in so many runs and in this part of them, is an error of the machine at that pose:
 #: the runs' vectors lie within this part of their mean. What is further off than an effect may be (50 µm) is a mistake
 #: in the program of the plan, in however many runs.
 FEWEST_ALIKE, PART_ALIKE, SPREAD_ALIKE = 2, 0.5, 0.5
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """How far a row is off: ``vector`` (d,) mm, ``chi_square`` in stated standard uncertainties.
-
-    ``others`` are rows of the same run that explain the same residual as well: the plan cannot say which it was.
-    """
-
-    row: int
-    vector: tuple[float, ...]
-    chi_square: float
-    others: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,7 +69,8 @@ class GrossReading:
     """A row that is grossly off, as people find it: its ``axis`` or column is off by ``size`` mm.
 
     ``pose`` are the joints that the plan moved. ``others`` are the sequences
-    of rows of the same run that may be wrong instead.
+    of rows of the same run that may be wrong instead. ``is_along_surface``: the touch stands elsewhere on its surface
+    than in the other runs, which the numbers of its run show little of or nothing.
     """
 
     row: int
@@ -91,6 +82,7 @@ class GrossReading:
     size: float
     chi_square: float
     others: tuple[int, ...]
+    is_along_surface: bool = False
 
 
 @dataclass(frozen=True)
@@ -254,7 +246,7 @@ def _alike_in_all_runs(problem: ChainProblem, readings: Sequence[Deviation]) -> 
     if len(readings) < FEWEST_ALIKE or len(problem.runs) < FEWEST_ALIKE:
         return set()
     vector_of = {reading.row: reading.vector for reading in readings}
-    touches = _touches(problem)
+    touches = plan_touches(problem)
     alike: set[int] = set()
     for touch in np.unique(touches[list(vector_of)]):
         rows = [row for row in vector_of if touches[row] == touch]
@@ -268,23 +260,6 @@ def _alike_in_all_runs(problem: ChainProblem, readings: Sequence[Deviation]) -> 
         if apart <= SPREAD_ALIKE * length and length <= problem.largest_effect[0]:
             alike.update(rows)
     return alike
-
-
-def _touches(problem: ChainProblem) -> npt.NDArray[np.int64]:
-    """The touch of the plan (n,) that every row is: the same number for the same target, pose and occurrence."""
-    context = problem.context
-    measured = problem.measured_joints
-    posed = [joint for joint in range(len(context.chain.joints)) if joint not in measured]
-    poses = np.round(context.positions[:, posed], 6) + 0.0
-    numbers: dict[tuple[object, ...], int] = {}
-    counted: dict[tuple[object, ...], int] = {}
-    touches = np.empty(len(context), dtype=np.int64)
-    for row in range(len(context)):
-        key = (str(context.target[row]), *poses[row].tolist())
-        in_run = (int(context.run[row]), *key)
-        counted[in_run] = counted.get(in_run, -1) + 1
-        touches[row] = numbers.setdefault((*key, counted[in_run]), len(numbers))
-    return touches
 
 
 def deviations(problem: ChainProblem, local: Array, common: Array) -> list[Deviation]:
@@ -309,7 +284,8 @@ def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviat
     """The gross rows among those that the run's own unknowns follow, by the places of the other runs.
 
     Between runs the targets may be placed anew as a whole (``problem.moved_together``), but not each by itself. Empty
-    for problems whose targets have no places, and with fewer than three runs.
+    for problems whose targets have no places, and with fewer than three runs; without a touch that half of the runs
+    contradict.
     """
     placement = problem.moved_together
     count = len(problem.base_names)
@@ -340,7 +316,22 @@ def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviat
         readings += [
             reading for reading in _of_run(held, sigma, len(problem.context)) if followed[reading.row]
         ]
-    return readings
+    return _of_few_runs(problem, readings)
+
+
+def _of_few_runs(problem: ChainProblem, readings: Sequence[Deviation]) -> list[Deviation]:
+    """The readings but those of a touch that contradicts half of the runs or more: nobody can say which are right.
+
+    A ball that is touched where an axis hardly moves before has its backlash on one side on one day, on the other the
+    next; without this ball of the bar in any run all of them would shrink to a point.
+    """
+    touches, runs = plan_touches(problem), problem.context.run
+    marked = [int(touches[reading.row]) for reading in readings]
+    return [
+        reading
+        for reading, touch in zip(readings, marked, strict=True)
+        if 2 * marked.count(touch) < len(np.unique(runs[touches == touch]))
+    ]
 
 
 def _checked(problem: ChainProblem, solution: Solution) -> npt.NDArray[np.bool_]:
@@ -357,11 +348,14 @@ def off_reading(problem: ChainProblem, by_error: Array, row: int, vector: Array)
     """The reading that explains most of the residual (d,) of a row, and by how much it is off, in mm.
 
     ``by_error`` (n, 3, J, 2, 6) are the derivatives of the chain's vectors by its errors. A row that stands apart from
-    the others of its target (``far_off``) has the whole ``vector`` (3,) from them: the part of it that the method
-    measures may be small.
+    the others of its target (``far_off``), or elsewhere on its surface, has the whole ``vector`` (3,) from them: the
+    part of it that the method measures may be small.
     """
     chain = problem.context.chain
+    is_whole = len(vector) > len(problem.components)
     linear = problem.measured_joints
+    if is_whole:
+        linear = tuple(index for index, joint in enumerate(chain.joints) if not joint.turns)
     if not linear:
         most = int(np.abs(vector).argmax())
         return problem.components[most], float(vector[most])
@@ -369,7 +363,7 @@ def off_reading(problem: ChainProblem, by_error: Array, row: int, vector: Array)
         [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
     )
     shifts = np.einsum("nrac,ac->nra", by_error[:, :, linear, MOTION, :3], directions)
-    measured = shifts if problem.far_off[row] else problem.observe(shifts)
+    measured = shifts if is_whole or problem.far_off[row] else problem.observe(shifts)
     off = np.linalg.pinv(measured[row]) @ vector
     most = int(np.abs(off).argmax())
     return chain.joints[linear[most]].name.lower(), float(off[most])
@@ -397,6 +391,7 @@ def as_reading(problem: ChainProblem, by_error: Array, deviation: Deviation) -> 
         size=size,
         chi_square=deviation.chi_square,
         others=tuple(int(context.sequence[other]) for other in deviation.others),
+        is_along_surface=len(deviation.vector) > len(problem.components),
     )
 
 
@@ -404,10 +399,12 @@ def gross_readings(problem: ChainProblem, solution: Solution | None = None) -> t
     """The gross readings of a problem, before any fit of it and, where there is a ``solution``, under that."""
     local, common = problem.start, problem.common_start
     by_row = {deviation.row: deviation for deviation in deviations(problem, local, common)}
+    elsewhere = {deviation.row: deviation for deviation in along_surface(problem)}
     if solution is not None:
         local, common = solution.local, solution.common
         later = [*deviations(problem, local, common), *against_other_runs(problem, solution)]
         by_row |= {deviation.row: deviation for deviation in later}
+    by_row |= elsewhere
     if not by_row:
         return ()
     by_error = problem.evaluated(local, common, jacobian=True).by_error

@@ -44,7 +44,7 @@ def gross_noted(reading: GrossReading, target_word: str) -> GrossReadingNoted:
     )
     return GrossReadingNoted(
         reading.run, reading.sequence, target_word, reading.target, pose, reading.size, reading.axis,
-        tuple(reading.others),
+        tuple(reading.others), reading.is_along_surface,
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 from monitor.discovery import Fit
@@ -21,10 +22,10 @@ from monitor.workflow.uncertainty.result import Behind
 from monitor.workflow.uncertainty.sources import (
     all_sources,
     axes_stated,
-    contained,
     counted_columns,
     length_reference,
     refuse_twice,
+    shown_part,
     stated,
 )
 
@@ -71,7 +72,7 @@ def beside_readings(
     of_days = (between_days(components),) if adds_days else ()
     counted = counted_columns(
         run.run, run.sensitivity.unknowns, campaign, number, sources,
-        contained(source.kind, components.days, adds_days),
+        shown_part(source.kind, _runs_of_days(fit, campaign), adds_days),
     )  # fmt: skip
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
@@ -86,6 +87,12 @@ def beside_readings(
         ),
         bool(linear) and linear <= axes_stated(sources, chain),
     )
+
+
+def _runs_of_days(fit: Fit, campaign: Campaign) -> list[int]:
+    """How many runs of the fit each of its days has."""
+    day = {run.run: run.day for run in campaign.runs}
+    return list(Counter(day[int(number)] for number in fit.problem.runs).values())
 
 
 def _gains(fit: Fit, names: tuple[str, ...]) -> tuple[str, ...]:

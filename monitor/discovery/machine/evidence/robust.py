@@ -14,15 +14,9 @@ import numpy as np
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.exceptions import DataError
-from monitor.methods.chain.gross import (
-    FEWEST_RUNS,
-    LEAST_TIMES,
-    Deviation,
-    GrossReading,
-    against_other_runs,
-    as_reading,
-    deviations,
-)
+from monitor.methods.chain.along_surface import along_surface
+from monitor.methods.chain.deviation import FEWEST_RUNS, LEAST_TIMES, Deviation
+from monitor.methods.chain.gross import GrossReading, against_other_runs, as_reading, deviations
 from monitor.methods.chain.problem import ChainProblem
 
 #: Marking and fitting in turn; two suffice where the errors of the machine are small.
@@ -54,6 +48,8 @@ def robust_fit(problem: ChainProblem) -> RobustFit:
     gross |= {
         deviation.row: deviation for deviation in deviations(problem, problem.start, problem.common_start)
     }
+    # After those, whose number tells by how much alone: a touch that stands elsewhere tells by which reading too.
+    gross |= {deviation.row: deviation for deviation in along_surface(problem)}
     current = _without(problem, gross)
     for _ in range(MOST_ROUNDS):
         solution = current.solution
