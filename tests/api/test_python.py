@@ -88,6 +88,14 @@ def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: 
     assert campaign.explain("warm").missing == ()
 
 
+def test_several_effects_are_added_in_one_version(db: mm.Database) -> None:
+    campaign = db.campaign("five-days")
+    version = campaign.add(["EXX:reversal", "EYY:reversal"], "plays").content.model.version
+    assert version.effects == ("EXX:reversal", "EYY:reversal")
+    with pytest.raises(InputError, match="name an effect to add, or several"):
+        campaign.add([])
+
+
 def test_answers_of_all_kinds_are_tables(db: mm.Database) -> None:
     campaign = db.campaign("five-days")
     u = campaign.uncertainty(method="guf").table()

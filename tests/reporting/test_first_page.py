@@ -157,7 +157,11 @@ def test_a_quiet_week_says_so() -> None:
             "the measurements.",
         ),
         (AWAY, "fine", "No machine could be stated to be fine."),
-        (machine("M", "no change seen", probability_out=0.01), "unjudged", "Not against every tolerance: M."),
+        (
+            machine("M", "no change seen", probability_out=0.01),
+            "unjudged",
+            "Not every parameter has a tolerance: M.",
+        ),
         (machine("M", "no change seen"), "unjudged", "Nothing was judged: no tolerances are stated."),
         (machine("M", "model fails"), "unjudged", "Nothing was judged: no tolerances are stated."),
         (

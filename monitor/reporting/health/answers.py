@@ -326,7 +326,7 @@ def _unjudged(fleet: Fleet) -> str:
         for state, phrase in (
             (State.NOT_MEASURED, "not measured this week"),
             (State.NOT_EVALUATED, "measured but not evaluated"),
-            (State.NO_CHANGE_SEEN, "not against every tolerance"),
+            (State.NO_CHANGE_SEEN, "not every parameter has a tolerance"),
         )
         if (rows := [row for row in fleet.rows if row.state == state and row not in open_rows])
     ]
