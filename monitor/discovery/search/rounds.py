@@ -35,13 +35,13 @@ def in_rounds(searched: Searched[RoundT], most: int) -> tuple[RoundT, bool]:
     Whoever waits is told a share in which the present round is the last: another one takes it back.
     """
     for number in range(most):
-        begun, ended = (_share(number, done) for done in (0.0, 1.0))
-        told(begun)
-        with within(begun, begun + UP_TO_JUDGEMENT * (ended - begun)):
+        start, end = _share(number, 0.0), _share(number, 1.0)
+        told(start)
+        with within(start, start + UP_TO_JUDGEMENT * (end - start)):
             current = searched.round()
             told(1.0)
         standing = searched.judged(current)
-        told(ended)
+        told(end)
         if standing is not None:
             return standing, True
     return current, False
