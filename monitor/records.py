@@ -261,8 +261,8 @@ class Setup:
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
     that in which a vector is read; ``known`` names the unknowns held as stated; ``certificate`` is the instrument's.
-    ``drift_uncertainty`` (mm or rad) is the standard uncertainty of what its numbers drift from its first row of a run to
-    its last, None where they do not.
+    ``drift_uncertainty`` (mm or rad) is the standard uncertainty of what its numbers drift from its first row of a run
+    to its last, None where they do not.
     """
 
     id: str

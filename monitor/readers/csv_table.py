@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
+from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.spreadsheet import plain_csv
 
@@ -40,7 +41,11 @@ def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
-    lines = plain_csv(text).split("\n")
+    plain = plain_csv(text)
+    if is_cut(plain):
+        faults.add(file, plain.count("\n") + 1, None, CUT)
+        return None
+    lines = plain.split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)

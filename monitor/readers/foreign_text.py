@@ -6,6 +6,7 @@ import codecs
 import re
 
 from monitor.readers.csv_table import LONGEST_LINE, MOST_LINES
+from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.faults import Faults
 
 #: Control characters that no text has; tab, line ends, form feed, the end-of-file mark of DOS and the separators 0x0F
@@ -32,6 +33,9 @@ def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str]
             name, line, None,
             f"character 0x{ord(binary[0]):02x}: this is no text file; export the measurement as text or CSV",
         )  # fmt: skip
+        return None
+    if is_cut(text):
+        faults.add(name, text.count("\n") + 1, None, CUT)
         return None
     if text.count("\n") > MOST_LINES:
         faults.add(name, None, None, f"the file has more than {MOST_LINES} lines; split it")

@@ -32,8 +32,8 @@ BRANCHES: tuple[Branch, ...] = ("tool", "work")
 class ReadingFormat:
     """What a kind of reading asks of the file: its ``columns`` (those of ``optional`` may be empty or missing), whether
     they are angles, the keys that it needs, those that it allows, the unknowns that may be ``known``, and whether it
-    ``turns``: an orientation besides lengths, with an uncertainty of its own; ``drifts``: whether its zero may be stated
-    to drift within a run."""
+    ``turns``: an orientation besides lengths, with an uncertainty of its own; ``drifts``: whether its zero may be
+    stated to drift within a run."""
 
     columns: tuple[str, ...]
     angular: bool = False

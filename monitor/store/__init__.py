@@ -142,6 +142,7 @@ if TYPE_CHECKING:
     from monitor.store.past.lack_of_fit import (
         RefutedMachine as RefutedMachine,
         refuted_machines as refuted_machines,
+        unexplained_machines as unexplained_machines,
     )
     from monitor.store.past.machine_runs import (
         MachineDescription as MachineDescription,
@@ -225,7 +226,7 @@ else:
             "save_model",
             "past.fleet": "BlockCut FleetSums fleet_sums",
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
-            "past.lack_of_fit": "RefutedMachine refuted_machines",
+            "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
             "probing_counts",

@@ -4,7 +4,8 @@
 40 µrad, 10 µm/m), readings of ``tests/simulator/four_instruments.py``, which shares no code with the package. A region
 is the ellipsoid of the stated covariance at 95 % (chi-square, JCGM 102, 6.5.2). ``--heavy``: noise of Student's t with
 three degrees of freedom and the same standard deviation; ``--drift``: the machine grows by 2 µm in X in the R-test's
-hour, ``--stated``: and the R-test states that it drifts by so much; ``--pitch``: the effect of the example, which the model lacks; ``--bar``: the ball bar alone, in three planes.
+hour, ``--stated``: and the R-test states that it drifts by so much; ``--pitch``: the effect of the example, which the
+model lacks; ``--bar``: the ball bar alone, in three planes.
 ``--told``: how often `explain` finds something, `compare` says that something is missing or that instruments disagree,
 and `contributions` has an E_n above 1; ``--first``: the first seed.
 ``--session``: three runs of a day with one bar, the first with a laser too; ``--days``: the same on three days;

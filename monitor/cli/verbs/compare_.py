@@ -66,8 +66,8 @@ def _drift(campaign: str, drift: RunsWithTime) -> None:
     output.say(
         f"setup {drift.setup}{number} in run {drift.run} runs with the time: {drift.size:+.3g} {drift.unit} from its "
         f"first row to its last, u = {drift.u:.2g} {drift.unit}, one of {drift.comparisons} looked at; chance alone "
-        f"makes one as large in {_chance(drift.by_chance)} of campaigns. It drifts, or the model lacks what the plan went "
-        f"through in order: `monitor explain {campaign}` weighs both; a drift belongs into u, as "
+        f"makes one as large in {_chance(drift.by_chance)} of campaigns. It drifts, or the model lacks what the plan "
+        f"went through in order: `monitor explain {campaign}` weighs both; a drift belongs into u, as "
         "drift_standard_uncertainty_um or _urad of the setup"
     )
 

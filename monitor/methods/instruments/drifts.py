@@ -4,8 +4,9 @@ A drift that the model lacks is added to the numbers of one setup in one run, in
 row to its last, and judged by one step from the joint point (score test: C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948)
 50). Of the column of a drift only what the unknowns of the fit do not do counts: a plan that goes one way once shows no
 drift, one that comes back to its first pose does. Where the readings of a setup scatter more than it states, their own
-scatter judges (Student's t); less never makes a drift surer. An effect of the machine that is missing runs with the time too, in plans that go one way at a
-time; then the readings contradict each other besides, so what leaves most of that is no drift.
+scatter judges (Student's t); less never makes a drift surer. An effect of the machine that is missing runs with the
+time too, in plans that go one way at a time; then the readings contradict each other besides, so what leaves most of
+that is no drift.
 """
 
 from __future__ import annotations

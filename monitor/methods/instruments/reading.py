@@ -41,8 +41,8 @@ def in_mm(name: str, values: Array) -> Array:
 class Rows:
     """The m rows of one setup: ``run`` (m,) indices of their runs from 0, ``target`` (m,) names, ``measured`` (m, k)
     the columns of their kind in mm (NaN where one was not read), ``positions`` (m, J), ``nominal`` (m, 3) where the
-    target stands by the file, NaN where that is not said, ``elapsed`` (m,) the time from 0 at the setup's first row of the
-    run to 1 at its last, ``guess`` (m, g) constants of a kind: where its search begins."""
+    target stands by the file, NaN where that is not said, ``elapsed`` (m,) the time from 0 at the setup's first row of
+    the run to 1 at its last, ``guess`` (m, g) constants of a kind: where its search begins."""
 
     chain: Chain
     run: npt.NDArray[np.int64]

@@ -253,6 +253,13 @@ class NoiseDesign:
         relative = np.exp(-0.5 * (criteria - criteria.min()))
         return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
 
+    def deviance(self, residual: Array, correlation: Correlation | None) -> float:
+        """Minus twice the logarithm of the restricted likelihood of residuals (R, N) under a correlation of the grid,
+        at the variance that makes it largest."""
+        index = GRID.index(GRID[0] if correlation is None else correlation)
+        number = float(self._number[index])
+        return float(self._criteria(*self._parts_of(residual))[index]) - number * float(np.log(number))
+
     def _parts_of(self, residual: Array) -> tuple[Array, Array]:
         """What of residuals (R, N) says how neighbours resemble each other."""
         return self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
@@ -335,8 +342,12 @@ class NoiseDesign:
         able = whites.able
         fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
         squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
-        number = self._share * (self._numbers - able.sum(axis=(1, 2)))
-        return np.asarray(self._share * whites.logarithm + number * np.log(np.maximum(squares, 1e-300)))
+        return np.asarray(self._share * whites.logarithm + self._number * np.log(np.maximum(squares, 1e-300)))
+
+    @cached_property
+    def _number(self) -> Array:
+        """The degrees of freedom (C,) under every correlation."""
+        return np.asarray(self._share * (self._numbers - self._whites.able.sum(axis=(1, 2))))
 
     @cached_property
     def _whites(self) -> _Whites:

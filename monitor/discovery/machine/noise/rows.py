@@ -8,6 +8,7 @@ stand between, and a face that is touched from the other side shows the same dri
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,8 @@ import numpy.typing as npt
 from monitor.machine import MOTION
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
+
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,9 @@ class Rows:
         """How many of the N numbers are of readings."""
         return int(self.weighted.shape[1]) * self.numbers
 
-    def by_neighbours(self, touches: Array, runs: npt.NDArray[np.int64] | None = None) -> Array:
+    def by_neighbours(
+        self, touches: npt.NDArray[ScalarT], runs: npt.NDArray[np.int64] | None = None
+    ) -> npt.NDArray[ScalarT]:
         """What stands by touch (R, T, ...) in the order of neighbours; ``runs`` (R,) are those that it is of."""
         if self.order is None:
             return touches
@@ -70,8 +75,7 @@ def rows_of(problem: ChainProblem) -> Rows:
 def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
     """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
     no vectors of as many joints."""
-    measured = problem.measured_joints
-    if len(measured) != 3 or problem.sigma.shape[1] != 3:
+    if len(problem.measured_joints) != 3 or problem.sigma.shape[1] != 3:
         return None
     moved = _directions(problem, by_error)
     # Directions are at right angles but for errors of microradians.
