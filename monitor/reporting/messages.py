@@ -55,6 +55,16 @@ def machines_refuted(machines: Mapping[str, str], most: int) -> str:
     )
 
 
+def machines_lacking(machines: Mapping[str, str], most: int) -> str:
+    """Return which ``machines`` (with their latest campaigns) have a latest comparison that misses something."""
+    named = ", ".join(f"{machine} ({campaign})" for machine, campaign in list(machines.items())[:most])
+    more = f" and {len(machines) - most} more" if len(machines) > most else ""
+    return (
+        f"the latest comparison says that the model lacks something: {named}{more}; "
+        f"type `monitor explain {next(iter(machines.values()))}`"
+    )
+
+
 def attention_words(attention: str, season_not_told: bool | None) -> str:
     """Return the class of a parameter of the fleet; of a slope that may be a season not that it drifts."""
     return _MOVES.get(attention, attention) if season_not_told else attention

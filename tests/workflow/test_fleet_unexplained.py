@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from monitor.readers import read_campaign
+from monitor.reporting.messages import machines_lacking
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
@@ -33,3 +34,11 @@ def test_named_from_the_comparison_until_the_effect_is_added(tmp_path: Path) -> 
         assert fleet(db, FleetRequest()).models_lacking is None
         # Asked of a version by its name, the page of that version judges it.
         assert fleet(db, FleetRequest("samba@1")).models_lacking is None
+
+
+def test_the_command_line_names_the_machine_and_what_to_type() -> None:
+    said = machines_lacking({"A": "a-1", "B": "b-1", "C": "c-1"}, 2)
+    assert said == (
+        "the latest comparison says that the model lacks something: A (a-1), B (b-1) and 1 more; "
+        "type `monitor explain a-1`"
+    )

@@ -12,7 +12,7 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
-from monitor.reporting.messages import attention_words, machines_refuted
+from monitor.reporting.messages import attention_words, machines_lacking, machines_refuted
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
@@ -90,6 +90,8 @@ def _say_of_machines(answer: FleetAnswer) -> None:
     if answer.models_refuted:
         latest = {machine: refuted.campaign for machine, refuted in answer.models_refuted.items()}
         output.say(machines_refuted(latest, MOST_NAMED))
+    if answer.models_lacking:
+        output.say(machines_lacking(answer.models_lacking, MOST_NAMED))
 
 
 def _cells(row: FleetTableRow) -> list[str]:
