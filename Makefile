@@ -90,7 +90,7 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 concurrency: setup  ## eight importers and twenty readers at one database for ten minutes (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/concurrency.py $(ARGS)
 
-kills: setup  ## thirteen verbs killed 500 times at random moments (docs/reliability.md)
+kills: setup  ## eighteen verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
 
 soak: setup  ## a shop for an hour: imports, reports, pages, publishing and kills together (docs/reliability.md)

@@ -24,6 +24,18 @@ def listening(tell: Callable[[float], None]) -> Iterator[None]:
         _THREAD.tell = outer
 
 
+@contextmanager
+def within(low: float, high: float) -> Iterator[None]:
+    """Let what the block tells, from 0 to 1, count from ``low`` to ``high`` of the whole."""
+    tell: Callable[[float], None] | None = getattr(_THREAD, "tell", None)
+    if tell is None:
+        yield
+        return
+    outer = tell
+    with listening(lambda share: outer(low + (high - low) * share)):
+        yield
+
+
 def is_awaited() -> bool:
     """Return whether anybody listens to what this thread does."""
     return getattr(_THREAD, "tell", None) is not None

@@ -32,4 +32,4 @@ def checkpoint() -> None:
     """Raise StoppedError where the work of this thread was taken back."""
     stop: threading.Event | None = getattr(_THREAD, "stop", None)
     if stop is not None and stop.is_set():
-        raise StoppedError
+        raise StoppedError("the work was taken back")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from monitor.api.answer import Answer
 from monitor.api.asking import Ask, drawn
 from monitor.api.tables import parameter_table, run_table, table_of
+from monitor.exceptions import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,17 +71,29 @@ class Campaign:
         return drawn(self._ask, "explain", campaign=self.name, model=model, **options)
 
     def add(
-        self, effect: str, name: str | None = None, *, to: str | None = None, note: str = ""
+        self, effect: str | Sequence[str], name: str | None = None, *, to: str | None = None, note: str = ""
     ) -> Answer[ChangeModelAnswer]:
-        """Add an effect to the model ``to`` (by default the method's own); the answer has the error before and after in
-        ``history``, RMS in µm on the fitted and on held-out runs.
+        """Add an effect to the model ``to`` (by default the method's own), or several at once: of two that take each
+        other's part neither shows what it is worth alone. The answer has the error before and after in ``history``, RMS
+        in µm on the fitted and on held-out runs.
 
         ``name`` is that of the new model; without one the name ``to`` means the new version from now on. Raises
-        EffectError for an effect that cannot be read.
+        EffectError for an effect that cannot be read, InputError where none is named.
         """
+        first, *beside = (effect,) if isinstance(effect, str) else tuple(effect) or ("",)
+        if not first:
+            raise InputError("name an effect to add, or several: campaign.add(['EXX:reversal', 'EXX:poly2'])")
         model = self.method if to is None else to
         return Answer(
-            self._ask("add effect", effect=effect, to=model, new_name=name, note=note, campaign=self.name)
+            self._ask(
+                "add effect",
+                effect=first,
+                beside=tuple(beside),
+                to=model,
+                new_name=name,
+                note=note,
+                campaign=self.name,
+            )
         )
 
     def uncertainty(self, run: int | None = None, **options: Any) -> Answer[UncertaintyAnswer]:

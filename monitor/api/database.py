@@ -5,6 +5,7 @@ from __future__ import annotations
 import getpass
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from monitor.workflow.fleet.answer import FleetAnswer
     from monitor.workflow.health.request import ReportAnswer
     from monitor.workflow.intake.importing import ImportAnswer
+    from monitor.workflow.likeness import LikeAnswer
     from monitor.workflow.model.answer import ModelsAnswer
     from monitor.workflow.simulation import SimulateAnswer, SimulateMachineAnswer
     from monitor.workflow.trend.answer import TrendAnswer
@@ -163,18 +165,28 @@ def simulate(
     topology: str | None = None,
     *,
     errors: Mapping[str, float | Sequence[float]] | None = None,
+    like: str | Path | None = None,
     **options: Any,
-) -> Answer[SimulateAnswer] | Answer[SimulateMachineAnswer]:
+) -> Answer[SimulateAnswer] | Answer[SimulateMachineAnswer] | Answer[LikeAnswer]:
     """Write a virtual campaign folder: of a machine of a ``topology`` with chosen ``errors``, or of one of ours.
 
     With a ``topology``, such as ``"w C B X b Z Y (C1) t"``: ``errors`` in µm, µrad and µm/m by effect, such as
     ``{"EC0B": 20, "EXX:poly1": 15}``, and ``method`` (its own plan), ``days``, ``noise_um`` and ``seed``. Without:
     ``effect`` is hidden in the virtual machine of the project, with ``peak_um``; ``noise_um``, ``seed``, ``robot``.
+    ``like`` a campaign folder of yours: a campaign a month, of ``machines`` (names), from ``start`` ("2026-01-12") on
+    for ``months``, with ``drifts`` such as ``[("EY0A", 0.3)]`` (a month, in the unit shown; a third entry names one
+    machine), ``events`` such as ``[("2026-05-01", "EB0C", 9.0, "M3")]``, ``effect``, ``peak_um``, ``steady``, ``seed``.
     Raises InputError for another option or a value that cannot be, TopologyError, EffectError, and DataError for a
     machine on which the plan cannot be measured.
     """
     from monitor.workflow import simulation
 
+    if like is not None:
+        if topology is not None or errors is not None:
+            raise InputError(
+                "like has the topology and the errors of its campaign; leave out topology and errors"
+            )
+        return _simulated_like(out, like, options)
     if topology is None:
         if errors is not None:
             raise InputError("errors needs topology, the machine that has them; without it there is effect")
@@ -189,3 +201,26 @@ def simulate(
     wanted = {**options, "out": Path(out), "topology": topology, "errors": sizes}
     with options_as_arguments(simulation.SimulateMachineRequest):
         return Answer(simulation.simulate_machine(request_of(simulation.SimulateMachineRequest, wanted)))
+
+
+def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) -> Answer[LikeAnswer]:
+    """Write campaigns like that of a folder."""
+    from monitor.workflow import likeness
+
+    def day(written: date | str) -> date:
+        try:
+            return written if isinstance(written, date) else date.fromisoformat(written)
+        except ValueError as fault:
+            raise InputError(f"'{written}' is no day; write 2026-01-12") from fault
+
+    values = {**options, "out": Path(out), "like": str(like)}
+    for name, example in (("machines", '("M1", "M2")'), ("start", '"2026-01-12"')):
+        if name not in values:
+            raise InputError(f"like needs {name}, such as {name}={example}")
+    machines = values["machines"]
+    values["machines"] = (machines,) if isinstance(machines, str) else tuple(machines)
+    values["start"] = day(values["start"])
+    with options_as_arguments(likeness.LikeRequest):
+        values["drifts"] = tuple(likeness.Drift(*drift) for drift in values.get("drifts", ()))
+        values["events"] = tuple(likeness.Step(day(on), *step) for on, *step in values.get("events", ()))
+        return Answer(likeness.simulate_like(request_of(likeness.LikeRequest, values)))

@@ -6,20 +6,17 @@ Exit status 0: done; 1: the answer is no; 2: bad input or usage, with one plain 
 from __future__ import annotations
 
 import contextlib
-import gc
 import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
 
+from monitor.cli.garbage import collect_rarely
 from monitor.cli.parser import parse
 from monitor.exceptions import InputError, MonitorError
 
 DONE, NO, BAD_INPUT, OUR_FAULT = 0, 1, 2, 3
 
-#: Objects made before Python looks for cycles among them (700). While modules are loaded it finds none, and looking
-#: takes a tenth of the time of a verb that reads; arrays are freed without it.
-GARBAGE_THRESHOLD = 100_000
 #: What says how many threads the linear algebra has, which reads it when it is loaded.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -27,7 +24,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; the exit status."""
     if arguments is None:
-        gc.set_threshold(GARBAGE_THRESHOLD, *gc.get_threshold()[1:])
+        collect_rarely()
         _one_thread()
     typed = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):

@@ -88,10 +88,8 @@ def _remaining(explanation: MachineExplanation) -> None:
             f"; RMS of {explanation.target_word}s on the tool {um(remaining.carried_rms_um)} µm, of those beside the "
             f"machine {um(remaining.resting_rms_um)} µm"
         )
-    output.say(
-        f"with all of this in the model {um(remaining.deviation_um)} µm remain where "
-        f"{um(remaining.stated_uncertainty_um)} µm are stated{parts}"
-    )
+    expected = um(explanation.comparison.expected_rms_um)
+    output.say(f"with all of this in the model: RMS {um(remaining.rms_um)} µm, expected {expected} µm{parts}")
 
 
 def _curve(explanation: CurveExplanation) -> None:

@@ -152,7 +152,7 @@ def _table(answer: TrendAnswer) -> None:
     columns = {heading: cells for heading, cells in columns.items() if any(text != "-" for text in cells)}
     slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
-        f"{answer.machine}: {_size(answer)}{slopes}",
+        f"{answer.machine}: {_size(answer)}; latest: mean of the n runs of the last day{slopes}",
         ["parameter", "relative to", *(_HEADINGS.get(heading, heading) for heading in columns)],
         [
             [name, answer.refers_to.get(name, ""), *cells]
@@ -402,10 +402,14 @@ def _backtest(answer: TrendAnswer) -> Iterator[str]:
     )
     name = min(tests, key=lambda parameter: tests[parameter].share_inside)
     yield (
-        f"backtest, each day forecast from the days before it: {inside} of {forecasts} later values "
+        f"backtest of {_all_of(len(tests))}, each day forecast from the days before it: {inside} of {forecasts} values "
         f"({100 * inside / forecasts:.0f} %) inside the 95 % forecast interval; least for {name}, "
         f"{tests[name].inside} of {tests[name].forecasts}"
     )
+
+
+def _all_of(count: int) -> str:
+    return "the one parameter" if count == 1 else f"all {count} parameters together"
 
 
 def _crossing(interval: Between | None) -> str:

@@ -55,10 +55,12 @@ def _turns(chain: Chain) -> Iterable[str]:
 
 def _heat(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> Iterable[str]:
     spindle = [f"E{axis}{joint.name}:const" for joint in chain.of_kind("spindle") for axis in "XYZAB"]
+    # Screws stretch also where a method takes their gains as known.
+    gains = [f"E{COMPONENTS[joint.main]}{joint.name}:poly1" for joint in chain.of_kind("linear")]
     # What follows a driver already has only one.
     plain = [text for text in base if not parse_effect(text, chain).driver_text]
     for driver in drivers:
-        for effect in (*plain, *spindle):
+        for effect in (*plain, *gains, *spindle):
             yield f"{effect}@{driver}"
 
 
@@ -71,6 +73,14 @@ def _weight(chain: Chain) -> Iterable[str]:
 def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
     """Return the effects of balls on stems, for methods that touch them."""
     return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))
+
+
+def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
+    """Return what grows beyond the last axis of the tool where no spindle stands in the chain: a shift of the tool."""
+    if not chain.tool or chain.of_kind("spindle"):
+        return ()
+    last = chain.tool[-1].name
+    return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
 
 
 def of_tracker(

@@ -7,15 +7,19 @@ A driver is one small class like a shape. Another one is one more file of ``driv
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol, Self
+
+import numpy as np
 
 from monitor.effects.context import Context
 from monitor.effects.description import Explanation
 from monitor.effects.joint_error import JointError
 from monitor.effects.registry import BuiltIn
+from monitor.exceptions import EffectError
 from monitor.records import Array
-from monitor.units import ONE, Unit
+from monitor.units import MINUTE, ONE, Unit
 
 
 class Driver(Protocol):
@@ -74,3 +78,31 @@ class SettlingDriver(HeatDriver, ABC):
     @abstractmethod
     def columns(self, context: Context, joint: int | None) -> Array:
         """Return the multipliers (n, m) at every probing."""
+
+
+@dataclass(frozen=True)
+class ExponentialDriver(SettlingDriver):
+    """The driver 1 - exp(-t / tau) of a kind of time; ``NAME`` or ``NAME45min`` in an effect."""
+
+    #: Its name in an effect.
+    name: ClassVar[str]
+    #: Where the search begins, in s, as long as the constant is neither given nor searched.
+    typical_time_constant_s: ClassVar[float]
+
+    @classmethod
+    def of(cls, groups: Mapping[str, str]) -> Self:
+        if "minutes" not in groups:
+            return cls()
+        minutes = float(groups["minutes"])
+        if minutes == 0:
+            raise EffectError(f"the time constant of @{cls.name} must be above 0 min")
+        return cls(time_constant_s=MINUTE.to_internal(minutes))
+
+    @abstractmethod
+    def time(self, context: Context) -> Array:
+        """Return the time (n,) in s since it began to settle."""
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        """Return the approach (n, 1) to what it settles at."""
+        tau = self.typical_time_constant_s if self.time_constant_s is None else self.time_constant_s
+        return np.asarray(-np.expm1(-self.time(context) / tau)[:, None])

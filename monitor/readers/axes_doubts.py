@@ -2,7 +2,8 @@
 
 Two places that are probed at one pose differ by their declared step, turned as the rotary axes stand. Where all of
 these stand at zero nothing is turned: the steps of the readings are the declared ones, axis by axis. Distances alone
-do not show an exchange, which leaves them as they are.
+do not show an exchange, which leaves them as they are. A piece without declared places whose touches have normals has
+faces: steps between touches of one face lie in it.
 """
 
 from __future__ import annotations
@@ -13,23 +14,35 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, TELLING_SHARE, declared_places, off_places, pairs
+from monitor.readers.unit_doubts import (
+    DISTANCE_TOLERANCE,
+    TELLING_SHARE,
+    ZERO_RAD,
+    declared_places,
+    off_places,
+    pairs,
+)
 from monitor.records import Array, Campaign
 
 AXES = "XYZ"
 #: Steps from which on an arrangement is told: three places.
 FEWEST_STEPS = 3
+#: What holds for steps between declared places, and for those between touches of one face.
+DECLARED, IN_THE_FACE = "are the declared ones", "lie in that face"
+#: A normal with a component above this points along an axis; a face tilted by a degree has 0.9998.
+ALONG_AN_AXIS = 0.999
 
 
 @dataclass(frozen=True)
 class MistakenAxes:
     """Linear ``axes`` whose columns fit the declared places exchanged (``turned`` is false), or of the other sign
-    (true; one axis); ``count`` steps between ``noun`` say so."""
+    (true; one axis); ``count`` steps between ``noun`` say so, of which then ``holds`` is true."""
 
     noun: str
     axes: str
     turned: bool
     count: int
+    holds: str = DECLARED
 
 
 def mistaken_axes(campaign: Campaign) -> MistakenAxes | None:
@@ -39,8 +52,10 @@ def mistaken_axes(campaign: Campaign) -> MistakenAxes | None:
     declared = declared_places(campaign)
     machine, probings = campaign.machine, campaign.probings
     by_hand = "placement" in probings.channels
-    if declared is None or machine.chain or by_hand or not all(axis in probings.readings for axis in AXES):
+    if machine.chain or by_hand or not all(axis in probings.readings for axis in AXES):
         return None
+    if declared is None:
+        return _out_of_their_faces(campaign)
     steps, nominal = pairs(campaign, declared.places, at_zero=True)
     if len(nominal) < FEWEST_STEPS or off_places(campaign) is not None:
         return None
@@ -51,6 +66,61 @@ def mistaken_axes(campaign: Campaign) -> MistakenAxes | None:
         if _share_off(arranged, nominal) <= TELLING_SHARE / 2:
             return MistakenAxes(declared.noun, axes, turned, len(nominal))
     return None
+
+
+def _out_of_their_faces(campaign: Campaign) -> MistakenAxes | None:
+    """Axes whose columns look exchanged by the steps between touches of one face, by their stated normals, in the first
+    run at the pose with all rotary axes at zero; where several exchanges would do, the axes of all of them."""
+    steps, normal = _steps_in_faces(campaign)
+    if not len(steps) or _out_of_face(steps, normal) <= TELLING_SHARE:
+        return None
+    fitting = [
+        axes
+        for axes, turned, arranged in _arrangements(steps)
+        if not turned and _out_of_face(arranged, normal) <= TELLING_SHARE / 2
+    ]
+    if not fitting:
+        return None
+    # A turn of all three is told where no exchange of two does.
+    axes = "".join(axis for axis in AXES if any(axis in pair for pair in fitting if len(pair) == 2)) or AXES
+    return MistakenAxes("touches of one face", axes, False, len(steps), IN_THE_FACE)
+
+
+def _steps_in_faces(campaign: Campaign) -> tuple[Array, Array]:
+    """The steps (n, 3) in mm between touches with one normal along an axis, and that normal's axis as 1 in (n, 3)."""
+    probings = campaign.probings
+    names = [f"normal_{axis}" for axis in "xyz"]
+    if not all(name in probings.channels for name in names):
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    rows = probings.run == probings.run[0]
+    for axis, values in probings.readings.items():
+        if not campaign.machine.is_linear(axis):
+            rows &= np.abs(values) < ZERO_RAD
+    rows &= ~np.isin(probings.target, [ball.id for ball in campaign.artefact.balls])
+    normal = np.column_stack([probings.channels[name][rows] for name in names])
+    read = np.column_stack([probings.readings[axis][rows] for axis in AXES])
+    steps, along = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for axis in range(3):
+        for side in (1.0, -1.0):
+            face = read[side * normal[:, axis] > ALONG_AN_AXIS]
+            if len(face) < 2:
+                continue
+            of_face = face[1:] - face[:-1]
+            of_face = of_face[np.linalg.norm(of_face, axis=1) > 0.0]
+            steps.append(of_face)
+            along.append(np.tile(np.eye(3)[axis], (len(of_face), 1)))
+    return np.concatenate(steps), np.concatenate(along)
+
+
+def _out_of_face(steps: Array, normal: Array) -> float:
+    """The largest share of the steps, by the axis of the normal, that leave their face by more than the tolerance."""
+    leaves = np.abs(np.sum(steps * normal, axis=1)) > DISTANCE_TOLERANCE * np.linalg.norm(steps, axis=1)
+    shares = [
+        float(np.mean(leaves[normal[:, axis] == 1.0]))
+        for axis in range(3)
+        if np.sum(normal[:, axis] == 1.0) >= FEWEST_STEPS
+    ]
+    return max(shares, default=0.0)
 
 
 def _signs(campaign: Campaign) -> Array:

@@ -60,13 +60,22 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _travel,
             _angles,
             _places,
-            _columns,
+            exchanged_columns,
             _units_of_runs,
             _statements,
             _temperatures,
             _days,
             _to_come,
         )
+        for sentence in check(campaign)
+    )
+
+
+def column_doubts(campaign: Campaign) -> tuple[str, ...]:
+    """The sentences on columns exchanged, of the other sign or in another unit, each of which refutes a fit."""
+    return tuple(
+        sentence
+        for check in (_travel, _angles, _places, exchanged_columns, _units_of_runs)
         for sentence in check(campaign)
     )
 
@@ -159,19 +168,19 @@ def _places(campaign: Campaign) -> Iterator[str]:
     )
 
 
-def _columns(campaign: Campaign) -> Iterator[str]:
-    """Columns of linear axes that are exchanged, or have the other sign."""
+def exchanged_columns(campaign: Campaign) -> Iterator[str]:
+    """Yield the sentence on columns of linear axes that are exchanged, or have the other sign; nothing for none."""
     mistaken = mistaken_axes(campaign)
     if mistaken is None:
         return
     columns = _and([f"{axis.lower()}_mm" for axis in mistaken.axes])
     yield (
-        f"at the pose with all rotary axes at zero the {mistaken.count} steps between {mistaken.noun} are the declared "
+        f"at the pose with all rotary axes at zero the {mistaken.count} steps between {mistaken.noun} "
+        f"{mistaken.holds} only with "
         + (
-            f"ones only with the other sign of {columns}: check the sign of [machine.axes.{mistaken.axes}] and of the "
-            "column"
+            f"the other sign of {columns}: check the sign of [machine.axes.{mistaken.axes}] and of the column"
             if mistaken.turned
-            else f"ones only with {columns} exchanged: check the order of the columns"
+            else f"{columns} exchanged: check the order of the columns"
         )
         + ", and whether the artefact stands as it is declared"
     )

@@ -146,6 +146,12 @@ def sexagesimal(text: str, unit: str | None = None) -> Decimal | None:
     return -size if match["sign"] == "-" else size
 
 
+def has_full_parts(text: str) -> bool:
+    """Whether a cell with minutes and seconds is none because one of these reaches 60, as rounding makes of 59.999."""
+    match = _SEXAGESIMAL.fullmatch(text.strip())
+    return match is not None and sexagesimal(text) is None
+
+
 def as_angle(unit: ForeignUnit) -> ForeignUnit:
     """Return the unit of an angle: hours there are hours of angle, 15 degrees each; any other as it is."""
     return _BY_SPELLING["hourangle"] if unit.name == "h" else unit

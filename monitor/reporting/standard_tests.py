@@ -24,12 +24,12 @@ AXIS_FIGURES: Mapping[str, tuple[str, str]] = {
 }
 #: Kind of a figure of a circle: symbol and name of ISO 230-4:2005, clause 3, with the plane and the sense of rotation.
 _CIRCLE_FIGURES: Mapping[str, tuple[str, str]] = {
-    "circular": ("G_{plane}", "circular deviation, {sense}"),
+    "circular": ("G_{plane}", "circular deviation about its least-squares circle, {sense}"),
     "minimum_zone": ("G_{plane} zone", "circular deviation between minimum-zone circles, {sense}"),
-    "largest": ("F_{plane} max", "largest radial deviation, {sense}"),
-    "smallest": ("F_{plane} min", "smallest radial deviation, {sense}"),
-    "both": ("G(b)", "bi-directional circular deviation"),
-    "hysteresis": ("H", "circular hysteresis"),
+    "largest": ("F_{plane} max", "largest radial deviation about the centre of G, {sense}"),
+    "smallest": ("F_{plane} min", "smallest radial deviation about the centre of G, {sense}"),
+    "both": ("G(b)", "bi-directional circular deviation about the least-squares circle of both senses"),
+    "hysteresis": ("H", "circular hysteresis about the centre of G(b)"),
 }
 
 

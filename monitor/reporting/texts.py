@@ -25,6 +25,9 @@ ENGLISH = "en"
 _SYMBOL = re.compile(r"\b(k|R|u)_(q|p|C|P|day|Tag)\b")
 #: SHA-256 in hexadecimal digits.
 _HASH = re.compile(r"\b[0-9a-f]{64}\b")
+#: A space between a number and its unit, and on both sides of a sign between a symbol and its number.
+_NUMBER_AND_UNIT = re.compile(r"(?<=[0-9]) (?=(?:%|°C|K|mm|[µn]m(?:/m)?|[µm]?rad(?:/m)?|arcsec)(?![\w]))")
+_SYMBOL_AND_NUMBER = re.compile(r"(?<=\b[A-Za-z]) ([=±<>]) (?=[−+-]?[0-9])")
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
 
 
@@ -60,10 +63,18 @@ class Texts:
 def with_subscripts(text: str) -> Markup:
     """A sentence for a page, its symbols (``k_q``) set with subscripts; text that is no markup is escaped.
 
-    A hash in it goes on in the next line without a hyphen, which would be copied with it.
+    Its numbers stay with their units; a hash in it goes on in the next line without a hyphen, which would be copied
+    with it.
     """
-    marked = _SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))
+    marked = _SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(with_bound_units(text))))
     return Markup(_HASH.sub(r'<span class="hash">\g<0></span>', marked))
+
+
+def with_bound_units(text: str) -> str:
+    """A sentence, or markup, in which no line ends between a number and its unit or a symbol and its number."""
+    bound = _NUMBER_AND_UNIT.sub("\N{NO-BREAK SPACE}", text)
+    bound = _SYMBOL_AND_NUMBER.sub("\N{NO-BREAK SPACE}\\1\N{NO-BREAK SPACE}", bound)
+    return Markup(bound) if isinstance(text, Markup) else bound
 
 
 @cache

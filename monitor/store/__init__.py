@@ -14,6 +14,7 @@ from monitor.store.machine_models import (
     machine_model as machine_model,
     machine_models as machine_models,
     machines_of_method as machines_of_method,
+    machines_with_runs as machines_with_runs,
     not_identified as not_identified,
     save_machine_model as save_machine_model,
 )
@@ -141,6 +142,7 @@ if TYPE_CHECKING:
     from monitor.store.past.lack_of_fit import (
         RefutedMachine as RefutedMachine,
         refuted_machines as refuted_machines,
+        unexplained_machines as unexplained_machines,
     )
     from monitor.store.past.machine_runs import (
         MachineDescription as MachineDescription,
@@ -186,6 +188,7 @@ if TYPE_CHECKING:
     from monitor.store.type_tolerances import type_in_use as type_in_use
     from monitor.store.verification import (
         Verification as Verification,
+        unrecorded as unrecorded,
         verify_audit as verify_audit,
     )
     from monitor.store.withdrawals import (
@@ -223,7 +226,7 @@ else:
             "save_model",
             "past.fleet": "BlockCut FleetSums fleet_sums",
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
-            "past.lack_of_fit": "RefutedMachine refuted_machines",
+            "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
             "probing_counts",
@@ -234,7 +237,7 @@ else:
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",
             "turns": "Holder Patience",
             "type_tolerances": "type_in_use",
-            "verification": "Verification verify_audit",
+            "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",
         },
     )

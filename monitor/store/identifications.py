@@ -146,13 +146,13 @@ def last_identification(db: Database) -> int:
     return int(number)
 
 
-def identification_numbers(db: Database, software_version: str) -> list[int]:
-    """Return the numbers of the identifications that a version made of campaigns that count."""
+def identification_numbers(db: Database, software_version: str | None = None) -> list[int]:
+    """Return the numbers of the identifications of campaigns that count; only those that a version made, if named."""
     return [
         int(number)
         for (number,) in db.rows(
             "SELECT identification_id FROM identification AS i JOIN campaign USING (campaign_id) "
-            "WHERE i.software_version = ? ORDER BY ALL",
+            "WHERE i.software_version = coalesce(?, i.software_version) ORDER BY ALL",
             [software_version],
         )
     ]

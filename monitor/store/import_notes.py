@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -23,8 +24,8 @@ from monitor.units import CONDITION_SUFFIXES
 #: With two or three coordinates a probing, or a finer print, it does not.
 FEWEST_PROBINGS = 12
 
-#: A folder imported again and again under new names gives a sentence for each of the first, a list of the rest.
-SENTENCES = 3
+#: A folder imported again and again under new names: so many campaigns, and runs of each, are named.
+MOST_CAMPAIGNS, MOST_PAIRS = 5, 5
 
 
 def run_fingerprints(touches: Probings) -> dict[int, str]:
@@ -106,19 +107,26 @@ def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
         [campaign],
     )
     copies = [(key, list(rows)) for key, rows in groupby(repeated, key=lambda row: row[:3])]
-    for (other, its_machine, machine), rows in copies[:SENTENCES]:
-        pairs = [(run, same) for *_, run, same in rows]
-        shown = ", ".join(f"{run} (there {same})" for run, same in pairs[:5]) + ", ..." * (len(pairs) > 5)
-        of = "" if machine == its_machine else f" of machine {its_machine}"
-        notes.append(
-            f"{len(pairs)} run{'s' * (len(pairs) > 1)} of {campaign} equal those of campaign {other}{of} in every "
-            f"reading, which two measurements never do: run {shown}; withdraw the copy (monitor withdraw)"
-        )
-    more = [str(other) for (other, *_), _ in copies[SENTENCES:]]
-    if more:
-        shown = ", ".join(more[:10]) + ", ..." * (len(more) > 10)
-        notes.append(
-            f"{len(more)} more campaign{'s hold' if len(more) > 1 else ' holds'} runs that equal those of {campaign}: "
-            f"{shown}"
-        )
-    return tuple(notes)
+    return (*notes, _copied(campaign, copies)) if copies else tuple(notes)
+
+
+def _copied(campaign: str, copies: Sequence[tuple[tuple[Any, ...], list[tuple[Any, ...]]]]) -> str:
+    """One sentence on all campaigns that hold runs of this one, however often it was imported."""
+    count = len({run for _, rows in copies for *_, run, _ in rows})
+    head = f"{count} run{'s' * (count > 1)} of {campaign} equal{'s' * (count == 1)}"
+    never = "in every reading, which two measurements never do"
+    named = [_named(key, rows) for key, rows in copies[:MOST_CAMPAIGNS]]
+    if len(copies) == 1:
+        ((other, pairs),) = named
+        return f"{head} those of campaign {other} {never}: run {pairs}; withdraw the copy (monitor withdraw)"
+    more = len(copies) - len(named)
+    each = "; ".join(f"{other}, run {pairs}" for other, pairs in named) + f"; and {more} more" * (more > 0)
+    return f"{head} those of {len(copies)} campaigns {never}: {each}. Withdraw the copies (monitor withdraw)"
+
+
+def _named(key: tuple[Any, ...], rows: Sequence[tuple[Any, ...]]) -> tuple[str, str]:
+    """A campaign with its machine, where that is another, and the pairs of equal runs."""
+    other, its_machine, machine = key
+    pairs = [f"{run} (there {same})" for *_, run, same in rows]
+    shown = ", ".join(pairs[:MOST_PAIRS]) + ", ..." * (len(pairs) > MOST_PAIRS)
+    return f"{other}{'' if machine == its_machine else f' of machine {its_machine}'}", shown

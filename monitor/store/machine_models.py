@@ -99,6 +99,12 @@ def not_identified(db: Database) -> tuple[str, ...]:
     return tuple(str(campaign) for (campaign,) in db.rows(_NOT_IDENTIFIED))
 
 
+def machines_with_runs(db: Database) -> tuple[str, ...]:
+    """The machines of which a run was imported, by name; a curve has none."""
+    rows = db.rows("SELECT DISTINCT machine FROM campaign SEMI JOIN run USING (campaign_id) ORDER BY machine")
+    return tuple(str(machine) for (machine,) in rows)
+
+
 def machines_of_method(db: Database, method: str) -> tuple[str, ...]:
     """The machines that a campaign of a method measured, by name."""
     rows = db.rows("SELECT DISTINCT machine FROM campaign WHERE method = ? ORDER BY machine", [method])

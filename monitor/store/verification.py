@@ -58,6 +58,33 @@ def verify_audit(db: Database) -> Verification:
         *index_faults(db),
         *schema_faults(db),
     ]
+    audited = _audited(db)
+    stored = {(content.subject, content.key): content for content in _contents(db)}
+    for subject, key in sorted(audited.keys() | stored.keys()):
+        name = f"{subject} {key}"
+        if (subject, key) not in stored:
+            faults.append(f"{name} is in the audit, but no longer in the database")
+        elif (subject, key) not in audited:
+            faults.append(_without_entry(subject, key))
+        elif not _fits(db, stored[subject, key], audited[subject, key]):
+            faults.append(f"{name} was altered after it was stored")
+    last = audit.last_anchor(db)
+    return Verification(last.entry, last.sha256, tuple(faults))
+
+
+def unrecorded(db: Database) -> tuple[str, ...]:
+    """Return a sentence for everything that is stored without an entry of the audit: entries cut off at the end.
+
+    Nothing is hashed; what was cut off with all that it records leaves no trace but a hash kept elsewhere.
+    """
+    audited = _audited(db)
+    return tuple(
+        _without_entry(subject, key) for subject, key, _ in sorted(_keys(db)) if (subject, key) not in audited
+    )
+
+
+def _audited(db: Database) -> dict[tuple[str, str], str]:
+    """Return the hash of the content of each subject and key that the audit names last."""
     audited = {}
     imports: Counter[str] = Counter()
     for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry"):
@@ -65,17 +92,11 @@ def verify_audit(db: Database) -> Verification:
             imports[key] += 1
             key = _of_several(key, imports[key])
         audited[subject, key] = content
-    stored = {(content.subject, content.key): content for content in _contents(db)}
-    for subject, key in sorted(audited.keys() | stored.keys()):
-        name = f"{subject} {key}"
-        if (subject, key) not in stored:
-            faults.append(f"{name} is in the audit, but no longer in the database")
-        elif (subject, key) not in audited:
-            faults.append(f"{name} is in the database, but not in the audit")
-        elif not _fits(db, stored[subject, key], audited[subject, key]):
-            faults.append(f"{name} was altered after it was stored")
-    last = audit.last_anchor(db)
-    return Verification(last.entry, last.sha256, tuple(faults))
+    return audited
+
+
+def _without_entry(subject: str, key: str) -> str:
+    return f"{subject} {key} is in the database, but not in the audit"
 
 
 @dataclass(frozen=True)
@@ -114,45 +135,64 @@ def _fits(db: Database, content: _Content, audited: str) -> bool:
     return audited in content.hashes(db) or audited in content.hashes_of_signed_zeros(db)
 
 
-def _contents(db: Database) -> Iterator[_Content]:
+#: Of each subject of the audit: the numbers under which its rows are stored.
+_NUMBERS: Mapping[str, str] = {
+    "identification": "SELECT identification_id FROM identification",
+    "analysis": "SELECT DISTINCT analysis_id FROM analysis",
+    "event": "SELECT event_id FROM event",
+    "selection": "SELECT selection_id FROM selection",
+    "machine model": "SELECT choice_id FROM machine_model",
+    "refused import": "SELECT refusal_id FROM refused_import",
+    "cleared refusal": "SELECT refusal_id FROM refusal_cleared",
+    "import notes": "SELECT DISTINCT campaign_id FROM import_note",
+    "withdrawn campaign": "SELECT campaign_id FROM withdrawn_campaign",
+}
+#: How the content of a subject with a number is hashed; analyses are, many at once.
+_HASHES: Mapping[str, Callable[[Database, int], str]] = {
+    "campaign": stored_content,
+    "identification": stored_identification_content,
+    "event": event_content,
+    "selection": selection_content,
+    "machine model": machine_model_content,
+    "refused import": refusal_content,
+    "cleared refusal": cleared_content,
+    "import notes": notes_content,
+    "withdrawn campaign": withdrawal_content,
+}
+
+
+def _keys(db: Database) -> Iterator[tuple[str, str, int]]:
+    """Yield subject, key in the audit and number of everything that is stored; 0 for what has another name."""
     imports: Counter[str] = Counter()
     for number, name in db.rows("SELECT campaign_id, campaign FROM imported_campaign ORDER BY campaign_id"):
         imports[name] += 1
-        try:
-            content = stored_content(db, number)
-        except (MonitorError, ValueError, KeyError, TypeError):
-            # What can no longer be read was altered, too; the empty hash agrees with nothing.
-            content = ""
-        yield _Content("campaign", _of_several(name, imports[name]), content, number)
+        yield "campaign", _of_several(name, imports[name]), number
+    for subject, numbers in _NUMBERS.items():
+        for (number,) in db.rows(f"{numbers} ORDER BY ALL"):
+            yield subject, str(number), number
+    for model, version in db.rows("SELECT model, version FROM model ORDER BY ALL"):
+        yield "model", model_key(model, version), 0
+    for number, entry in db.rows("SELECT number, entry FROM certificate ORDER BY entry"):
+        yield "certificate", f"{number} entry {entry}", 0
+
+
+def _contents(db: Database) -> Iterator[_Content]:
     for model in list_models(db):
         key = model_key(model.name, model.version)
         yield _Content("model", key, model_content(model), key)
-    for (number,) in db.rows("SELECT identification_id FROM identification ORDER BY ALL"):
-        try:
-            content = stored_identification_content(db, number)
-        except (MonitorError, ValueError, KeyError, TypeError):
-            content = ""
-        yield _Content("identification", str(number), content, number)
     for number, content in analysis_contents(db):
         yield _Content("analysis", str(number), content)
-    for (number,) in db.rows("SELECT event_id FROM event ORDER BY ALL"):
-        yield _Content("event", str(number), event_content(db, number))
-    for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):
-        yield _Content("selection", str(number), selection_content(db, number))
-    for (number,) in db.rows("SELECT choice_id FROM machine_model ORDER BY ALL"):
-        yield _Content("machine model", str(number), machine_model_content(db, number))
-    for (number,) in db.rows("SELECT refusal_id FROM refused_import ORDER BY ALL"):
-        yield _Content("refused import", str(number), refusal_content(db, number))
-    for (number,) in db.rows("SELECT refusal_id FROM refusal_cleared ORDER BY ALL"):
-        yield _Content("cleared refusal", str(number), cleared_content(db, number))
-    for (number,) in db.rows("SELECT DISTINCT campaign_id FROM import_note ORDER BY ALL"):
-        yield _Content("import notes", str(number), notes_content(db, number))
-    for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign ORDER BY ALL"):
-        yield _Content("withdrawn campaign", str(number), withdrawal_content(db, number))
-    for number, entry, content in db.rows(
-        "SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"
-    ):
+    for number, entry, content in db.rows("SELECT number, entry, entry_sha256 FROM certificate"):
         yield _Content("certificate", f"{number} entry {entry}", content)
+    for subject, key, number in _keys(db):
+        if subject not in _HASHES:
+            continue
+        try:
+            content = _HASHES[subject](db, number)
+        except (MonitorError, ValueError, KeyError, TypeError):
+            # What can no longer be read was altered, too; the empty hash agrees with nothing.
+            content = ""
+        yield _Content(subject, key, content, number)
 
 
 def _of_several(name: str, nth: int) -> str:

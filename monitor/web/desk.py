@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
 from threading import Event, RLock
 from typing import Any
 
@@ -160,6 +159,7 @@ class Desk:
             ticket = self._tickets.get(key)
             if ticket is not None and ticket.is_good and not (anew and ticket.is_taken_back):
                 return ticket
+            self._forget_outdated()
             self._count += 1
             stop = Event()
             pool = self._quick if question == "trend" and document.get("parameter") else self._pool
@@ -167,10 +167,20 @@ class Desk:
             self._tickets[key] = ticket = Ticket(
                 self._count, question, document, user, future, stop, stamp=key[2]
             )
-            future.add_done_callback(partial(self._note_answer, key[:2], ticket))
+            # Handed over once: a ticket that its own future names for ever would wait for the garbage collector, which
+            # rarely looks at what is old, with an answer of megabytes.
+            noted = [ticket]
+            future.add_done_callback(lambda future: self._note_answer(key[:2], noted.pop(), future))
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
+
+    def _forget_outdated(self) -> None:
+        """Forget answers from before a write, which no question is answered by any more: they are megabytes each."""
+        freshness = self.asker.freshness
+        for key, ticket in list(self._tickets.items()):
+            if ticket.future.done() and key[2] != freshness.stamp(ticket.question, ticket.document):
+                del self._tickets[key]
 
     def ask_rested(
         self, user: User, question: str, document: Mapping[str, Any]

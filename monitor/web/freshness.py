@@ -38,7 +38,7 @@ class Freshness:
         self._lock = threading.Lock()
         self._all = self._imports = self._identified = 0
         self._of_machine: dict[str, int] = {}
-        self._answers: OrderedDict[tuple[str, str, Stamp], Any] = OrderedDict()
+        self._answers: OrderedDict[tuple[str, str], tuple[Stamp, Any]] = OrderedDict()
 
     def stamp(self, question: str, document: Mapping[str, Any]) -> Stamp:
         """Return what changes when the answer to a question may be another."""
@@ -69,14 +69,15 @@ class Freshness:
         """Return the key of a question now, and its answer where it was asked before (else None)."""
         key = (question, json.dumps(document, sort_keys=True, default=str), self.stamp(question, document))
         with self._lock:
-            answer = self._answers.get(key)
-            if answer is not None:
-                self._answers.move_to_end(key)
+            stamp, answer = self._answers.get(key[:2], ((), None))
+            if answer is None or stamp != key[2]:
+                return key, None
+            self._answers.move_to_end(key[:2])
             return key, answer
 
     def remember(self, key: tuple[str, str, Stamp], answer: Any) -> None:
-        """Hold an answer under the key that its question had before it was asked."""
+        """Hold an answer under the key that its question had before it was asked, in place of the one before."""
         with self._lock:
-            self._answers[key] = answer
+            self._answers[key[:2]] = (key[2], answer)
             while len(self._answers) > _MOST:
                 self._answers.popitem(last=False)

@@ -62,6 +62,16 @@ URGENCIES = dict(
 )
 
 
+#: The class of machines of which no number is known, beside those of the fleet; and how urgent such a machine is.
+WITHOUT_NUMBERS = "no numbers yet"
+NOT_IDENTIFIED = Urgency(
+    _OPEN.colour,
+    _OPEN.shape,
+    _OPEN.word,
+    "identify: its readings are here, its errors are not computed from them yet",
+)
+NOT_MEASURED = Urgency(_OPEN.colour, _OPEN.shape, "not measured", "measure it, and import the campaign")
+
 #: Powers of ten below this are written as such.
 SMALLEST_POWER = -5
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -134,10 +144,8 @@ def how_far(row: FleetTableRow) -> str:
 
 
 def since(row: FleetTableRow) -> str:
-    """Say since when: the latest day where it alone stands out, else the last event, else the first run."""
-    if row.attention is Attention.STANDS_OUT:
-        return day(row.latest_at)
-    return "the first run" if row.since is None else f"{day(row.since)}, the last event"
+    """Say since when a row holds, and what began then."""
+    return "" if row.onset is None or row.onset_is is None else f"{day(row.onset)}, {row.onset_is}"
 
 
 def _span(years: float) -> str:

@@ -9,6 +9,9 @@ from monitor.exceptions import InputError
 from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
 from monitor.store.catalogue import check_machine
 
+#: The kinds that most events are of; any other word is one, too.
+USUAL_KINDS = ("crash", "repair", "compensation", "probe")
+
 
 @dataclass(frozen=True)
 class EventRequest:
@@ -30,6 +33,12 @@ class EventRequest:
             return
         if not self.text.strip():
             raise InputError("say in words what happened, for example 'B axis encoder changed'")
+        word = self.text.strip().lower()
+        if self.kind == NOTE and word in USUAL_KINDS:
+            raise InputError(
+                f"'{word}' is a kind of event; a note would not split the history, and none can be undone: give "
+                f"--kind {word} and say in words what happened, for example 'spindle hit the vice'"
+            )
         if self.at is not None and self.at > datetime.now(UTC) + timedelta(hours=1):
             raise InputError(
                 f"{self.at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"

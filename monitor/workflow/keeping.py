@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import secrets
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
+
+import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.exceptions import InputError
@@ -22,9 +25,10 @@ from monitor.store import (
     restore,
     take_backup,
     take_increment,
+    unrecorded,
     verify_audit,
 )
-from monitor.workflow.recomputed import recompute
+from monitor.workflow.recomputed import Recomputation, recompute
 
 #: Words that entries of the audit are looked through for at once.
 _MOST_WORDS = 20
@@ -34,9 +38,11 @@ _MOST_WORDS = 20
 class VerifyAnswer:
     """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere.
 
-    ``anchored_entry`` is the entry that the hash kept elsewhere is of, ``recomputed`` how many identifications were
-    computed anew. ``signed_certificates`` is how many of the stored documents bear a signature,
-    ``trusted_signatures`` how many of these are of a trusted signer; None where nobody was named as such.
+    ``anchored_entry`` is the entry that the hash kept elsewhere is of. ``recomputed`` is how many identifications were
+    computed anew, of ``recomputable`` that this version made; ``of_other_versions`` made others, which are not computed
+    anew. ``seed`` drew them; None where there was nothing to draw. ``signed_certificates`` is how many of the stored
+    documents bear a signature, ``trusted_signatures`` how many of these are of a trusted signer; None where nobody
+    was named as such.
     """
 
     ok: bool
@@ -45,6 +51,9 @@ class VerifyAnswer:
     faults: tuple[str, ...]
     anchored_entry: int | None = None
     recomputed: int = 0
+    recomputable: int = 0
+    of_other_versions: int = 0
+    seed: int | None = None
     signed_certificates: int | None = None
     trusted_signatures: int | None = None
 
@@ -54,7 +63,8 @@ class VerifyRequest:
     """What is verified besides the database itself.
 
     ``anchor`` is a hash of the chain that was kept elsewhere: on paper, on a certificate or in a report. ``recompute``
-    is how many identifications, drawn by the last hash, are computed anew. ``trusted`` is a file of trusted signers
+    is how many identifications, drawn at random, are computed anew; ``seed`` draws those of an earlier verification
+    again. ``trusted`` is a file of trusted signers
     (certificates in PEM or DER, or fingerprints): every signed certificate has to be of one of them.
 
     Raises InputError for what is no hash or number.
@@ -63,12 +73,15 @@ class VerifyRequest:
     anchor: str | None = None
     recompute: int = 3
     trusted: Path | None = None
+    seed: int | None = None
 
     def __post_init__(self) -> None:
         if self.anchor is not None and not re.fullmatch(r"\s*[0-9a-fA-F]{64}\s*", self.anchor):
             raise InputError(f"--anchor {self.anchor}: a hash of the audit has 64 hexadecimal digits")
         if not 0 <= self.recompute < 2**31:
             raise InputError(f"--recompute {self.recompute}: how many identifications, 0 for none")
+        if self.seed is not None and not 0 <= self.seed < 2**63:
+            raise InputError(f"--seed {self.seed}: a whole number from 0 on, as an earlier verification said")
 
 
 def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
@@ -87,8 +100,13 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
             if anchored is None:
                 faults.append(messages.anchor_unknown(request.anchor.strip()))
     # Computed outside: nobody waits for a fit.
-    recomputed, different = recompute(db, verification.last_sha256, request.recompute)
-    faults += different
+    seed = secrets.randbits(32) if request.seed is None else request.seed
+    recomputation = (
+        recompute(db, np.random.default_rng(seed), request.recompute)
+        if request.recompute
+        else Recomputation(0, 0, 0, ())
+    )
+    faults += recomputation.faults
     signed = trusted = None
     if request.trusted is not None:
         # What looks at certificates takes longer to load than most databases to verify.
@@ -107,7 +125,10 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
         verification.last_sha256,
         tuple(faults),
         entry,
-        recomputed,
+        recomputation.computed,
+        recomputation.of,
+        recomputation.of_others,
+        seed if request.recompute < recomputation.of else None,
         signed,
         trusted,
     )
@@ -144,7 +165,10 @@ class AuditRequest:
 
 @dataclass(frozen=True)
 class AuditAnswer:
-    """Entries of the audit, the newest first; ``faults`` names entries that were edited, removed or put elsewhere."""
+    """Entries of the audit, the newest first.
+
+    ``faults`` names entries that were edited, removed or put elsewhere, and what is stored without an entry.
+    """
 
     entries: tuple[AuditEntry, ...]
     faults: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
@@ -157,7 +181,7 @@ def audit(db: Database, request: AuditRequest) -> AuditAnswer:
     """
     _refuse_lake(db, "audited")
     entries = last_entries(db, request.last, request.containing.split())
-    return AuditAnswer(entries, chain_faults(db) if request.check else None)
+    return AuditAnswer(entries, (*chain_faults(db), *unrecorded(db)) if request.check else None)
 
 
 @dataclass(frozen=True)

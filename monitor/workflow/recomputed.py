@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,13 +23,23 @@ from monitor.store import (
 TOLERANCE_U = 1e-3
 
 
-def recompute(db: Database, seed: str, count: int) -> tuple[int, tuple[str, ...]]:
-    """Identify campaigns again, drawn by the hash ``seed``; how many, and a sentence for each that is another now.
+@dataclass(frozen=True)
+class Recomputation:
+    """How many identifications were computed anew, of how many that this version made, and what came out otherwise.
 
-    Only identifications of this version of the software are drawn: another may have estimated otherwise.
+    ``of_others`` is how many other versions made: these may have estimated otherwise, and none is drawn.
     """
+
+    computed: int
+    of: int
+    of_others: int
+    faults: tuple[str, ...]
+
+
+def recompute(db: Database, generator: np.random.Generator, count: int) -> Recomputation:
+    """Identify campaigns again, drawn at random: whoever alters one cannot know which will be looked at."""
     numbers = identification_numbers(db, __version__)
-    drawn = np.random.default_rng(int(seed, 16)).permutation(numbers)[:count].tolist()
+    drawn = generator.permutation(numbers)[:count].tolist()
     faults, computed = [], 0
     for number in sorted(drawn):
         # What cannot be computed is no evidence: the hashes say whether readings or model were altered.
@@ -37,7 +48,8 @@ def recompute(db: Database, seed: str, count: int) -> tuple[int, tuple[str, ...]
             computed += 1
             if fault is not None:
                 faults.append(messages.not_reproduced(number, fault))
-    return computed, tuple(faults)
+    others = len(identification_numbers(db)) - len(numbers)
+    return Recomputation(computed, len(numbers), others, tuple(faults))
 
 
 def _difference(db: Database, number: int) -> str | None:

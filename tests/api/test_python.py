@@ -88,6 +88,14 @@ def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: 
     assert campaign.explain("warm").missing == ()
 
 
+def test_several_effects_are_added_in_one_version(db: mm.Database) -> None:
+    campaign = db.campaign("five-days")
+    version = campaign.add(["EXX:reversal", "EYY:reversal"], "plays").content.model.version
+    assert version.effects == ("EXX:reversal", "EYY:reversal")
+    with pytest.raises(InputError, match="name an effect to add, or several"):
+        campaign.add([])
+
+
 def test_answers_of_all_kinds_are_tables(db: mm.Database) -> None:
     campaign = db.campaign("five-days")
     u = campaign.uncertainty(method="guf").table()
@@ -222,6 +230,31 @@ def test_errors_of_a_simulated_machine_are_identified(
         for name, size in expected.items():
             u = np.hypot(table[name].std() / np.sqrt(12.0), 3.9 if name == "EXX" else 0.0)
             assert abs(table[name].mean() - size) < 4.0 * u + 1e-9, name
+
+
+def test_campaigns_like_one_of_yours_are_written(tmp_path: Path) -> None:
+    answer = mm.simulate(
+        tmp_path / "shop", like=EXAMPLES / "tilting-table", machines=("M1", "M2"), start="2026-01-12", months=2,
+        drifts=[("EY0A", 0.5, "M2")], events=[("2026-02-01", "EB0C", 9.0)], effect="EXX:reversal", peak_um=6.0,
+        steady=True,
+    )  # fmt: skip
+    assert [Path(folder).name for folder in answer.folders] == [
+        "M1-2026-01", "M1-2026-02", "M2-2026-01", "M2-2026-02"
+    ]  # fmt: skip
+    for wrong, said in (
+        ({"machines": "M1"}, 'like needs start, such as start="2026-01-12"'),
+        ({"start": "2026-01-12"}, r"like needs machines, such as machines=\(\"M1\", \"M2\"\)"),
+        ({"machines": "M1", "start": "12 May"}, "'12 May' is no day; write 2026-01-12"),
+        (
+            {"machines": "M1", "start": "2026-01-12", "month": 3},
+            "there is no option 'month'; did you mean 'months'",
+        ),
+        ({"machines": "M1", "start": "2026-01-12", "months": 0}, "months 0: 1 or more"),
+        ({"topology": "w b X t"}, "leave out topology and errors"),
+    ):
+        with pytest.raises(InputError, match=said):
+            mm.simulate(tmp_path / "x", like=EXAMPLES / "tilting-table", **wrong)
+    assert not (tmp_path / "x").exists()
 
 
 def test_a_simulated_machine_that_cannot_be_is_refused(tmp_path: Path) -> None:

@@ -96,10 +96,12 @@ def rotary(
     hidden: Hidden | None = None,
     plan: str = "source",
     perfect: bool = False,
+    walk: float = 0.0,
 ) -> Campaign:
     """Runs of 154 touches (the source's plan) or of 28 points at 36 poses, with 0.7 µm of noise, as printed (0.1 µm).
 
     A ``perfect`` piece stands where it should on a steady machine: only noise tells one touch of a face from another.
+    From touch to touch the tool goes astray along each axis by ``walk`` times that noise.
     """
     poses = touches.paper_plan() if plan == "source" else touches.every_pose(touches.block(), EVERY_30)
     chain, stands = read_topology(PAPER), touches.Piece() if perfect else piece(rng)
@@ -115,6 +117,9 @@ def rotary(
             chain, poses, errors, rng, piece=stands, noise_mm=0.7e-3,
             linear=hidden.linear if hidden else None, motion=motion,
         )  # fmt: skip
+        if walk:
+            for axis in chain.linear:
+                told[axis.name] = told[axis.name] + walk * 0.7e-3 * np.cumsum(rng.standard_normal(len(poses)))
         seen.append({axis: np.round(values, 4) for axis, values in told.items()})
     return touched(PAPER, poses, seen)
 
@@ -156,17 +161,18 @@ NOTHING: dict[str, Callable[[np.random.Generator, int], Campaign]] = {
     "rotary-probing": rotary,
     "rotary-probing, perfect piece": lambda rng, runs: rotary(rng, runs, perfect=True),
     "rotary-probing, 36 poses": lambda rng, runs: rotary(rng, runs, plan="every 30 degrees"),
+    "rotary-probing, walks": lambda rng, runs: rotary(rng, runs, walk=0.25),
     "free-form": pocket,
     "l-shape": arms,
 }
 
 
-def nothing_hidden(campaigns: int, scenes: Sequence[str], first: int) -> None:
+def nothing_hidden(campaigns: int, scenes: Sequence[str], first: int, numbers: Sequence[int]) -> None:
     """The share of campaigns without a hidden effect in which one is told."""
     print("| method | runs | campaigns | nothing is missing | told all the same |")
     print("| --- | --- | --- | --- | --- |")
     for scene in scenes:
-        for runs in (4, 10):
+        for runs in numbers:
             false: list[str] = []
             for seed in range(first, first + campaigns):
                 told = groups(explained(NOTHING[scene](np.random.default_rng([seed, runs]), runs)))
@@ -208,10 +214,11 @@ def main() -> None:
     parser.add_argument("--campaigns", type=int, default=100)
     parser.add_argument("--hidden", type=int, default=10, help="campaigns with each hidden effect")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--runs", type=int, nargs="+", default=[4, 10])
     parser.add_argument("--only", choices=NOTHING, nargs="*", default=list(NOTHING))
     options = parser.parse_args()
     if options.campaigns:
-        nothing_hidden(options.campaigns, options.only, options.first)
+        nothing_hidden(options.campaigns, options.only, options.first, options.runs)
     if options.hidden:
         print()
         one_hidden(options.hidden, options.first, ("source", "every 30 degrees"))

@@ -224,6 +224,8 @@ def test_audit_names_the_entry_that_was_edited_removed_or_put_elsewhere(typed: A
         "UPDATE audit SET actor = 'nobody' WHERE entry = 2": "audit entry 2 was altered: it was edited",
         "DELETE FROM audit WHERE entry = 2": "audit entry 2 is missing",
         "UPDATE audit SET entry = 7 - entry WHERE entry IN (1, 2, 3)": "and put elsewhere",
+        "DELETE FROM audit WHERE entry = (SELECT max(entry) FROM audit)": "is in the database, but not in the audit",
+        "DELETE FROM audit": "campaign cold-cold is in the database, but not in the audit",
     }
     for change, fault in changes.items():
         shutil.copyfile(db, db.with_name("changed.duckdb"))

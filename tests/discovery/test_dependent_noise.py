@@ -15,7 +15,8 @@ from by_path import load
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
-from monitor.discovery.machine.noise.correlation import Correlation, Rows, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, Whitening
+from monitor.discovery.machine.noise.rows import Rows
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.evidence import Pool, weigh_beside
@@ -42,6 +43,35 @@ def test_the_filter_is_the_inverse_of_the_triangle_of_cholesky():
     np.testing.assert_allclose(triangle[0][inside], expected, atol=1e-12)
     assert not triangle[0][4].any()
     assert determinant[0] == pytest.approx(np.linalg.slogdet(covariance[inside])[1])
+
+
+def test_touches_follow_those_of_their_own_direction():
+    """A vector that drifts, of which every touch shows one component from one side or the other: its covariance, from
+    touch to touch along the whole sequence, by its definition."""
+    correlation = Correlation(0.8, 0.6)
+    rng = np.random.default_rng(2)
+    axis, sign = rng.integers(0, 3, 14), rng.choice([-1.0, 1.0], 14)
+    lag = np.abs(np.subtract.outer(np.arange(14), np.arange(14)))
+    alike = np.equal.outer(axis, axis) * np.outer(sign, sign)
+    covariance = 0.6 * 0.8**lag * alike + 0.4 * np.eye(14)
+    order = np.argsort(axis, kind="stable")
+    begins = np.diff(axis[order], prepend=-1) != 0
+    steps = np.where(begins, 1, np.diff(order, prepend=0)).astype(float)
+    rows = Rows(
+        np.ones((1, 14), dtype=bool),
+        1,
+        sign[None, :, None, None],
+        begins[None],
+        None,
+        order[None],
+        steps[None],
+    )
+    whitening = Whitening(rows, correlation)
+    filtered = np.array([whitening(unit[None])[0] for unit in np.eye(14)]).T
+    np.testing.assert_allclose(filtered @ covariance @ filtered.T, np.eye(14), atol=1e-12)
+    assert whitening.factors[1][0] == pytest.approx(np.linalg.slogdet(covariance)[1])
+    numbers = rng.normal(size=(1, 14))
+    np.testing.assert_allclose(whitening.undone(whitening(numbers)), numbers, atol=1e-12)
 
 
 @pytest.mark.parametrize(("rho", "days", "each"), [(0.6, 2, 2), (0.6, 1, 1), (0.9, 2, 2)])

@@ -14,7 +14,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.noise.correlation import Correlation, Filters, Rows, Whitening, rows_of
+from monitor.discovery.machine.noise.correlation import Correlation, Filters, Whitening
+from monitor.discovery.machine.noise.rows import Rows, rows_of
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign

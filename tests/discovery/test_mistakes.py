@@ -17,12 +17,14 @@ from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
+from monitor.readers.doubts import column_doubts
 from monitor.records import Campaign, Probings
 from monitor.store import Database, StoredModel, import_campaign
 from monitor.workflow.campaign_parts import only_run
+from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
-from monitor.workflow.explain.request import ExplainRequest
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import as_model, resolve
@@ -144,17 +146,30 @@ def test_explain_says_it_first_and_tells_nothing_else(tmp_path: Path) -> None:
     assert mistake.rms_undone_um < 100.0 < 2000.0 < mistake.rms_as_recorded_um
 
 
-@pytest.mark.slow
-def test_explain_names_it_where_no_machine_fits(tmp_path: Path) -> None:
-    campaign = recorded("five-days", readings(X="Y", Y="X"))
+@pytest.mark.parametrize("name", ["five-days", "tilting-table"])
+def test_every_question_says_again_what_the_import_saw_exchanged(tmp_path: Path, name: str) -> None:
+    campaign = recorded(name, readings(X="Y", Y="X"))
+    questions = (
+        lambda db: identify(db, IdentifyRequest(campaign.name)),
+        lambda db: compare(db, CompareRequest(campaign.name)),
+        lambda db: explain(db, ExplainRequest(campaign.name)),
+    )
     with Database(tmp_path / "mistaken.duckdb") as db:
         import_campaign(db, campaign)
-        with pytest.raises(DataError, match="It looks as if the columns x_mm and y_mm were exchanged"):
-            explain(db, ExplainRequest(campaign.name))
+        for question in questions:
+            with pytest.raises(DataError, match=r"contradict the machine file.*with x_mm and y_mm exchanged"):
+                question(db)
 
 
-def test_identify_names_it_where_no_machine_fits(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_a_mistake_that_no_import_sees_is_searched_where_no_machine_fits(tmp_path: Path) -> None:
+    """Without a pose at zero nothing is seen without a fit."""
     campaign = recorded("five-days", readings(X="Z", Z="X"))
+    turned = campaign.probings.readings["B"] + 0.01
+    campaign = replace(
+        campaign, probings=replace(campaign.probings, readings=campaign.probings.readings | {"B": turned})
+    )
+    assert column_doubts(campaign) == ()
     with Database(tmp_path / "mistaken.duckdb") as db:
         import_campaign(db, campaign)
         with pytest.raises(DataError, match="It looks as if the columns x_mm and z_mm were exchanged"):

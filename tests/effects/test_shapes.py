@@ -72,6 +72,17 @@ def test_a_move_within_the_repeatability_of_a_touch_reverses_nothing(make: Calla
     np.testing.assert_array_equal(context.travel[:, joint], [1, 1, 1, 1, -1, -1, 1])
 
 
+def test_a_stop_that_no_plan_asked_for_reverses_nothing(make: Callable[..., Context]) -> None:
+    """Touches sent to one position stop up to 40 µm apart; a plan's own steps are 0.3 mm and more."""
+    context = make({"X": [50.0, 50.04, 50.0, 49.96, 49.7], "Y": [50.0, 50.04, 50.0, 49.96, 49.7]})
+    measured, commanded = (context.chain.index(name) for name in "XY")
+    expected = context.positions.copy()
+    expected[:, measured] += 1e-4
+    moved = context.expecting(expected)
+    np.testing.assert_array_equal(moved.travel[:, measured], [1, 1, 1, 1, -1])
+    np.testing.assert_array_equal(moved.travel[:, commanded], [1, 1, -1, -1, -1])
+
+
 def test_shapes_look_where_the_axis_is_expected(make: Callable[..., Context]) -> None:
     context = make({"X": [10.0, 20.0]}, columns={"x_mm": [10.0, 20.0]})
     joint = next(place for place, one in enumerate(context.chain.joints) if one.name == "X")

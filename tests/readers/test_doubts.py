@@ -11,9 +11,11 @@ from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from monitor.readers import doubts, read_campaign
+from monitor.readers.axes_doubts import mistaken_axes
 from monitor.readers.unit_doubts import runs_in_units
 from monitor.records import Campaign
 from monitor.workflow.intake.gross_doubts import gross_doubts
@@ -253,6 +255,40 @@ def test_exchanged_columns_are_named_at_import(
     folder = arranged(altered(example), change)
     (doubt,) = of(folder)
     assert re.search(words, doubt)
+
+
+@pytest.mark.parametrize(
+    ("change", "columns"),
+    [
+        (lambda x, y, z: (y, x, z), "x_mm and y_mm"),
+        (lambda x, y, z: (z, y, x), "x_mm and z_mm"),
+        (lambda x, y, z: (x, z, y), "y_mm and z_mm"),
+        (lambda x, y, z: (y, z, x), "x_mm, y_mm and z_mm"),
+    ],
+)
+def test_exchanged_columns_of_faces_are_named_by_their_normals(
+    altered: Callable[..., Path],
+    change: Callable[[float, float, float], tuple[float, float, float]],
+    columns: str,
+) -> None:
+    (doubt,) = of(arranged(altered("tilting-table"), change))
+    assert f"the 23 steps between touches of one face lie in that face only with {columns} exchanged" in doubt
+
+
+def test_faces_that_fit_two_exchanges_name_the_axes_of_both(altered: Callable[..., Path]) -> None:
+    """One face touched along one line: who exchanged X and Y may as well have exchanged X and Z."""
+    campaign = read_campaign(arranged(altered("tilting-table"), lambda x, y, z: (y, x, z)))
+    probings = campaign.probings
+    rows = np.array([name.startswith("side2") for name in probings.target])
+    one_face = replace(
+        probings,
+        **{name: getattr(probings, name)[rows] for name in ("run", "sequence", "time", "target")},
+        readings={name: values[rows] for name, values in probings.readings.items()},
+        channels={name: values[rows] for name, values in probings.channels.items()},
+    )
+    mistaken = mistaken_axes(replace(campaign, probings=one_face))
+    assert mistaken is not None
+    assert (mistaken.axes, mistaken.count) == ("XYZ", 3)
 
 
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])

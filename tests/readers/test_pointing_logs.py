@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from monitor.discovery import find_mistakes
 from monitor.exceptions import CampaignError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign, read_exports
@@ -217,7 +218,8 @@ ROW = "10:30:00,40,10.51,40.0"
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("10:30:00", "10:61:00", "night.csv, line 2, column az (azimuth_deg): '10:61:00' is no finite number; write 7"),
+        ("10:30:00", "10:61:00", "night.csv, line 2, column az (azimuth_deg): '10:61:00' has minutes or seconds t"),
+        ("10:30:00", "10:30:60.00", "'10:30:60.00' has minutes or seconds that are not below 60; write 75.255 or 75"),
         ("10:30:00", "", "night.csv, line 2, column az (azimuth_deg): '' is no finite number; write 75.255 or 75:15:1"),
         ("10:30:00", "10h30m", "night.csv, line 2, column az (azimuth_deg): '10h30m' is no finite number"),
         (",40,", ",95.5,", "line 2, column el (elevation_deg): 95.5 lies beyond -90 to 90 deg; is it elevation_deg, a"),
@@ -294,6 +296,36 @@ def test_a_log_as_an_observatory_writes_it_shows_the_mount_that_was_simulated(tm
         index = result.parameters.index(name)
         assert abs(run.estimate[index] - hidden) < 4.0 * np.sqrt(run.covariance[index, index])
     assert run.chi_square / run.degrees_of_freedom < 1.5
+
+
+def test_an_azimuth_that_counts_the_other_way_is_named_by_its_key(tmp_path: Path) -> None:
+    axes = (
+        SimulatedAxis("AZ", "rotary", (0.0, 0.0, 1.0), sign=-1, errors=(0, 0, 0, 60e-6, -40e-6, 0)),
+        SimulatedAxis("EL", "rotary", (0.0, 1.0, 0.0), sign=-1, errors=(0, 0, 0, 80e-6, 0, 0)),
+    )
+    chain, rng = SimulatedChain(axes), np.random.default_rng(7)
+    lines = []
+    for _ in range(40):
+        azimuth, elevation = rng.uniform((0.0, 20.0), (360.0, 85.0))
+        seen = chain.pose({"AZ": azimuth, "EL": elevation})[:3, :3] @ [1.0, 0.0, 0.0]
+        seen += rng.normal(0.0, 5e-6, 3)
+        seen /= np.linalg.norm(seen)
+        north = np.rad2deg(np.arctan2(-seen[1], seen[0])) % 360.0
+        lines.append(f"{north:.7f},{np.rad2deg(np.arcsin(seen[2])):.7f},{azimuth:.7f},{elevation:.7f}")
+    header = "az [deg],el [deg],mount az [deg],mount el [deg]"
+    right = read_campaign(log(tmp_path / "right", FROM_NORTH, header, *lines))
+    mirrored = FROM_NORTH.replace("north through east", "north through west")
+    wrong = read_campaign(log(tmp_path / "wrong", mirrored, header, *lines))
+    assert isinstance(right, Campaign)
+    assert isinstance(wrong, Campaign)
+    method = campaign_method(right)
+    ways = [mistake.what for mistake in find_mistakes(wrong, method.problem_of, None)]
+    assert ways[0].startswith(
+        "the directions were mirrored (`azimuth_from` of their mapping counts the other way"
+    )
+    # The signs of the axes and the complement of the azimuth are the same mirror, and nothing else is named.
+    assert len(ways) == 4
+    assert not any("direction_" in way for way in ways[1:])
 
 
 def refraction_by_hand(zenith: float) -> float:

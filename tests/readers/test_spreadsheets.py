@@ -110,7 +110,7 @@ def test_points_and_commas_in_one_table_are_refused_with_the_cause(tmp_path: Pat
     rows = tables(folder)["probings.csv"]
     mixed = [rows[0], [*rows[1][:-1], "1.5"], *([cell.replace(".", ",") for cell in row] for row in rows[2:])]
     (folder / "probings.csv").write_text("\n".join(";".join(row) for row in mixed), encoding="utf-8")
-    with pytest.raises(CampaignError) as refusal:
+    with pytest.raises(CampaignError, match="it has a decimal comma") as refusal:
         read_campaign(folder)
     lines = str(refusal.value).splitlines()
     assert len(lines) < 12
@@ -139,7 +139,7 @@ def test_faults_of_a_workbook_of_all_tables_name_the_sheet_too(tmp_path: Path) -
         column = next(cell.column for cell in book[sheet][1] if cell.value == name)
         book[sheet].cell(row=line, column=column, value="none")
     book.save(folder / "campaign.xlsx")
-    with pytest.raises(CampaignError) as refusal:
+    with pytest.raises(CampaignError, match="'none' is not a number") as refusal:
         read_campaign(folder)
     shown = str(refusal.value)
     assert "  campaign.xlsx, sheet runs, line 3, column ambient_degC: 'none' is not a number" in shown

@@ -11,9 +11,12 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.documents import from_document, to_document
 from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
+from monitor.reporting.health.attention import attention
 from monitor.reporting.health.comparison import MissingEffect, ModelHealth
+from monitor.reporting.health.page import fleet_context
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -154,7 +157,11 @@ def test_a_quiet_week_says_so() -> None:
             "the measurements.",
         ),
         (AWAY, "fine", "No machine could be stated to be fine."),
-        (machine("M", "no change seen", probability_out=0.01), "unjudged", "Not against every tolerance: M."),
+        (
+            machine("M", "no change seen", probability_out=0.01),
+            "unjudged",
+            "Not every parameter has a tolerance: M.",
+        ),
         (machine("M", "no change seen"), "unjudged", "Nothing was judged: no tolerances are stated."),
         (machine("M", "model fails"), "unjudged", "Nothing was judged: no tolerances are stated."),
         (
@@ -262,8 +269,9 @@ def due(name: str = "Mitsui", parameter_name: str = "EC0Y") -> MachineHealth:
     """Near its limit and growing: in tolerance when it was measured, and by now perhaps not."""
     check = NextCheck(CheckKind.PASSED, parameter_name, date(2026, 3, 7), 200.0)
     return machine(
-        name, "in tolerance", parameter(parameter_name, value=18.0), probability_out=0.01, next_check=check
-    )
+        name, "in tolerance", parameter(parameter_name, value=18.0), probability_out=0.01, next_check=check,
+        due=parameter_name,
+    )  # fmt: skip
 
 
 def test_a_machine_that_its_drift_may_have_taken_out_is_not_fine_but_due() -> None:
@@ -291,6 +299,42 @@ def test_a_machine_that_its_drift_may_have_taken_out_is_not_fine_but_due() -> No
     assert sentences["do"] == (
         "Adjust or compensate squareness X-Y (EC0Y) and measure again now; measure again now as well: Mitsui, Okuma."
     )
+
+
+def test_a_stored_record_is_due_as_the_one_that_was_made() -> None:
+    """The first page and the pages of machines are written from stored records, whose sentences are words alone."""
+    stored = from_document(MachineHealth, to_document(due()))
+    assert str(stored.next_check) == str(due().next_check)
+    assert not isinstance(stored.next_check, NextCheck)
+    week, _ = fleet(GOOD, stored)
+    assert [card["state"] for card in cards_of(week)] == ["due for a check"]
+
+
+def cards_of(week: Fleet) -> list[dict[str, str]]:
+    """Machine, state and likes of every card of a first page."""
+    return [
+        {"machine": card.head.machine, "state": card.head.state, "alike": card.alike}
+        for card in fleet_context(week)["cards"]
+    ]
+
+
+def test_cards_do_not_repeat_one_finding_while_another_is_not_drawn() -> None:
+    """Five machines of one finding before a change and one that is due: each finding has its card, and the others
+    of the first are named on it."""
+    out = [replace(DRIFTED, machine=f"Drifted {index}") for index in range(1, 6)]
+    drawn, alike = attention([*out, CHANGED, due(), AWAY, GOOD])
+    assert [health.machine for health in drawn] == ["Drifted 1", "Stepped", "Mitsui"]
+    assert alike == {"Drifted 1": ("Drifted 2", "Drifted 3", "Drifted 4", "Drifted 5")}
+    week = replace(fleet(*out, CHANGED, due(), AWAY, GOOD)[0], attention=drawn, alike=alike)
+    assert "<strong>The same on:</strong> Drifted 2, Drifted 3, Drifted 4, Drifted 5</p>" in "".join(
+        health_html(week, [])
+    )
+    # With room for all of them every machine has its picture.
+    drawn, alike = attention([*out[:2], CHANGED, GOOD])
+    assert [health.machine for health in drawn] == ["Drifted 1", "Drifted 2", "Stepped"]
+    assert alike == {}
+    drawn, alike = attention([GOOD])
+    assert ([health.machine for health in drawn], alike) == (["Good"], {})
 
 
 def test_what_the_model_lacks_is_why_a_machine_may_be_out() -> None:

@@ -12,6 +12,7 @@ from monitor.reporting.health.sentences import (
     BadPoint,
     BallMoved,
     CheckKind,
+    Drifting,
     ErrorOf,
     Factor,
     ImportsRefused,
@@ -106,6 +107,10 @@ def test_the_schema_of_a_sentence_is_a_text() -> None:
         (
             NewThisWeek(("a", "b", "c"), 2, (ModelLacks("EXX:reversal"),)),
             "a; b; c; and 2 more; the model lacks EXX:reversal",
+        ),
+        (
+            NewThisWeek((), drifting=(Drifting("EC0Y", 77.2, 5.0, "µrad"),)),
+            "EC0Y drifts by +6.43 µrad a month",
         ),
         (
             NotMeasured("five", last=DAY, state="out of tolerance", refused=(ImportsRefused(1, DAY),)),

@@ -8,6 +8,7 @@ from datetime import date
 from decimal import Decimal
 
 import pytest
+from markupsafe import Markup
 
 from monitor.exceptions import InputError
 from monitor.refusal import Advice, AdviceKind, Reason, ReasonKind, Refusal
@@ -19,7 +20,7 @@ from monitor.reporting.refused import (
 )
 from monitor.reporting.resources import report_text
 from monitor.reporting.symbols import describe
-from monitor.reporting.texts import languages, texts_of
+from monitor.reporting.texts import languages, texts_of, with_bound_units, with_subscripts
 
 ENGLISH = texts_of()
 
@@ -158,3 +159,21 @@ def test_a_sentence_that_is_all_there_is_stays_as_it_is() -> None:
 def test_every_kind_of_reason_has_a_sentence(kind: AdviceKind | ReasonKind) -> None:
     without_text = {AdviceKind.OWN_WORDS, ReasonKind.NOT_SEPARATED}
     assert (f"sentences.{kind.value}" in ENGLISH.sentences) == (kind not in without_text)
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [
+        ("Y −152,6 mm bis 191,1 mm", "Y −152,6~mm bis 191,1~mm"),
+        ("EB0C (16,4 µrad, U = 4,3 µrad)", "EB0C (16,4~µrad, U~=~4,3~µrad)"),
+        ("in tolerance with 95 % until then", "in tolerance with 95~% until then"),
+        ("−53 µm/m and 3 runs, 12 mmx", "−53~µm/m and 3 runs, 12 mmx"),
+    ],
+)
+def test_no_line_ends_between_a_number_and_its_unit(text: str, bound: str) -> None:
+    assert with_bound_units(text) == bound.replace("~", "\N{NO-BREAK SPACE}")
+
+
+def test_markup_stays_markup_where_units_are_bound() -> None:
+    assert with_subscripts(Markup("<b>U</b> is 3 µm")) == "<b>U</b> is 3\N{NO-BREAK SPACE}µm"
+    assert with_subscripts("u < 3 µm") == "u\N{NO-BREAK SPACE}&lt;\N{NO-BREAK SPACE}3\N{NO-BREAK SPACE}µm"

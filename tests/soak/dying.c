@@ -1,7 +1,7 @@
 /* Counts the system calls that change a file, and ends the process before one of them; loaded with LD_PRELOAD.
  *
  * die_before(n, torn) arms it: the n-th call from now on (1 is the next) does not happen, the process is killed instead.
- * With torn, a write does happen, but only its first half: what a disk may hold after a loss of power.
+ * With torn, a write does happen, but only so many 1024ths of it: what a disk may hold after a loss of power.
  * changes() is how many calls there were. Unarmed, it only counts. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -38,7 +38,7 @@ ssize_t write(int fd, const void *data, size_t size) {
     static __typeof__(&write) next;
     if (!next) next = NEXT(write);
     if (last()) {
-        if (atomic_load(&tearing) && size > 1) (void)!next(fd, data, size / 2);
+        if (atomic_load(&tearing) && size > 1) (void)!next(fd, data, size * atomic_load(&tearing) / 1024);
         die();
     }
     return next(fd, data, size);
@@ -48,7 +48,7 @@ ssize_t pwrite(int fd, const void *data, size_t size, off_t offset) {
     static __typeof__(&pwrite) next;
     if (!next) next = NEXT(pwrite);
     if (last()) {
-        if (atomic_load(&tearing) && size > 1) (void)!next(fd, data, size / 2, offset);
+        if (atomic_load(&tearing) && size > 1) (void)!next(fd, data, size * atomic_load(&tearing) / 1024, offset);
         die();
     }
     return next(fd, data, size, offset);

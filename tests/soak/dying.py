@@ -35,15 +35,19 @@ class Effort:
 
 @dataclass(frozen=True)
 class Death:
-    """When a process dies: before a call, in the middle of a write (``torn``), or after a processor time in s."""
+    """When a process dies: before a call, in the middle of a write (``torn``), or after a processor time in s.
+
+    ``share`` is how much of the write happens.
+    """
 
     call: int = 0
     torn: bool = False
     processor_s: float = 0.0
+    share: float = 0.5
 
     def __str__(self) -> str:
         if self.call:
-            return f"{'in' if self.torn else 'before'} call {self.call}"
+            return f"{f'{self.share:.0%} into' if self.torn else 'before'} call {self.call}"
         return f"after {self.processor_s:.2f} s of processor time"
 
 
@@ -51,7 +55,7 @@ def drawn(effort: Effort, generator: random.Random) -> Death:
     """A death within an effort: half before a call, a fifth in the middle of one, the others at a time."""
     kind = generator.random()
     if effort.calls and kind < 0.7:
-        return Death(generator.randint(1, effort.calls), kind >= 0.5)
+        return Death(generator.randint(1, effort.calls), kind >= 0.5, share=generator.random())
     return Death(processor_s=max(1e-4, generator.uniform(0.0, effort.processor_s)))
 
 
@@ -78,7 +82,9 @@ def _calls() -> int:
 
 def _arm(death: Death) -> None:
     if death.call:
-        ctypes.CDLL(None).die_before(ctypes.c_long(death.call), ctypes.c_int(death.torn))
+        ctypes.CDLL(None).die_before(
+            ctypes.c_long(death.call), ctypes.c_int(max(1, int(1024 * death.share)) if death.torn else 0)
+        )
     elif death.processor_s:
         # Counts all threads of the process; nobody catches the signal.
         signal.setitimer(signal.ITIMER_PROF, death.processor_s)

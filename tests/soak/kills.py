@@ -74,21 +74,24 @@ def arguments(name: str, room: Path) -> list[str]:
         "archive": [*database, "archive", str(room / "archive"), "--before", "2999-01-01"],
         "compact": [*database, "compact"],
         "export": [*database, "export", str(room / "exported")],
-        "publish": [
-            *database,
-            "publish",
-            "--to",
-            f"ducklake:{room}/shops.ducklake",
-            "--files",
-            str(room / "files"),
-        ],
+        "publish": [*database, *_publishing(room, NEW_LAKE)],
+        "publish again": [*database, *_publishing(room, KNOWN_LAKE)],
     }[name]
 
 
 VERBS = (
     "import", "identify", "uncertainty", "issue", "amend", "withdraw certificate", "withdraw", "report", "migration",
-    "backup", "incremental backup", "restore", "restore at", "archive", "compact", "export", "publish",
+    "backup", "incremental backup", "restore", "restore at", "archive", "compact", "export", "publish", "publish again",
 )  # fmt: skip
+
+#: Of a lake that is not there yet, and of one that holds what was published before.
+NEW_LAKE, KNOWN_LAKE = "shops.ducklake", "known.ducklake"
+#: The lakes that verbs publish to.
+LAKES = {"publish": NEW_LAKE, "publish again": KNOWN_LAKE}
+
+
+def _publishing(room: Path, lake: str) -> list[str]:
+    return ["publish", "--to", f"ducklake:{room}/{lake}", "--files", str(room / f"files of {lake}")]
 
 
 #: The verbs of which one comes first after each kill, in turn.
@@ -121,6 +124,10 @@ def faults_after(name: str, room: Path, reader: list[str]) -> list[str]:
     ``reader`` is the verb that comes first: what DuckDB recovers, it recovers in that session.
     """
     faults = []
+    if name == "publish again":
+        # A reader of the lake is the first to open its catalogue.
+        first, said = typed(["--db", f"ducklake:{room}/{KNOWN_LAKE}", "campaigns"])
+        faults += [] if first == 0 else [f"campaigns of the lake: {first} {said}"]
     databases = [room / "shop.duckdb", *(path for path in (room / "again.duckdb",) if path.exists())]
     for path in [*databases, *([room / "old.duckdb"] if name == "migration" else [])]:
         # A reader comes first, as it may: what it sees is whole, too.
@@ -142,8 +149,8 @@ def faults_after(name: str, room: Path, reader: list[str]) -> list[str]:
             if not file.read_bytes().rstrip().endswith(b"%%EOF"):
                 faults.append(f"{file.name} is half a file")
     again, said = typed(arguments(name, room))
-    if name == "publish" and again == 0:
-        faults += lake_faults(room)
+    if name in LAKES and again == 0:
+        faults += lake_faults(room, LAKES[name])
     if again != 0 and not (again == 2 and name in DONE_BEFORE and _was_done(name, room, said)):
         faults.append(f"the same verb again: {again} {said}")
     left = sorted(
@@ -158,10 +165,10 @@ def faults_after(name: str, room: Path, reader: list[str]) -> list[str]:
     return faults
 
 
-def lake_faults(room: Path) -> list[str]:
+def lake_faults(room: Path, name: str = NEW_LAKE) -> list[str]:
     """What a lake holds more or less of than the database that was published."""
     with (
-        LakeDatabase(f"ducklake:{room}/shops.ducklake") as lake,
+        LakeDatabase(f"ducklake:{room}/{name}") as lake,
         Database(room / "shop.duckdb", read_only=True) as db,
     ):
         return [
@@ -203,6 +210,7 @@ def prepare(room: Path) -> tuple[int, str]:
         [*base, "identify"],
         [*issue, "--run", "1"],
         [*base, "backup", str(room / "kept" / "full.duckdb")],
+        [*base, *_publishing(room, KNOWN_LAKE)],
         [*base, "event", "HU40-T", "a crash", "--at", "2026-03-05T07:00:00Z"],
         [*base, "backup", str(room / "kept" / "second.duckdb"), "--incremental"],
         [*base, "event", "HU40-T", "a repair", "--at", "2026-03-06T07:00:00Z"],
@@ -266,16 +274,17 @@ def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS, minut
     efforts: dict[str, Effort] = {}
     with tempfile.TemporaryDirectory() as folder:
         compute_once(Path(folder) / "computed")
-        prepared = Path(folder) / "prepared"
-        status, said, _ = forked(lambda: prepare(prepared))
+        prepared, room = Path(folder) / "prepared", Path(folder) / "room"
+        # Made where each trial has its copy: a lake keeps the address of its files.
+        status, said, _ = forked(lambda: prepare(room))
         assert status == 0, said
+        shutil.move(room, prepared)
         for seed in range(first_seed, first_seed + kills):
             if time.monotonic() > end:
                 break
             name = verbs[seed % len(verbs)]
             # The readers go on by one with every round of the verbs, so that each meets each.
             reader = READERS[(seed + seed // len(verbs)) % len(READERS)]
-            room = Path(folder) / "room"
             if name not in efforts:
                 # The first time computes what is kept; the second is the effort of those that follow.
                 for _ in range(2):

@@ -125,12 +125,12 @@ def test_an_export_that_was_killed_at_its_end_is_made_anew_or_whole(
 
     def die(path: Path, *arguments: object, **options: object) -> None:
         if path.exists() and path.name.startswith((".unfinished", "out.partial")):
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt("killed here")
         original(path, *arguments, **options)
 
     with monkeypatch.context() as killing:
         killing.setattr(Path, killed_at, die)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt, match="killed here"):
             export_tables(filled, tmp_path / "out")
     if killed_at == "replace":
         export_tables(filled, tmp_path / "out")

@@ -211,11 +211,11 @@ def test_a_publication_that_broke_is_resumed_and_nothing_is_there_twice(
             for statement in original(*arguments):  # type: ignore[arg-type]
                 calls += 1
                 if calls == at:
-                    raise Broken
+                    raise Broken("the network went away")
                 yield statement
 
         monkeypatch.setattr(publication, "statements", breaking)
-        with pytest.raises(Broken):
+        with pytest.raises(Broken, match="the network went away"):
             published(plants["Ulm"], lake, plant="Ulm")
     monkeypatch.setattr(publication, "statements", original)
     # A transaction that ends in a conflict is begun anew.

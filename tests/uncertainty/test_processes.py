@@ -30,7 +30,7 @@ def test_ctrl_c_while_a_worker_starts_is_heard_afterwards(monkeypatch):
     waiting.start()
     monkeypatch.setattr(SpawnProcess, "start", slow)
     try:
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt, match=r"^$"):
             Processes(1)
         assert len(begun) == 1
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -109,7 +109,7 @@ def test_what_it_had_written_is_undone(tmp_path: Path) -> None:
                 db.rows("SELECT 1")
 
         db.execute("CREATE TABLE tags (name TEXT)")
-        with stoppable(stop), pytest.raises(StoppedError):
+        with stoppable(stop), pytest.raises(StoppedError, match="was taken back"):
             write()
         assert db.rows("SELECT count(*) FROM tags") == [(0,)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from monitor.exceptions import DataError, EffectError, InputError
 from monitor.methods import campaign_method
 from monitor.methods.chain.likeness import Likeness
+from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.workflow.likeness import Drift, LikeRequest, Step, simulate_like
 
@@ -106,6 +108,61 @@ def test_a_hidden_effect_moves_a_row_by_its_peak() -> None:
     assert moved.max() == pytest.approx(4e-3, rel=1e-3)
     with pytest.raises(EffectError, match="there is no shape"):
         likeness.hidden("EXX:nope", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "effect"),
+    [
+        ("tilting-table", "EXX:reversal"),
+        ("free-form-pocket", "EYY:reversal"),
+        *(
+            pytest.param(name, effect, marks=pytest.mark.all_seeds)
+            for name, effect in (
+                ("tilting-table", "EYY:reversal"),
+                ("tilting-table", "EYY:windup5mm"),
+                ("free-form-pocket", "EXX:reversal"),
+                ("free-form-pins", "EYY:reversal"),
+                ("cold-cold", "EXX:reversal"),
+                ("cold-cold", "EBB:reversal"),
+                ("r-test", "EYY:reversal"),
+                ("laser", "EXX:reversal"),
+                ("ball-bar", "EXX:reversal"),
+                ("four-instruments", "EXX:reversal"),
+                ("mount-gem-28", "ECHA:reversal"),
+                ("tracked-robot", "EBJ2:reversal"),
+            )
+        ),
+    ],
+)
+def test_a_jump_at_reversal_is_hidden_and_estimated_with_its_size(name: str, effect: str) -> None:
+    """The way an axis came is the plan's: moves of the sought readings by micrometres do not turn it round."""
+    pattern = read_campaign(EXAMPLES / name)
+    method = campaign_method(pattern)
+    likeness = Likeness(pattern, method)
+    hidden, common = likeness.hidden(effect, 8e-3)
+    local = likeness.solution.local.copy()
+    made = likeness.campaign_with(local, np.random.default_rng(11), (hidden, common))
+    read_again = method.problem_of(made, method.own_model).foreseen()
+    np.testing.assert_array_equal(read_again.context.travel, likeness.problem.context.travel)
+    fitted = solve_problem(replace(read_again, added=hidden.added))
+    assert bool(fitted.common_free.all())
+    standard_uncertainty = np.sqrt(np.diag(fitted.common_covariance))
+    assert np.all(np.abs(fitted.common - common) < 4.5 * standard_uncertainty)
+    assert np.all(fitted.common > 0.5 * common)
+
+
+def test_a_mount_may_be_off_by_minutes_of_arc() -> None:
+    """Errors that are not small: the readings are found by steps with derivatives of their own."""
+    pattern = read_campaign(EXAMPLES / "mount-gem-28")
+    likeness = Likeness(pattern, campaign_method(pattern))
+    local, count = likeness.solution.local.copy(), len(likeness.problem.base_names)
+    free = likeness.solution.local_free[:, :count]
+    # 3 mrad are ten minutes of arc.
+    local[:, :count] += np.where(free, np.random.default_rng(3).normal(0.0, 3e-3, count), 0.0)
+    likeness.campaign_with(local, np.random.default_rng(4))
+    local[:, :count] += np.where(free, 0.3, 0.0)
+    with pytest.raises(DataError, match="choose a smaller drift, step or peak"):
+        likeness.campaign_with(local, np.random.default_rng(4))
 
 
 def test_what_cannot_be_simulated_is_refused(tmp_path: Path) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import UTC, datetime
 from email.message import EmailMessage
 from pathlib import Path
 from typing import Any
@@ -15,11 +17,18 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.store import Database, SharedDatabase
+from monitor.workflow.health import report as reporting
+from monitor.workflow.health.report import report
+from monitor.workflow.health.request import ReportRequest
+from monitor.workflow.health.task import Task, computed
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.watching import letter, watch as watching
 from monitor.workflow.watching.request import WatchAnswer, WatchRequest
 from monitor.workflow.watching.watch import watch
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+#: The week of the runs of the campaign.
+WEEK, MADE = "2012-W10", datetime(2012, 3, 12, tzinfo=UTC)
 MAIL = '[mail]\nserver = "localhost"\nsecurity = "none"\nfrom = "m@example.org"\nto = ["you@example.org"]\n'
 
 
@@ -105,11 +114,11 @@ def test_what_was_killed_goes_on_without_doing_anything_twice(
     path: Path, arrived: Path, where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def killed(*arguments: object, **more: object) -> None:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("killed here")
 
     with monkeypatch.context() as patch:
         patch.setattr(watching, where, killed)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt, match="killed here"):
             look(path, arrived)
     (campaign,) = look(path, arrived).arrived
     assert (campaign.state, campaign.identified) == ("unchanged", True)
@@ -175,6 +184,27 @@ def test_the_report_is_of_the_week_of_the_last_run(
         run.split(",")[1] for run in (arrived / "tilting-table" / "runs.csv").read_text().splitlines()[1:]
     )
     assert answer.report.from_ <= last[:10] <= answer.report.to
+
+
+def test_without_a_report_what_the_next_one_rests_on_is_stored(
+    path: Path, arrived: Path, tmp_path: Path, pdf_unread: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The report has nothing to compute, and says what one says that computes everything."""
+    look(path, arrived)
+    fresh = tmp_path / "fresh.duckdb"
+    tasks: list[Task | None] = []
+    monkeypatch.setattr(reporting, "computed", lambda task: tasks.append(task) or computed(task))
+    pages = []
+    for database in (path, fresh):
+        with Database(database, threads=1) as db, pdf_unread():
+            import_folders(db, ImportRequest([arrived / "tilting-table"]))
+            answer = report(db, ReportRequest(WEEK, out=tmp_path / database.stem, made_at=MADE))
+        pages.append(
+            re.sub("number [0-9]+, has the SHA-256 [0-9a-f]+", "", Path(answer.files[0]).read_text())
+        )
+    assert tasks[0] is None
+    assert tasks[1] is not None
+    assert pages[0] == pages[1]
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,9 @@ def options(parser: ArgumentParser) -> None:
         help="only entries with all these words in time, user, action, subject or key",
     )
     parser.add_argument(
-        "--check", action="store_true", help="name entries that were edited, removed or put elsewhere"
+        "--check",
+        action="store_true",
+        help="name entries that were edited, removed or put elsewhere, and what has none",
     )
 
 
@@ -41,5 +43,7 @@ def run(options: Namespace) -> int:
         for fault in answer.faults or ():
             output.say(fault)
         if answer.faults == ():
-            output.say("every entry of the audit is in its place and as it was written")
+            output.say(
+                "every entry of the audit is in its place and as it was written, and what is stored has an entry"
+            )
     return 1 if answer.faults else 0

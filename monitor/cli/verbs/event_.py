@@ -12,7 +12,8 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.moments import moment
 from monitor.cli.parser import common
-from monitor.workflow.events import EventRequest, event
+from monitor.store import NOTE
+from monitor.workflow.events import USUAL_KINDS, EventRequest, event
 
 EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B axis encoder changed"'
 
@@ -31,7 +32,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--kind",
         default="note",
-        help="a word: crash, repair, compensation, probe; note (the default) where nothing changed the machine",
+        help=f"a word: {', '.join(USUAL_KINDS)}; note (the default) where nothing changed the machine",
     )
 
 
@@ -46,6 +47,11 @@ def run(options: Namespace) -> int:
         answer = ask(db, event, request)
     if options.json:
         output.document(answer)
-    else:
-        output.listing(answer.events, "nothing was recorded yet")
+        return 0
+    output.listing(answer.events, "nothing was recorded yet")
+    if options.text is not None and options.kind == NOTE:
+        output.say(
+            "recorded as a note, which does not split the history; "
+            f"--kind {', '.join(USUAL_KINDS)} or another word does"
+        )
     return 0

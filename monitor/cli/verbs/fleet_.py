@@ -21,6 +21,8 @@ EXAMPLE = "monitor fleet --top 50"
 
 #: Campaigns that are named where they lack numbers.
 MOST_NAMED = 10
+#: What a machine is called of which nothing was identified.
+NOT_JUDGED = "not judged: not identified"
 
 
 def options(parser: ArgumentParser) -> None:
@@ -44,12 +46,16 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     answer = on_screen(answer)
+    without = answer.without_numbers or ()
+    count = answer.machines + len(without)
+    lacking = f", {len(without)} of them without numbers" if without else ""
     output.table(
-        f"{answer.machines} machine{'' if answer.machines == 1 else 's'}, {answer.values} values; "
+        f"{count} machine{'' if count == 1 else 's'}{lacking}, {answer.values} values; "
         "q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
          "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
-        [_cells(row) for row in answer.table], text_columns=6,
+        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in without), *(_cells(row) for row in answer.table)],
+        text_columns=6,
     )  # fmt: skip
     for attention, count in answer.attention.items():
         if count:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from monitor.cli import output, understood_output
 from monitor.cli.database import ask, opened
+from monitor.cli.folder_patterns import in_full
 from monitor.cli.parser import common
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 
@@ -39,7 +40,7 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    request = ImportRequest(options.folder, options.mapping, options.campaign, options.dry_run)
+    request = ImportRequest(in_full(options.folder), options.mapping, options.campaign, options.dry_run)
     with ExitStack() as stack:
         if options.dry_run and options.server is None and not Path(options.db).exists():
             # Nothing is stored, and no database is left behind either.

@@ -15,6 +15,7 @@ from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
+from monitor.reporting.health.records import state_in_words
 from monitor.workflow.health.mail import mail_report, read_mail_settings
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportAnswer, ReportOptions, ReportRequest
@@ -110,7 +111,7 @@ def _say(answer: ReportAnswer) -> None:
         [
             [
                 row.machine,
-                row.state,
+                state_in_words(row),
                 str(row.changed),
                 "-" if row.since is None else f"{row.since:%Y-%m-%d}",
                 "-" if row.probability_out is None else f"{row.probability_out:.2g}",

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.configuration import configuration
+from monitor.cli.garbage import collect_as_usual
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 
@@ -65,6 +66,7 @@ def run(options: Namespace) -> int:
         certificate=options.certificate, key=options.key, proxy=options.behind_proxy, reading_only=options.read_only,
         tolerances=configuration().tolerances or {}, trusted_signers=configuration().trusted_signers,
     )  # fmt: skip
+    collect_as_usual()
     serve(settings, lambda text: print(text, flush=True))
     return 0
 

@@ -36,7 +36,7 @@ def run(options: Namespace) -> int:
     query = sys.stdin.read() if options.query == "-" else options.query
     as_table = not (options.csv or options.json)
     limit = SHOWN if options.limit is None and as_table else options.limit
-    with opened(options) as db:
+    with opened(options) as db, output.working("asking"):
         answer = ask(db, sql, SqlRequest(query, limit))
     if options.json:
         output.document(answer)

@@ -26,6 +26,12 @@ def options(parser: ArgumentParser) -> None:
         help="how many identifications to compute anew from the stored readings (default 3)",
     )  # fmt: skip
     parser.add_argument(
+        "--seed",
+        type=int,
+        metavar="N",
+        help="draw these as an earlier verification did that printed its seed",
+    )
+    parser.add_argument(
         "--trust", type=Path, metavar="FILE",
         help="check the signature of every certificate against these signers: certificates (PEM or DER), or a SHA-256 "
         "fingerprint a line (default: trusted_signers of the configuration)",
@@ -35,7 +41,11 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
         trusted = options.trust or configuration().trusted_signers
-        answer = ask(db, keeping.verify, keeping.VerifyRequest(options.anchor, options.recompute, trusted))
+        answer = ask(
+            db,
+            keeping.verify,
+            keeping.VerifyRequest(options.anchor, options.recompute, trusted, options.seed),
+        )
     if options.json:
         output.document(answer)
     else:
@@ -43,8 +53,8 @@ def run(options: Namespace) -> int:
             output.say(fault)
         if answer.anchored_entry is not None:
             output.say(f"the hash kept elsewhere is that of entry {answer.anchored_entry}")
-        if answer.recomputed:
-            output.say(f"identifications computed anew from the stored readings: {answer.recomputed}")
+        if answer.recomputable or answer.of_other_versions:
+            output.say(_recomputed(answer))
         if answer.signed_certificates is not None:
             output.say(
                 f"signed certificates: {answer.signed_certificates}, of trusted signers: {answer.trusted_signatures}"
@@ -53,6 +63,16 @@ def run(options: Namespace) -> int:
             f"{options.db} {_verdict(answer)}: {answer.entries} entries, the last with hash {answer.last_sha256}"
         )
     return 0 if answer.ok else 1
+
+
+def _recomputed(answer: keeping.VerifyAnswer) -> str:
+    """Say how large the sample was, and what it was not drawn from."""
+    drawn = "" if answer.seed is None else f", drawn by --seed {answer.seed}"
+    others = f"; {answer.of_other_versions} of other versions are not" if answer.of_other_versions else ""
+    return (
+        f"identifications computed anew from the stored readings: {answer.recomputed} of {answer.recomputable}"
+        f"{drawn}{others}"
+    )
 
 
 def _verdict(answer: keeping.VerifyAnswer) -> str:

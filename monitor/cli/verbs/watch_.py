@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from monitor.cli import output
 from monitor.cli.configuration import configuration
 from monitor.cli.database import opened_file, refuse_server
+from monitor.cli.garbage import collect_as_usual
 from monitor.cli.parser import common
 from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
@@ -76,6 +77,7 @@ def run(options: Namespace) -> int:
         return _look(options, request)
     output.say(f"watching {options.folder}, every {options.every:g} s; Ctrl-C ends it")
     said = ""
+    collect_as_usual()
     while True:
         try:
             _look(options, request)
@@ -118,7 +120,9 @@ def _left_for_later(answer: WatchAnswer) -> list[str]:
 
 def _written(answer: WatchAnswer) -> list[str]:
     """The states of the report's machines, its files, and to whom a letter went."""
+    from monitor.reporting.health.records import state_in_words
+
     report = answer.report
-    lines = [] if report is None else [f"{row.machine}: {row.state}" for row in report.machines]
+    lines = [] if report is None else [f"{row.machine}: {state_in_words(row)}" for row in report.machines]
     lines += [] if report is None else report.files
     return [*lines, *(f"sent to {address}" for address in answer.mailed_to)]

@@ -9,14 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.noise.correlation import (
-    Correlation,
-    NoiseDesign,
-    Whitening,
-    rows_of,
-    turned_into_readings,
-)
+from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign, Whitening
 from monitor.discovery.machine.noise.plan_cells import plan_cells
+from monitor.discovery.machine.noise.rows import neighbours_of
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
@@ -135,11 +130,10 @@ class Fit:
     @cached_property
     def noise_design(self) -> NoiseDesign:
         """What the estimate of that correlation needs besides the residuals."""
-        rows = rows_of(self.problem)
+        rows = neighbours_of(self.problem, self.by_error)
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )
-        rows = replace(rows, turned=turned_into_readings(self.problem, self.by_error))
         last = self.solution.last
         several = len(last.residual) > 1
         unknowns = last.local if several else np.concatenate([last.local, last.common], axis=2)
@@ -149,7 +143,7 @@ class Fit:
         """The fit with the noise of neighbours correlated as said."""
         if correlation is None:
             return replace(self, whitening=None)
-        rows = replace(rows_of(self.problem), turned=turned_into_readings(self.problem, self.by_error))
+        rows = neighbours_of(self.problem, self.by_error)
         return replace(self, whitening=Whitening(rows, correlation))
 
     @cached_property

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
+import numpy as np
+
 from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
 from monitor.discovery.machine.joints.robot_search import (
@@ -77,16 +79,42 @@ class ChainSearch:
     def under(self, first: Fit, beside_curves: Suspects | None = None) -> ChainRound:
         """Search until nothing changes, from a fit that leaves the ``gross`` readings out; beside the curves of joints
         one that leaves out the suspects so far."""
-        rounds = _Rounds(self, first, beside_curves)
-        latest, settled = in_rounds(rounds, MOST_ROUNDS)
-        if not settled:
-            latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
+        latest, settled = self._settled(first, beside_curves, None)
+        # Of one run, effects may take up noise that walks, or noise an effect, and either stands under its own noise.
+        correlation = (
+            None if len(self.problem.runs) > 1 or beside_curves is not None else correlation_under(first)
+        )
+        if correlation is not None and latest.refined:
+            other, other_settled = self._settled(first, beside_curves, correlation)
+            if self._cost(other) < self._cost(latest):
+                latest, settled = other, other_settled
         reached = {
-            Limit.EFFECTS: len(latest.refined) >= rounds.most_effects,
+            Limit.EFFECTS: len(latest.refined)
+            >= (MOST_EFFECTS if beside_curves is None else MOST_BESIDE_CURVES),
             Limit.BAD_POINTS: len(latest.suspects.bad) >= MOST_BAD_POINTS,
             Limit.ROUNDS: not settled,
         }
         return replace(latest, limits=tuple(limit for limit, is_reached in reached.items() if is_reached))
+
+    def _settled(
+        self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None
+    ) -> tuple[ChainRound, bool]:
+        """What stands in the end, from noise of so correlated neighbours on, and whether it settled."""
+        rounds = _Rounds(self, first, beside_curves, correlation)
+        latest, settled = in_rounds(rounds, MOST_ROUNDS)
+        if not settled:
+            latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
+        return latest, settled
+
+    def _cost(self, latest: ChainRound) -> float:
+        """Minus twice the logarithm of the restricted likelihood of what was found, with Schwarz's price of what it has
+        free, that of each choice among all families, and of every reading left out."""
+        under, families = latest.under, len({variant.family for variant in self.variants})
+        correlation = None if under.whitening is None else under.whitening.correlation
+        left_out = int(under.left_out.sum()) * self.problem.sigma.shape[1]
+        free = under.nuisance.basis.shape[2] + left_out + 2 * (correlation is not None)
+        price = free * np.log(under.readings + left_out) + 2.0 * len(latest.refined) * np.log(families)
+        return under.noise_design.deviance(under.solution.last.residual, correlation) + float(price)
 
 
 NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]
@@ -96,7 +124,9 @@ class _Rounds:
     """The rounds of a search on a chain, and the conditions of the present one: suspects, the correlation of neighbours
     and the families that cannot be fitted."""
 
-    def __init__(self, search: ChainSearch, first: Fit, beside_curves: Suspects | None) -> None:
+    def __init__(
+        self, search: ChainSearch, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None
+    ) -> None:
         self.search = search
         self.first = first
         self.beside_curves = beside_curves is not None
@@ -104,7 +134,7 @@ class _Rounds:
         self.initial = search.gross if beside_curves is None else beside_curves
         # A ball that shakes hides effects and makes others; runs that do not share it show it before any is known.
         self.suspects = self.initial if self.beside_curves else self._with_scatter()
-        self.correlation: Correlation | None = None
+        self.correlation = correlation
         self.unfitted: dict[str, None] = {}
         self._noises: NoiseTurns = Turns()
         self._earlier: Turns[SuspectNames, ChainRound] = Turns()

@@ -19,6 +19,7 @@ from monitor.discovery.search.evidence import Evidence, best_of_families, pool_o
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
 from monitor.discovery.search.steps import step_by_step
+from monitor.progress import told
 from monitor.statistics import control_false_discoveries
 from monitor.stopping import checkpoint
 
@@ -84,6 +85,11 @@ def findings_of(scene: Scene[CandidateT], selected: Sequence[CandidateT]) -> tup
     return _Steps(scene, Acceptance(scene)).findings(selected)
 
 
+#: Where a round stands when it weighs its first candidates and when its steps end, and by how much each further step
+#: is nearer to that end: medians of nine examples. What is left is the fit of what was accepted, and its rivals.
+FIRST_WEIGHED, STEPS_END, SLOWER = 0.25, 0.5, 0.8
+
+
 def findings_without_rivals(
     scene: Scene[CandidateT], selected: Sequence[CandidateT], families: int
 ) -> list[Finding[CandidateT]]:
@@ -104,12 +110,15 @@ class _Steps(Generic[CandidateT]):
         self.rate = rate
         self.families = family_count(scene)
         self.pool = pool_of(scene)
+        self._weighings = 0
         self._weighed: Memory[list[Evidence[CandidateT]]] = Memory()
         self._alone: Memory[Evidence[CandidateT]] = Memory()
 
     def weighed(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
         """Evidence for the candidates of the pool that can be separated from the selected ones, given these."""
         checkpoint()
+        self._weighings += 1
+        told(FIRST_WEIGHED + (STEPS_END - FIRST_WEIGHED) * (1.0 - SLOWER**self._weighings))
         weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, self.pool, selected))
         return self.rules.separable(selected, weighed)
 

@@ -2,6 +2,9 @@
 
 Whatever a method measures, its problem says what is left of every row at given errors. The numbers that were read, the
 linear axes of a touch or the columns of an instrument, are moved until just the noise is left.
+
+Effects see the poses of the plan, where the pattern's own errors let the measured axes stop, and not the readings that
+are sought: which way an axis came to its pose is the plan's; a reading moved by a micrometre must not turn it round.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import numpy as np
 from monitor.effects import Effect, parse_effect
 from monitor.exceptions import DataError, EffectError
 from monitor.methods.chain.least_squares import Solution
-from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.methods.method import ChainMethod
 from monitor.records import Array, Campaign, Probings
 
@@ -23,10 +26,11 @@ from monitor.records import Array, Campaign, Probings
 NOMINAL = "nominal"
 #: What rounding leaves of a point that was turned into another frame, mm.
 EXACT_MM = 1e-7
-#: Newton steps: rows are linear in what was read but for products of errors and turns of 1e-4.
-STEPS = 4
-#: What may be left of a row besides its noise, against its standard uncertainty.
-CLOSE_ENOUGH = 1e-3
+#: Newton steps with the derivatives at the pattern: rows are linear in what was read but for products of errors and
+#: turns of 1e-4, so four do there; larger errors (a mount's angles of minutes) get derivatives of their own, and more.
+FIRST_STEPS, MOST_STEPS = 4, 24
+#: What may be left of a row besides its noise, against its standard uncertainty, and where more steps gain nothing.
+CLOSE_ENOUGH, EXACT = 1e-3, 1e-6
 #: Step of the numerical derivative against the size of the numbers of a column.
 STEP = 1e-6
 
@@ -49,9 +53,10 @@ class Likeness:
 
     def __init__(self, campaign: Campaign, method: ChainMethod) -> None:
         self.campaign, self.method = campaign, method
-        self.problem = method.problem_of(campaign, method.own_model)
-        method.refuse(campaign, self.problem)
-        self.solution: Solution = solve_problem(self.problem)
+        problem = method.problem_of(campaign, method.own_model)
+        method.refuse(campaign, problem)
+        self.solution: Solution = solve_problem(problem)
+        self.problem = _with_planned_poses(problem, self.solution)
         knows_columns = bool(self.problem.read_columns)
         self.kept = {} if knows_columns else _kept_numbers(self.problem, campaign.probings.channels)
         self.frames = None if knows_columns or self.kept else _frames(self.problem, campaign.probings)
@@ -97,22 +102,21 @@ class Likeness:
         weighed = np.isfinite(self.problem.sigma)
         wanted = np.where(weighed, noise * np.where(weighed, self.problem.sigma, 0.0), 0.0)
         probings = self.campaign.probings
-        # The derivatives hardly change over errors of 1e-4: those at the pattern serve every step.
-        slopes = np.stack(
-            [self._slope(probings, column, local, common, effects) for column in self.columns], axis=-1
-        )
-        slopes[~weighed] = 0.0
-        inverse = np.linalg.pinv(slopes)
-        for _ in range(STEPS):
-            remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
+        remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
+        inverse = np.zeros((0, 0, 0))
+        for step in range(MOST_STEPS):
+            if self._worst(remaining) <= EXACT:
+                break
+            if step == 0 or step >= FIRST_STEPS:
+                inverse = self._inverse(probings, local, common, effects)
             moved = np.einsum("nkd,nd->nk", inverse, remaining)
             probings = _moved(probings, dict(zip(self.columns, -moved.T, strict=True)))
-        remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
-        worst = float(np.max(np.abs(remaining) / np.where(weighed, self.problem.sigma, 1.0), initial=0.0))
+            remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
+        worst = self._worst(remaining)
         if worst > CLOSE_ENOUGH:
             raise DataError(
                 f"no readings of the plan of {self.campaign.name} show these errors: {worst:.2g} standard "
-                "uncertainties are left of a row; choose smaller ones"
+                "uncertainties are left of a row; choose a smaller drift, step or peak"
             )
         return replace(self.campaign, probings=_as_written(probings, self.campaign.probings, self.columns))
 
@@ -135,6 +139,19 @@ class Likeness:
             for name, values in probings.channels.items()
             if np.isfinite(values).all() and np.any(self._slope(probings, name, local, common, ()))
         )
+
+    def _worst(self, remaining: Array) -> float:
+        """The largest of what is left of the rows (n, d), in standard uncertainties; rows without a weight are zero."""
+        sigma = np.where(np.isfinite(self.problem.sigma), self.problem.sigma, 1.0)
+        return float(np.max(np.abs(remaining) / sigma, initial=0.0))
+
+    def _inverse(self, probings: Probings, local: Array, common: Array, effects: tuple[Effect, ...]) -> Array:
+        """The shortest moves (n, k, d) of the numbers of the columns for a row that changes by 1 mm."""
+        slopes = np.stack(
+            [self._slope(probings, column, local, common, effects) for column in self.columns], axis=-1
+        )
+        slopes[~np.isfinite(self.problem.sigma)] = 0.0
+        return np.asarray(np.linalg.pinv(slopes))
 
     def _left(self, probings: Probings, local: Array, common: Array, effects: tuple[Effect, ...]) -> Array:
         return np.array(replace(self._problem_with(probings), added=effects).vectors(local, common))
@@ -176,6 +193,13 @@ class Likeness:
             for way in (1.0, -1.0)
         )
         return np.asarray((above - below) / (2.0 * step))
+
+
+def _with_planned_poses(problem: ChainProblem, solution: Solution) -> ChainProblem:
+    """The problem whose effects see where the measured axes stop under a solution, whatever is read later."""
+    if problem.context.expected is not None or not problem.measured_joints:
+        return problem
+    return replace(problem, context=problem.context.expecting(stops(problem, solution)))
 
 
 def _frames(problem: ChainProblem, probings: Probings) -> Frames | None:

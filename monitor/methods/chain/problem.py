@@ -335,25 +335,34 @@ def _best_of(
 
 
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
-    """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
-    for effect, columns in zip(problem.base, problem.base_columns, strict=True):
-        if not problem.is_limited[columns.start]:
-            continue
-        free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
-        errors = np.where(free, values, 0.0)
-        worst = int(np.abs(errors).argmax())
-        if abs(errors[worst]) > problem.largest_error:
-            is_gain = isinstance(effect, ChainEffect) and effect.is_gain
-            # A tip that truly moves by 1 + gain of what was typed.
-            units = mistaken_for_mm(1.0 / (1.0 + errors[worst])) if is_gain and errors[worst] > -1.0 else ()
-            looks = "".join(
-                f"; it looks as if the unit of its readings were {unit.name}, not mm" for unit in units
-            )
-            raise DataError(
-                f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
-                f"{'mm/mm' if is_gain else 'rad'}, which is no error of a machine: the readings contradict the machine "
-                f"file{looks}; check the axis signs, the topology, the units, the columns and the order of the targets"
-            )
+    """DataError where a location angle or a gain comes out too large to be an error, or too much is left.
+
+    The largest of all runs is named, and how many runs have one.
+    """
+    limited = [
+        (effect, columns.start)
+        for effect, columns in zip(problem.base, problem.base_columns, strict=True)
+        if problem.is_limited[columns.start]
+    ]
+    columns = [column for _, column in limited]
+    errors = np.where(solution.local_free[:, columns], solution.local[:, columns], 0.0)
+    too_large = np.abs(errors) > problem.largest_error
+    if too_large.any():
+        run, which = np.unravel_index(int(np.abs(errors).argmax()), errors.shape)
+        (effect, column), error = limited[int(which)], float(errors[run, which])
+        is_gain = isinstance(effect, ChainEffect) and effect.is_gain
+        # A tip that truly moves by 1 + gain of what was typed.
+        units = mistaken_for_mm(1.0 / (1.0 + error)) if is_gain and error > -1.0 else ()
+        looks = "".join(
+            f"; it looks as if the unit of its readings were {unit.name}, not mm" for unit in units
+        )
+        others = int(too_large.any(axis=1).sum()) - 1
+        alike = f" ({others} other run{'s' * (others > 1)} too)" if others else ""
+        raise DataError(
+            f"run {problem.runs[run]}{alike}: {problem.base_names[column]} comes out at {error:.3g} "
+            f"{'mm/mm' if is_gain else 'rad'}, which is no error of a machine: the readings contradict the machine "
+            f"file{looks}; check the axis signs, the topology, the units, the columns and the order of the targets"
+        )
     wrong = problem.contradiction(solution)
     if wrong is not None:
         raise DataError(f"the readings contradict the machine file: {wrong}")

@@ -19,6 +19,7 @@ from monitor.readers.foreign_units import (
     as_angle,
     decimal_of,
     foreign_unit,
+    has_full_parts,
     plain,
     unit_names,
     unit_of_column,
@@ -159,7 +160,9 @@ def _check(
     for line, cell in zip(lines, cells, strict=True):
         number = decimal_of(cell)
         fault = (
-            f"{quoted(cell)} is no finite number{example}" if number is None else beyond(name, float(number))
+            f"{quoted(cell)} {_what_is_wrong(cell)}{example}"
+            if number is None
+            else beyond(name, float(number))
         )
         if fault is None:
             continue
@@ -167,6 +170,11 @@ def _check(
             table.fault(name, fault)
             break
         table.faults.add(file, line, f"{origin.column} ({name})", fault)
+
+
+def _what_is_wrong(cell: str) -> str:
+    """Why a cell is no angle and no weather, in words that follow it."""
+    return "has minutes or seconds that are not below 60" if has_full_parts(cell) else "is no finite number"
 
 
 def matching(export: Export, name: str) -> str | None:

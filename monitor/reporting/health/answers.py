@@ -37,7 +37,7 @@ _WITHOUT_LIMIT: tuple[State, ...] = (
 #: Names of machines in a sentence; of more, their number.
 _NAMED = 6
 #: A drift is spoken of below this probability of seeing it where there is none.
-_DRIFT_P = 0.05
+DRIFT_P = 0.05
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
 _QUIET_IN_PART = (
     "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
@@ -94,8 +94,7 @@ def concern(health: MachineHealth) -> ParameterHealth | None:
     """Return the parameter that makes a machine's state, or is nearest to make it; None without parameters."""
     parameters = health.parameters
     if is_due(health):
-        check = health.next_check
-        named = [each for each in parameters if isinstance(check, NextCheck) and each.name == check.parameter]
+        named = [each for each in parameters if each.name == health.due]
         if named:
             return named[0]
     if health.state is State.CHANGED:
@@ -111,7 +110,7 @@ def concern(health: MachineHealth) -> ParameterHealth | None:
 def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
     """A drift that reaches its limit counts before one that does not, after the probability to be out already."""
     out, drift = parameter.probability_out or 0.0, parameter.drift
-    reaches = parameter.reaches_soon and drift is not None and drift.p_value < _DRIFT_P
+    reaches = parameter.reaches_soon and drift is not None and drift.p_value < DRIFT_P
     used = abs(parameter.estimate) / parameter.tolerance if parameter.tolerance else 0.0
     return (out if out > 0.01 else 0.0), float(reaches), used
 
@@ -211,7 +210,7 @@ def _stands(parameter: ParameterHealth) -> str:
 
 def _moves(parameter: ParameterHealth, drift: Drift) -> str:
     """How much the parameter gets further from zero (grows) or nearer to it a month, where that is no chance."""
-    if drift.p_value >= _DRIFT_P:
+    if drift.p_value >= DRIFT_P:
         return ""
     month, _ = in_words(abs(drift.per_year) / 12.0, drift.u_per_year / 12.0)
     verb = "grows" if drift.per_year * parameter.estimate > 0.0 else "shrinks"
@@ -327,7 +326,7 @@ def _unjudged(fleet: Fleet) -> str:
         for state, phrase in (
             (State.NOT_MEASURED, "not measured this week"),
             (State.NOT_EVALUATED, "measured but not evaluated"),
-            (State.NO_CHANGE_SEEN, "not against every tolerance"),
+            (State.NO_CHANGE_SEEN, "not every parameter has a tolerance"),
         )
         if (rows := [row for row in fleet.rows if row.state == state and row not in open_rows])
     ]

@@ -13,6 +13,8 @@ from monitor.reporting.health.columns import column_widths
 from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
     ALARMS,
+    DUE,
+    DUE_MEANS,
     STATES,
     Change,
     ConditionRange,
@@ -24,6 +26,7 @@ from monitor.reporting.health.records import (
     VolumetricMap,
     fleet_row,
     is_due,
+    state_in_words,
 )
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health.trend_picture import trend_picture
@@ -56,9 +59,8 @@ LOOKS = {
     State.IN_TOLERANCE: "good",
     State.NO_CHANGE_SEEN: "good",
 }
-#: How a machine is named that its drift may have taken out of tolerance since it was measured.
-_DUE_SIGN, _DUE = "◔", "due for a check"
-_DUE_MEANS = "nothing is wrong so far, but by its drift it need not be in tolerance any more"
+#: The sign of a machine that is due for a check.
+_DUE_SIGN = "◔"
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
 _BLIND_SHOWN = 4
 #: Changes and events named on the page, the latest first.
@@ -88,11 +90,15 @@ class FleetLine:
 
 @dataclass(frozen=True)
 class Card:
-    """A machine that needs attention on the first page: why, what to do, and the history of what is wrong."""
+    """A machine that needs attention on the first page: why, what to do, and the history of what is wrong.
+
+    ``alike`` names others of which the same is found.
+    """
 
     head: FleetLine
     reason: str
     to_do: str
+    alike: str
     picture: Markup
 
 
@@ -151,7 +157,11 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "legend": _legend(fleet.rows),
         "noticed": [(machine, _anchor(machine), what) for machine, what in fleet.noticed],
         "answers": answers(fleet),
-        "cards": [_card(health) for health in fleet.attention if health.state in URGENT or is_due(health)],
+        "cards": [
+            _card(health, fleet.alike.get(health.machine, ()))
+            for health in fleet.attention
+            if health.state in URGENT or is_due(health)
+        ],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state is not State.NOT_MEASURED for row in fleet.rows),
@@ -161,15 +171,17 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
 def _legend(rows: Sequence[FleetRow]) -> list[tuple[str, str, str]]:
     """Sign, word and meaning of the states on the page."""
     states = {row.state for row in rows if not is_due(row)}
-    due = [(_DUE_SIGN, _DUE, _DUE_MEANS)] if any(map(is_due, rows)) else []
+    due = [(_DUE_SIGN, DUE, DUE_MEANS)] if any(map(is_due, rows)) else []
     return [
         *((SIGNS[state], state.value, meaning) for state, meaning in STATES.items() if state in states),
         *due,
     ]
 
 
-def _card(health: MachineHealth) -> Card:
-    return Card(_line(fleet_row(health)), reason(health), to_do(health), _card_picture(health))
+def _card(health: MachineHealth, alike: tuple[str, ...]) -> Card:
+    return Card(
+        _line(fleet_row(health)), reason(health), to_do(health), ", ".join(alike), _card_picture(health)
+    )
 
 
 def _card_picture(health: MachineHealth) -> Markup:
@@ -196,7 +208,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
     return PrintedMachine(
         health=health,
         head=_line(fleet_row(health)),
-        meaning=_DUE_MEANS if is_due(health) else STATES[health.state],
+        meaning=DUE_MEANS if is_due(health) else STATES[health.state],
         lines=lines,
         widths=column_widths(lines),
         no_trend=(
@@ -243,7 +255,7 @@ def _line(row: FleetRow) -> FleetLine:
         anchor=_anchor(row.machine),
         location=row.location,
         sign=_DUE_SIGN if is_due(row) else SIGNS[row.state],
-        state=_DUE if is_due(row) else row.state,
+        state=state_in_words(row),
         look="doubtful" if is_due(row) else LOOKS[row.state],
         alarm=row.state in ALARMS,
         changed=str(row.changed),

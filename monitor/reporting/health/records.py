@@ -6,6 +6,7 @@ that could not be made is a text that says why, never an empty place.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
@@ -13,7 +14,6 @@ from enum import StrEnum
 from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
 from monitor.reporting.health.comparison import ModelHealth
-from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.svg.map_slices import Slice
 
 
@@ -52,6 +52,9 @@ STATES: dict[State, str] = {
     State.IN_TOLERANCE: "every parameter is within its tolerance and nothing changed",
     State.NO_CHANGE_SEEN: "nothing changed; not every parameter has a tolerance to be judged by",
 }
+#: How a machine is named that its drift may have taken out of tolerance since it was measured, and what that means.
+DUE = "due for a check"
+DUE_MEANS = "nothing is wrong so far, but by its drift it need not be in tolerance any more"
 #: The states that `--fail-on-alarm` answers with exit status 1.
 ALARMS: tuple[State, ...] = (State.OUT_OF_TOLERANCE, State.MAY_BE_OUT_OF_TOLERANCE, State.NOT_EVALUATED)
 
@@ -208,7 +211,8 @@ class MachineHealth:
     """One machine in one week. ``run`` is the run whose numbers stand in ``parameters``, ``basis`` how they were found.
 
     ``probability_out`` that any parameter with a tolerance is beyond it, jointly. What a new record says are kinds with
-    numbers (``sentences.py``), what a stored one says are their words.
+    numbers (``sentences.py``), what a stored one says are their words. ``due`` names the parameter whose drift may have
+    taken a machine out of tolerance with which nothing was wrong when it was measured; None in older records.
     """
 
     machine: str
@@ -228,11 +232,12 @@ class MachineHealth:
     model: ModelHealth | None
     quality: DataQuality
     map: VolumetricMap | None
+    due: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class FleetRow:
-    """A machine in the fleet table."""
+    """A machine in the fleet table; ``due`` as in ``MachineHealth``."""
 
     machine: str
     location: str
@@ -241,6 +246,7 @@ class FleetRow:
     since: datetime | None
     probability_out: float | None
     next_check: Said
+    due: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -249,8 +255,9 @@ class Fleet:
 
     ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
     says whether the week had, by the shop's clock, when the report was made. ``attention`` are the records of the most
-    urgent machines, for the pictures and answers of the first page. ``noticed``: machine and sentence of what was
-    noticed in the week under weekly looks at the fleet. ``anchor`` is the last entry of the audit when the report was
+    urgent machines, for the pictures and answers of the first page; ``alike`` names by machine the others of which the
+    same is found. ``noticed``: machine and sentence of what was noticed in the week under weekly looks at the fleet.
+    ``anchor`` is the last entry of the audit when the report was
     made.
     """
 
@@ -265,6 +272,7 @@ class Fleet:
     ended: bool = True
     noticed: tuple[tuple[str, str], ...] = ()
     attention: tuple[MachineHealth, ...] = ()
+    alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     anchor: AuditAnchor | None = None
 
 
@@ -278,14 +286,18 @@ def fleet_row(health: MachineHealth) -> FleetRow:
         health.since,
         health.probability_out,
         health.next_check,
+        health.due,
     )
 
 
 def is_due(machine: FleetRow | MachineHealth) -> bool:
     """Return whether nothing is wrong with a machine so far, but by its drift it need not be in tolerance any more."""
-    check = machine.next_check
-    fine = machine.state in (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
-    return fine and isinstance(check, NextCheck) and check.kind is CheckKind.PASSED
+    return machine.due is not None
+
+
+def state_in_words(machine: FleetRow | MachineHealth) -> str:
+    """Return the state of a machine as it is printed: one that is due is not said to be unchanged."""
+    return DUE if is_due(machine) else machine.state
 
 
 def by_urgency(row: FleetRow) -> tuple[float, float, str]:

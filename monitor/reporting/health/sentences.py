@@ -98,6 +98,20 @@ class ModelLacks(Sentence):
 
 
 @dataclass(frozen=True)
+class Drifting(Sentence):
+    """A parameter that makes the state of its machine drifts, by ``per_year`` with ``u_per_year``."""
+
+    parameter: str
+    per_year: float
+    u_per_year: float
+    unit: str
+
+    def __str__(self) -> str:
+        month, _ = in_words(self.per_year / 12.0, self.u_per_year / 12.0, sign=True)
+        return f"{self.parameter} drifts by {month} {self.unit} a month"
+
+
+@dataclass(frozen=True)
 class ImportsRefused(Sentence):
     """Imports that were refused and did not come in since, the last on ``last``."""
 
@@ -112,16 +126,20 @@ class ImportsRefused(Sentence):
 
 @dataclass(frozen=True)
 class NewThisWeek(Sentence):
-    """What is new: the first of it, how many are not named, and what the model lacks."""
+    """What is new: the first of it, how many are not named, what the model lacks, and what drifts on."""
 
     named: tuple[Said, ...]
     more: int = 0
     lacking: tuple[ModelLacks, ...] = ()
+    drifting: tuple[Drifting, ...] = ()
 
     def __str__(self) -> str:
         rest = [f"and {self.more} more"] if self.more else []
         named = [what.brief if isinstance(what, SteppedAtEvent) else str(what) for what in self.named]
-        return "; ".join([*named, *rest, *map(str, self.lacking)]) or "nothing this week"
+        return (
+            "; ".join([*named, *rest, *map(str, self.lacking), *map(str, self.drifting)])
+            or "nothing this week"
+        )
 
 
 @dataclass(frozen=True)

@@ -111,11 +111,13 @@ def _chain(source: Path) -> tuple[Backup, ...]:
     path, expected = source, None
     while True:
         if not path.is_file():
-            follows = f", which {chain[0].path} follows" if chain else ""
+            how = "; `monitor backup FILE` makes one, to be put back later"
+            follows = f", which {chain[0].path} follows" if chain else how
             raise StoreError(f"there is no backup {path}{follows}")
         if not manifest_of(path).is_file():
             raise StoreError(
-                f"{path} has no manifest {manifest_of(path).name} beside it, so it cannot be checked"
+                f"{path} has no manifest {manifest_of(path).name} beside it, so it cannot be checked; "
+                "`monitor backup FILE` writes both"
             )
         backup = read_manifest(manifest_of(path))
         if expected not in (None, backup.sha256):

@@ -15,10 +15,13 @@ from pathlib import Path
 import duckdb
 
 from monitor.exceptions import InputError, StoreError
+from monitor.store.kept_blocks import has_torn_blocks, settle_blocks
 
 #: Under which name a lake is attached.
 LAKE = "lake"
 _SCHEME = "ducklake:"
+#: What stands before the name of a catalogue that is no DuckDB file.
+_SERVERS = ("postgres:", "postgresql:", "mysql:", "sqlite:")
 _EXTENSIONS = {
     "ducklake": "duckdb_extension_ducklake",
     "postgres_scanner": "duckdb_extension_postgres_scanner",
@@ -42,6 +45,12 @@ def check_lake_address(address: str) -> None:
             "the address of a lake holds a password, which the list of processes shows to everybody; put it into "
             "~/.pgpass or $PGPASSWORD, which PostgreSQL's client reads"
         )
+
+
+def catalogue_file(address: str) -> str | None:
+    """Return the DuckDB file that is the catalogue of a lake; None for one in another program's database."""
+    name = address.removeprefix(_SCHEME)
+    return None if name.startswith(_SERVERS) else name.removeprefix("duckdb:")
 
 
 def connection_with_extensions(threads: int | None = None) -> duckdb.DuckDBPyConnection:
@@ -74,8 +83,19 @@ def _extension(name: str, module: str) -> Path:
 
 
 def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -> None:
-    """Attach a lake under its name. Raises StoreError for one that cannot be opened or is not there."""
+    """Attach a lake under its name. Raises StoreError for one that cannot be opened or is not there.
+
+    What half a write damaged in a catalogue of DuckDB is put back first (``kept_blocks``).
+    """
     check_lake_address(address)
+    catalogue = catalogue_file(address)
+    if catalogue is not None:
+        settle_blocks(catalogue)
+        if has_torn_blocks(catalogue):
+            raise StoreError(
+                f"{catalogue} holds half a block of a write that was cut off; what was there before lies beside it, "
+                "and is put back by whoever opens the lake next and may write the file"
+            )
     bracketed = f" ({', '.join(options)})" if options else ""
     try:
         connection.execute(f"ATTACH {literal(address)} AS {LAKE}{bracketed}")

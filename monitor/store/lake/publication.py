@@ -23,7 +23,15 @@ from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database, utc_now
 from monitor.store.entries import select_portion
-from monitor.store.lake.attaching import LAKE, attach, connection_with_extensions, is_lake, literal
+from monitor.store.kept_blocks import keep_blocks, settle_blocks
+from monitor.store.lake.attaching import (
+    LAKE,
+    attach,
+    catalogue_file,
+    connection_with_extensions,
+    is_lake,
+    literal,
+)
 from monitor.store.lake.copying import attach_origin, statements
 from monitor.store.lake.names import (
     register_names,
@@ -87,12 +95,14 @@ class _Publisher:
 
     def __init__(self, path: str, patience: Patience, address: str, files: Path | None) -> None:
         self._path, self._patience, self._address, self._files = path, patience, address, files
+        self._catalogue = catalogue_file(address)
         self._connection = connection_with_extensions()
         self._attached = False
         self._tries = 0
 
     def close(self) -> None:
         self._connection.close()
+        self._settle()
 
     def publish(self, name: str, progress: Callable[[int, int], None]) -> Published:
         """Publish portion by portion; the file is let go in between, so that those who write get their turn."""
@@ -140,6 +150,18 @@ class _Publisher:
             with contextlib.suppress(duckdb.Error):
                 self._connection.execute(statement)
         self._attached = False
+        self._settle()
+
+    def _settle(self) -> None:
+        """Remove the copy of the blocks of a catalogue whose checkpoint is through."""
+        if self._catalogue is not None:
+            with contextlib.suppress(StoreError):
+                settle_blocks(self._catalogue)
+
+    def _keep(self) -> None:
+        """Copy the blocks of a catalogue in a DuckDB file that the next checkpoint may write over."""
+        if self._catalogue is not None:
+            keep_blocks(self._catalogue)
 
     def _attach(self) -> None:
         options = ["CREATE_IF_NOT_EXISTS false"]
@@ -147,11 +169,17 @@ class _Publisher:
             options = [f"DATA_PATH {literal(str(self._files.resolve()))}", "OVERRIDE_DATA_PATH false"]
         attach(self._connection, self._address, *options, _NOTHING_INLINED)
         self._attached = True
+        # What its log still holds of a process that died is written into the file without a commit of ours.
+        self._keep()
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         self._connection.begin()
         yield
+        self._commit()
+
+    def _commit(self) -> None:
+        self._keep()
         self._connection.commit()
 
     def _make(self) -> None:
@@ -247,7 +275,7 @@ class _Publisher:
             f"INSERT INTO {LAKE}.publication VALUES (?, ?, ?, ?, ?, ?, ?)",
             [plant_no, first, last, sha256, copied, __version__, utc_now()],
         )
-        self._connection.commit()
+        self._commit()
         return int(copied)
 
 

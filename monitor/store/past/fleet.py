@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,8 @@ class FleetSums(GroupSums):
     of the group less the origin. ``last_d`` is when the machine's last day began (days since 1970), ``latest`` the
     mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where the parameter was refused
     there. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it are
-    left out.
+    left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs without a
+    break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within it).
     """
 
     machine: npt.NDArray[np.str_]
@@ -107,13 +109,20 @@ class FleetSums(GroupSums):
     latest: Array
     latest_runs: Array
     since_d: Array
+    first_d: Array
+    beyond_d: Array
     repeated_sums: RepeatedSums
     temperatures: TemperatureSums
     blocks: FleetBlocks
 
 
 def fleet_sums(
-    db: Database, model: str | None = None, version: int | None = None, *, cut: BlockCut
+    db: Database,
+    model: str | None = None,
+    version: int | None = None,
+    *,
+    cut: BlockCut,
+    limits: Mapping[tuple[str, str], float] = MappingProxyType({}),
 ) -> FleetSums:
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
@@ -121,19 +130,24 @@ def fleet_sums(
     Without ``model`` that which each machine is followed by, the method's own where none was chosen. A parameter that
     a machine refused both in its first campaign and on its last day has zero for its origin and loses
     2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
-    ``cut`` says how the history of a machine is cut into blocks. Raises NotFoundError where nothing was identified.
+    ``cut`` says how the history of a machine is cut into blocks, ``limits`` of the absolute value by machine and
+    parameter are in display units. Raises NotFoundError where nothing was identified.
     """
     with db.reading():
-        epoch_d, columns, of_blocks = _summed(db, model, version, cut)
+        epoch_d, columns, of_blocks = _summed(db, (model, version), cut, limits)
     return _sums(columns, _blocks(of_blocks, columns), epoch_d)
 
 
 def _summed(
-    db: Database, model: str | None, version: int | None, cut: BlockCut
+    db: Database, of: tuple[str | None, int | None], cut: BlockCut, limits: Mapping[tuple[str, str], float]
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """First day, columns of all cells and of their blocks, by way of tables that live as long as the connection."""
+    """Return first day, columns of all cells and of their blocks, by way of tables that live as long as the connection.
+
+    ``of`` are a model and its version.
+    """
     for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
         db.execute(statement)
+    model, version = of
     db.set_variables({"model": model, "version": version})
     db.execute(queries.CHOSEN)
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
@@ -150,6 +164,12 @@ def _summed(
         db.execute(statement)
     for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
         db.execute(statement)
+    for statement in (queries.SHOWN, queries.LIMITS):
+        db.execute(statement)
+    if limits:
+        names = {"machines": [machine for machine, _ in limits], "parameters": [name for _, name in limits]}
+        db.execute(queries.LIMITED, {**names, "limits": list(limits.values())})
+    db.execute(queries.BEYOND)
     db.set_variables({"whole": cut.whole, "each": cut.each, "most": cut.most, "epoch_d": epoch_d})
     db.execute(queries.BLOCKS)
     db.execute(queries.PARTS)
@@ -209,6 +229,8 @@ def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, e
         latest=number["latest"] / f,
         latest_runs=number["latest_n"],
         since_d=number["since_d"],
+        first_d=epoch_d + number["t_first"],
+        beyond_d=number["beyond_d"],
         repeated_sums=RepeatedSums(
             runs=number["runs_rep"],
             offset=number["offset_rep"] / f,

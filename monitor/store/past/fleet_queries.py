@@ -185,6 +185,18 @@ PARAMETER_BITS = 20
 # And of a cell and a block.
 BLOCK_BITS = 6
 
+# Each parameter with its number, its unit and what its values are divided by where they are shown.
+SHOWN = """
+CREATE OR REPLACE TEMP TABLE fleet_shown AS
+SELECT k, parameter, first(unit) AS unit, first(factor) AS factor
+FROM (
+    SELECT unnest(h.numbers) AS k, unnest(h.parameters) AS parameter, unnest(i.units) AS unit,
+           unnest(i.display_factors) AS factor
+    FROM identification AS i JOIN fleet_heading AS h ON i.identification_id = h.identifications[1]
+)
+GROUP BY k, parameter
+"""
+
 # The values of every cell in some groups, a list each. The outer join keeps the values on the side that is only read:
 # a hash table of them would be most of the time and memory.
 LISTS = f"""
@@ -209,6 +221,38 @@ WITH last AS (
 {LISTS.format(groups="last")}
 """
 
+# Limits of the absolute values, in display units.
+LIMITS = "CREATE OR REPLACE TEMP TABLE fleet_limit (machine VARCHAR, parameter VARCHAR, most DOUBLE)"
+LIMITED = "INSERT INTO fleet_limit SELECT unnest($machines), unnest($parameters), unnest($limits)"
+
+# Where the mean of the last day is beyond its limit: since when every run is, in the whole history of the machine. An
+# event that does not bring a parameter back splits its history, not this.
+BEYOND = f"""
+CREATE OR REPLACE TEMP TABLE fleet_beyond AS
+WITH beyond AS (
+    SELECT cell, machine_no, most * factor AS most
+    FROM fleet_limit JOIN fleet_machine USING (machine) JOIN fleet_shown USING (parameter)
+    JOIN fleet_latest ON cell = ((machine_no << {PARAMETER_BITS}) | k)
+    WHERE abs(list_avg(x)) >= most * factor
+), timed AS (
+    SELECT cell, most, started_at, x
+    FROM (
+        SELECT campaign_id, cell, most, unnest(runs) AS run, unnest(xs) AS x
+        FROM (
+            SELECT c.campaign_id, c.machine_no, v.runs, unnest(h.numbers) AS k, unnest(v.value) AS xs
+            FROM identified_values AS v JOIN fleet_chosen AS c USING (identification_id)
+            JOIN fleet_heading AS h USING (heading)
+            WHERE c.machine_no IN (SELECT machine_no FROM beyond)
+        ) AS values_of JOIN beyond ON cell = ((values_of.machine_no << {PARAMETER_BITS}) | k)
+    ) JOIN run USING (campaign_id, run)
+    WHERE x IS NOT NULL
+), within AS (
+    SELECT cell, max(started_at) FILTER (abs(x) <= most) AS last_within FROM timed GROUP BY cell
+)
+SELECT cell, epoch(min(started_at)) / 86400.0 AS beyond_d
+FROM timed JOIN within USING (cell) WHERE last_within IS NULL OR started_at > last_within GROUP BY cell
+"""
+
 # Every machine has an origin for every parameter: a value of its first campaign, else one of its last day.
 ORIGINS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_origin AS
@@ -228,7 +272,8 @@ LEFT JOIN fleet_latest AS l USING (cell)
 # A row for each cell, block and number of runs in a group: what depends on that number alone is worked out afterwards.
 PARTS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_part AS
-SELECT cb, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
+SELECT cb, n, count(*) AS k, min(t) AS t_first, sum(v) AS v, min(v) AS least,
+       sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
        sum(t) AS t, sum(t * t) AS tt, sum(m) AS m, sum(m * m) AS mm, sum(m * t) AS tm,
        sum(v * v) AS vv, count(g) AS g_k, sum(g) AS g, sum(g * g) AS gg, sum(g * t) AS gt, sum(g * m) AS gm,
        min(g) AS g_low, max(g) AS g_high
@@ -244,22 +289,13 @@ GROUP BY cb, n
 """
 
 TOGETHER = f"""
-WITH shown AS (
-    SELECT k, parameter, first(unit) AS unit, first(factor) AS factor
-    FROM (
-        SELECT unnest(h.numbers) AS k, unnest(h.parameters) AS parameter, unnest(i.units) AS unit,
-               unnest(i.display_factors) AS factor
-        FROM identification AS i JOIN fleet_heading AS h ON i.identification_id = h.identifications[1]
-    )
-    GROUP BY k, parameter
-), latest AS (
+WITH latest AS (
     SELECT cell, began_d AS last_d, list_count(x) AS latest_n,
            list_avg(list_transform(x, lambda value: value - origin)) AS latest
     FROM fleet_latest JOIN fleet_origin USING (cell)
 ), part AS (
-    SELECT cb >> {BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS
-    t,
-           sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv,
+    SELECT cb >> {BLOCK_BITS} AS cell, n, sum(k) AS k, min(t_first) AS t_first, sum(v) AS v, min(least) AS least,
+           sum(logs) AS logs, sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv,
            sum(g_k) AS g_k, sum(g) AS g, sum(gg) AS gg, sum(gt) AS gt, sum(gm) AS gm, min(g_low) AS g_low,
            max(g_high) AS g_high
     -- Groups in which a parameter was refused in every run have no part in it.
@@ -270,7 +306,7 @@ WITH shown AS (
            coalesce(min(least * n / (n - 1)) FILTER (n > 1), 0.0) AS least,
            coalesce(sum((n - 1) * (logs + k * ln(n / (n - 1)))) FILTER (n > 1), 0.0) AS logs,
            coalesce(sum(k / (n - 1)) FILTER (n > 1), 0.0) AS inverse,
-           sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm,
+           min(t_first) AS t_first, sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm,
            -- About 20 °C, of the groups whose runs all have a temperature.
            sum(g_k) AS g_k, coalesce(sum(g), 0.0) AS g, coalesce(sum(gg), 0.0) AS gg, coalesce(sum(gt), 0.0) AS gt,
            coalesce(sum(gm), 0.0) AS gm, coalesce(max(g_high) - min(g_low), 0.0) AS g_range,
@@ -289,14 +325,16 @@ WITH shown AS (
 SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
        coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d,
+       coalesce(b.beyond_d, 'nan') AS beyond_d,
        coalesce(h.channel, '') AS thermometer
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}
 JOIN fleet_origin AS o USING (cell)
 LEFT JOIN latest AS l USING (cell)
 LEFT JOIN fleet_since AS e ON e.machine_no = m.machine_no
+LEFT JOIN fleet_beyond AS b USING (cell)
 LEFT JOIN fleet_thermometer AS h ON h.machine_no = m.machine_no
-JOIN shown AS s ON s.k = p.cell & ((1 << {PARAMETER_BITS}) - 1)
+JOIN fleet_shown AS s ON s.k = p.cell & ((1 << {PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
 """
 
@@ -322,6 +360,9 @@ TABLES = (
     "blocked",
     "since",
     "latest",
+    "shown",
+    "limit",
+    "beyond",
     "origin",
     "part",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from monitor.records import Verdict
 from monitor.store.connection import Database
 
 # From the refuted ones, which are few, to the machines that have any, and of these alone to the campaign that counts.
@@ -63,3 +64,35 @@ def refuted_machines(
     """
     rows = db.rows(_REFUTED, {"level": level, "model": model, "version": version})
     return tuple(RefutedMachine(*row) for row in rows)
+
+
+# The latest campaign of each machine by its runs, and of its comparisons under the model that the machine is followed
+# by the latest: what `compare`, `explain`, the page of the model or a weekly report stored.
+_UNEXPLAINED = """
+WITH own AS (
+    SELECT model, max(version) AS version FROM model
+    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+), judged AS (
+    SELECT campaign_id, model, model_version, analysis_id, document ->> 'verdict' AS verdict
+    FROM analysis WHERE kind = 'comparison' AND campaign_id IS NOT NULL
+), latest AS (
+    SELECT c.machine, arg_max(c.campaign_id, (r.started_at, c.campaign_id)) AS campaign_id
+    FROM campaign AS c JOIN run AS r USING (campaign_id)
+    SEMI JOIN (SELECT machine FROM judged JOIN campaign USING (campaign_id)) USING (machine) GROUP BY c.machine
+)
+SELECT c.machine, arg_max(c.campaign, j.analysis_id)
+FROM latest JOIN campaign AS c USING (campaign_id) JOIN judged AS j USING (campaign_id)
+LEFT JOIN v_machine_models AS f ON f.machine = c.machine AND f.method = c.method
+LEFT JOIN own AS o ON o.model = c.method
+WHERE j.model = coalesce(f.model, c.method)
+      AND j.model_version = coalesce(f.model_version, o.version, j.model_version)
+GROUP BY c.machine HAVING arg_max(j.verdict, j.analysis_id) = $missing ORDER BY c.machine
+"""
+
+
+def unexplained_machines(db: Database) -> dict[str, str]:
+    """Return by machine its latest campaign, where the latest stored comparison says that something is missing.
+
+    A campaign that nobody compared is not judged: the sums of the fleet do not compare.
+    """
+    return dict(db.rows(_UNEXPLAINED, {"missing": Verdict.SOMETHING_IS_MISSING.value}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,15 @@ from monitor.reporting.svg.sparkline import MOST, sparkline
 from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
-from monitor.web.words import URGENCIES, Urgency, how_far, since
+from monitor.web.words import (
+    NOT_IDENTIFIED,
+    NOT_MEASURED,
+    URGENCIES,
+    WITHOUT_NUMBERS,
+    Urgency,
+    how_far,
+    since,
+)
 from monitor.workflow.fleet.attention import ATTENTION, Attention
 
 if TYPE_CHECKING:
@@ -35,21 +43,26 @@ PAGE_SIZE = 40
 @dataclass(frozen=True)
 class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
-    first; ``latest`` is the date of its latest run, empty where none is known."""
+    first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
+    numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not
+    explain it."""
 
     machine: str
     plant: str
     urgency: Urgency
     attention: str
     season_not_told: bool | None
-    worst: FleetTableRow
+    worst: FleetTableRow | None
     how_far: str
     since: str
     others: tuple[FleetTableRow, ...]
     latest: str
+    unexplained: str = ""
 
 
-def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> list[MachineRow]:
+def machine_rows(
+    table: Iterable[FleetTableRow], plants: Mapping[str, str], unexplained: Mapping[str, str]
+) -> list[MachineRow]:
     """Return a row a machine, in the order of the table, which has the most urgent first."""
     rows: dict[str, list[FleetTableRow]] = {}
     for row in table:
@@ -67,9 +80,32 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
             since=since(of_machine[0]),
             others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < usual),
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
+            unexplained=unexplained.get(machine, ""),
         )
         for machine, of_machine in rows.items()
     ]
+
+
+def unnumbered_rows(machines: TableAnswer, numbered: Container[str]) -> list[MachineRow]:
+    """Return a row for every machine of which no number is known: not identified, or not measured at all."""
+    rows = []
+    for machine in _described(machines):
+        if machine["machine"] in numbered:
+            continue
+        urgency = NOT_IDENTIFIED if machine["campaigns"] else NOT_MEASURED
+        latest = str(machine["latest_run_at"] or "")[:10]
+        rows.append(
+            MachineRow(
+                machine=str(machine["machine"]), plant=str(machine["location"] or ""), urgency=urgency,
+                attention=WITHOUT_NUMBERS, season_not_told=None, worst=None,
+                how_far="", since=f"{latest}, the latest run" if latest else "", others=(), latest=latest,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _described(machines: TableAnswer) -> list[dict[str, Any]]:
+    return [dict(zip(machines.columns, row, strict=True)) for row in machines.rows]
 
 
 @dataclass(frozen=True)
@@ -102,6 +138,23 @@ def _summed(request: Request, machines: TableAnswer) -> _Sums:
     return _Sums(shown.answer(), waiting, "" if is_of_now else f"{shown.asked_on:%Y-%m-%d %H:%M:%S}")
 
 
+def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
+    """Return the machines, the most urgent first; those without numbers stand before what is as usual.
+
+    While the first sums are made, nothing is known of any.
+    """
+    if sums.answer is None and sums.waiting is not None:
+        return []
+    rows: list[MachineRow] = []
+    if (answer := sums.answer) is not None:
+        refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
+        unexplained = {**(answer.models_lacking or {}), **refuted}
+        rows = machine_rows(answer.table, plants_of(machines), unexplained)
+    usual = ATTENTION.index(Attention.AS_USUAL)
+    urgent = [row for row in rows if ATTENTION.index(Attention(row.attention)) < usual]
+    return urgent + unnumbered_rows(machines, {row.machine for row in rows}) + rows[len(urgent) :]
+
+
 def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
     """How many machines there are of each word, the most urgent first."""
     counts: dict[str, tuple[Urgency, int]] = {}
@@ -118,8 +171,7 @@ def _within(latest: str, since: str, until: str) -> bool:
 
 def plants_of(machines: TableAnswer) -> dict[str, str]:
     """Return the location of every machine that states one."""
-    name, location = machines.columns.index("machine"), machines.columns.index("location")
-    return {str(row[name]): str(row[location]) for row in machines.rows if row[location]}
+    return {str(row["machine"]): str(row["location"]) for row in _described(machines) if row["location"]}
 
 
 def routes() -> APIRouter:
@@ -134,10 +186,9 @@ def routes() -> APIRouter:
         machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
         sums = _summed(request, machines)
         answer, waiting = sums.answer, sums.waiting
-        rows = [] if answer is None else machine_rows(answer.table, plants_of(machines))
-        listed = {row.machine for row in rows}
-        every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
-        counts = {label: sum(row.attention == label for row in rows) for label in ATTENTION}
+        rows = _with_unnumbered(sums, machines)
+        classes: dict[str, Urgency] = {**URGENCIES, WITHOUT_NUMBERS: NOT_IDENTIFIED}
+        counts = {label: sum(row.attention == label for row in rows) for label in classes}
         shown = [
             row
             for row in rows
@@ -150,11 +201,10 @@ def routes() -> APIRouter:
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
-            states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
+            states=[(label, urgency, counts[label]) for label, urgency in classes.items() if counts[label]],
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
-            unlisted=[name for name in every if name not in listed],
+            unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
-            refuted={} if answer is None else answer.models_refuted or {},
         )  # fmt: skip
 
     @router.post("/fleet/identify")

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.web.charts.residuals import (
     MAGNIFICATIONS,
     driver_chart,
@@ -22,7 +22,7 @@ from monitor.web.charts.residuals import (
     scene_vectors,
 )
 from monitor.web.desk import Desk, Ticket
-from monitor.web.forms import Form, asked_once, read_form
+from monitor.web.forms import Form, asked_once, read_form, whole_number
 from monitor.web.rendering import link, page
 from monitor.web.words import listed
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 #: So long the script's question for an effect's arrows is held before it has to ask again.
 FETCH_S = 20.0
+#: Names of the boxes of effects that are added together, before their ranks.
+TICKED = "ticked-"
 
 
 def routes() -> APIRouter:
@@ -79,16 +81,17 @@ def routes() -> APIRouter:
 
     @router.post("/model/add")
     async def add(request: Request) -> Response:
-        """Add an effect: a new version of the model, or a new model."""
+        """Add an effect, or those that are ticked together: a new version of the model, or a new model."""
         async with read_form(request) as form:
-            campaign, effect = form.text("campaign"), form.text("effect")
-            document = {"effect": effect, "campaign": campaign, "to": form.text("to")}
+            campaign, (effect, *beside) = form.text("campaign"), _effects(form)
+            document = {"effect": effect, "beside": beside, "campaign": campaign, "to": form.text("to")}
             document |= form.filled("new_name", "note")
         overtaken = None if form.filled("new_name") else _overtaken(request, form)
         if overtaken is not None:
             return overtaken
         answer = await asked_once(request, form, "add effect", document)
-        return _back(campaign, answer, f"{effect} was added")
+        added = f"{effect} was added" if not beside else f"{', '.join((effect, *beside))} were added"
+        return _back(campaign, answer, added)
 
     @router.post("/model/undo")
     async def undo(request: Request) -> Response:
@@ -103,6 +106,18 @@ def routes() -> APIRouter:
         return _back(campaign, answer, f"{effect} was taken out")
 
     return router
+
+
+def _effects(form: Form) -> list[str]:
+    """Return the effect of a card, or those that are ticked, by rank. Raises InputError where none is."""
+    if "effect" in form.texts:
+        return [form.text("effect")]
+    ranks = {
+        name.removeprefix(TICKED): effect for name, effect in form.texts.items() if name.startswith(TICKED)
+    }
+    if not ranks:
+        raise InputError("no effect is ticked; tick those that are added together")
+    return [ranks[rank] for rank in sorted(ranks, key=lambda rank: whole_number("rank", rank))]
 
 
 async def _explained(request: Request, campaign: str, effect: str, model: str = "") -> Response:

@@ -50,7 +50,7 @@ def first_fit(campaign: Campaign, model: StoredModel) -> RobustFit:
     try:
         return robust_fit(machine_problem(campaign, model))
     except DataError as refusal:
-        raise with_mistake(refusal, campaign, model) from refusal
+        raise with_mistake(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def explanation_of(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
 from monitor.reporting.weekly_notice import WeeklyNotices
-from monitor.workflow.fleet.attention import Attention
+from monitor.workflow.fleet.attention import Attention, Onset
 from monitor.workflow.history.refuted import RefutedCampaign
 
 
@@ -17,7 +17,8 @@ class FleetTableRow:
 
     ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``season_not_told``: a
     yearly season can be all of the slope, the history is too short to tell. ``refers_to`` says in words what the
-    parameter is stated relative to, where it is an error of the chain.
+    parameter is stated relative to, where it is an error of the chain. ``since`` is the last event: what is judged
+    begins with it. ``onset`` is the moment since which the row holds, by ``onset_is``.
     """
 
     rank: int
@@ -50,6 +51,8 @@ class FleetTableRow:
     temperature: str | None = field(default=None, metadata=OMITTED)
     season_not_told: bool | None = field(default=None, metadata=OMITTED)
     refers_to: str | None = field(default=None, metadata=OMITTED)
+    onset: str | None = field(default=None, metadata=OMITTED)
+    onset_is: Onset | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,9 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
     part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
-    ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from.
+    ``without_numbers`` are machines of which no run has numbers under that model, which no row stands for.
+    ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
+    ``models_lacking`` by machine those whose stored comparison says that something is missing from it.
     """
 
     machines: int
@@ -71,3 +76,5 @@ class FleetAnswer:
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     models_refuted: Mapping[str, RefutedCampaign] | None = field(default=None, metadata=OMITTED)
+    models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
+    without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

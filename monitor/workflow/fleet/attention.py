@@ -18,5 +18,15 @@ class Attention(StrEnum):
     UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
 
 
+class Onset(StrEnum):
+    """What began at the moment since which a row holds."""
+
+    BEYOND = "the first of the runs beyond the limit"
+    LATEST = "the latest day"
+    DIFFERS = "where the days before and after differ most"
+    EVENT = "the last event"
+    FIRST = "the first run"
+
+
 #: The classes by their number.
 ATTENTION = tuple(Attention)

@@ -20,14 +20,16 @@ from monitor.store import (
     fleet_sums,
     latest_frames,
     latest_tolerances,
+    machines_with_runs,
     not_identified,
     refuted_machines,
     tolerance_types,
+    unexplained_machines,
 )
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
-from monitor.workflow.fleet.attention import ATTENTION
-from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, warmth_beside
+from monitor.workflow.fleet.attention import ATTENTION, Attention, Onset
+from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, split_times, warmth_beside
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
@@ -58,8 +60,27 @@ class _Cells:
         """The most urgent first."""
         return np.lexsort((self.sums.parameter, self.sums.machine, -self.measure, self.kind))
 
+    @cached_property
+    def differs_d(self) -> Array:
+        """Since when the days of each cell differ most from those before (c,), in days since 1970."""
+        return split_times(self.sums)
+
+    def onset(self, index: int) -> tuple[float, Onset]:
+        """Since when a row holds (days since 1970), and what began then."""
+        sums, attention = self.sums, ATTENTION[int(self.kind[index])]
+        if attention is Attention.OUT and np.isfinite(sums.beyond_d[index]):
+            return float(sums.beyond_d[index]), Onset.BEYOND
+        if attention in (Attention.OUT, Attention.STANDS_OUT):
+            return float(sums.last_d[index]), Onset.LATEST
+        if attention is Attention.DAYS_DIFFER:
+            return float(self.differs_d[index]), Onset.DIFFERS
+        if np.isfinite(sums.since_d[index]):
+            return float(sums.since_d[index]), Onset.EVENT
+        return float(sums.first_d[index]), Onset.FIRST
+
     def row(self, index: int) -> FleetTableRow:
         """One of them as a row without a rank."""
+        onset, onset_is = self.onset(index)
         return FleetTableRow(
             rank=0,
             machine=str(self.sums.machine[index]),
@@ -90,6 +111,8 @@ class _Cells:
             years_to_limit=_number(self.years[index]) if self.kind[index] == 1 else None,
             temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
             season_not_told=True if self.drift.season_p[index] >= REFUTED else None,
+            onset=_date(onset),
+            onset_is=onset_is,
         )
 
 
@@ -126,6 +149,11 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
+        models_lacking=(unexplained_machines(db) or None) if request.model is None else None,
+        without_numbers=tuple(
+            name for name in machines_with_runs(db) if name not in set(sums.machine.tolist())
+        )
+        or None,
     )
 
 
@@ -152,21 +180,16 @@ def _cells_of(db: Database, model: str | None) -> _Cells:
     """Every machine and parameter under a model, tested and ranked."""
     stored = None if model is None else resolve(db, model)
     name, version = (None, None) if stored is None else (stored.name, stored.version)
-    sums = fleet_sums(db, name, version, cut=CUT)
+    limits = latest_tolerances(db)
+    sums = fleet_sums(db, name, version, cut=CUT, limits=limits)
     cells, drift = cell_tests(sums)
-    limit = _limits(db, sums)
+    keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
+    limit = np.array([limits.get(key, np.nan) for key in keys])
     tests = {"anova": means_p(sums), "bartlett": cells.bartlett_p, "drift": drift.p_value}
     q_values = {
         test: control_false_discoveries(p_values, rate=RATE).q_value for test, p_values in tests.items()
     }
     return _Cells(sums, cells, drift, q_values, limit, *ranked(sums, cells, drift, q_values["drift"], limit))
-
-
-def _limits(db: Database, sums: FleetSums) -> Array:
-    """Limit of the absolute value of each cell by the machine's latest campaign; NaN where none is stated."""
-    stated = latest_tolerances(db)
-    keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
-    return np.array([stated.get(key, np.nan) for key in keys])
 
 
 def _date(days: float) -> str | None:

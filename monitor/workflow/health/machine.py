@@ -13,6 +13,7 @@ from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth,
 from monitor.reporting.health.sentences import (
     CheckKind,
     LimitWithoutMap,
+    MachineNamed,
     NextCheck,
     NotMeasured,
     RunNamed,
@@ -24,6 +25,7 @@ from monitor.store import (
     MachineHistory,
     RecordedRun,
     campaign_tolerances,
+    machine_descriptions,
     machine_events,
     machine_history,
     machine_runs,
@@ -47,6 +49,8 @@ from monitor.workflow.health.runs import campaign_span, first_run, past_runs
 from monitor.workflow.health.task import Task, TaskResult
 from monitor.workflow.health.verdict import (
     conformity_of,
+    drifting_to_limit,
+    due_by_drift,
     factor_of,
     imports_refused,
     new_this_week,
@@ -97,6 +101,17 @@ class MachineWeek:
     def runs_of_week(self) -> list[RecordedRun]:
         """The runs that began in the week."""
         return [run for run in self.runs if self.week.holds(run.local_start)]
+
+
+def named_machines(db: Database) -> list[MachineName]:
+    """Return every machine that counts, by name."""
+    machines = []
+    for machine in machine_descriptions(db):
+        description = MachineNamed(
+            machine.manufacturer, machine.model, machine.serial_number, machine.topology
+        )
+        machines.append(MachineName(machine.machine, description, machine.location))
+    return machines
 
 
 def read_week(db: Database, name: MachineName, week: Week, options: ReportOptions) -> MachineWeek:
@@ -167,11 +182,13 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     # A campaign whose identification is refused has no numbers, whatever a robust fit of one run made of it.
     evaluated = (stated is not None and last.campaign not in history.unidentified) or not can_be
     state = state_of(judged, noted, explanation, quality, past.options.risk, evaluated=evaluated)
+    check = next_check(state, drifts, limits, week)
+    due = due_by_drift(state, check)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
-        changed=new_this_week(noted, explanation, quality),
+        changed=new_this_week(noted, explanation, quality, drifting_to_limit(state, parameters, due)),
         since=since_when(state, parameters, noted, measured.span.first), probability_out=judged.any,
-        next_check=next_check(state, drifts, limits, week),
+        next_check=check,
         run=_named(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_of(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
@@ -179,7 +196,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
             explanation, results.versions, measured.span, unchanged, _refuted_p(history, measured),
         ),
         quality=quality,
-        map=stated_map(results.map, limit_um, beyond),
+        map=stated_map(results.map, limit_um, beyond), due=due,
     )  # fmt: skip
 
 

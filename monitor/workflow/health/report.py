@@ -19,6 +19,7 @@ from typing import BinaryIO
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
+from monitor.reporting.health.attention import LOOKED_AT, attention
 from monitor.reporting.health.records import (
     ALARMS,
     Fleet,
@@ -29,7 +30,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
-from monitor.reporting.health.sentences import MachineNamed, NothingMeasured
+from monitor.reporting.health.sentences import NothingMeasured
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.store import (
     Database,
@@ -37,14 +38,19 @@ from monitor.store import (
     campaign_machines,
     check_campaigns,
     last_anchor,
-    machine_descriptions,
     save_analysis,
 )
 from monitor.store.catalogue import check_machine
 from monitor.uncertainty.workers.engine import Engine, in_order
 from monitor.workflow.certificate.files import why_not
 from monitor.workflow.engines import engine_of
-from monitor.workflow.health.machine import MachineName, MachineWeek, machine_health, read_week
+from monitor.workflow.health.machine import (
+    MachineName,
+    MachineWeek,
+    machine_health,
+    named_machines,
+    read_week,
+)
 from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.task import Task, computed
@@ -56,8 +62,6 @@ KIND = "health"
 #: many machines, since a process starts in the time in which a machine or two are computed.
 MOST_WORKERS = 4
 MACHINES_A_WORKER = 4
-#: Machines that the first page draws: the most urgent, as many as leave room for the table.
-ATTENTION = 3
 
 
 def report(
@@ -75,7 +79,7 @@ def report(
         raise InputError(
             f"--week {week.name} begins on {week.first}, and today is {today}: nothing can be said of it"
         )
-    every = _machines(db)
+    every = named_machines(db)
     machines = _selected(db, every, request)
     try:
         request.out.mkdir(parents=True, exist_ok=True)  # before minutes of computing
@@ -88,28 +92,19 @@ def report(
         rows = _reported(db, machines, week, request, engine, progress)
         # Once all runs of the week are identified.
         looks = weekly_notices(db, week).of_machines({row.machine for row, _ in rows}, week.name)
+        drawn, alike = attention(stored_health(db, number) for _, number in rows[:LOOKED_AT])
         fleet = Fleet(
             week.name, week.first, week.last, moment, f"machine-health-monitor {__version__}", options.risk,
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
             noticed=tuple((notice.machine, weekly_sentence(notice)) for notice in looks.notices),
-            attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
+            attention=drawn,
+            alike=alike,
             anchor=last_anchor(db),
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
     return _answer(fleet, week, files, looks)
-
-
-def _machines(db: Database) -> list[MachineName]:
-    """Every machine that counts, by name."""
-    machines = []
-    for machine in machine_descriptions(db):
-        description = MachineNamed(
-            machine.manufacturer, machine.model, machine.serial_number, machine.topology
-        )
-        machines.append(MachineName(machine.machine, description, machine.location))
-    return machines
 
 
 def _selected(db: Database, every: list[MachineName], request: ReportRequest) -> list[MachineName]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from monitor.documents import Said
 from monitor.records import VOLUMETRIC, Verdict
+from monitor.reporting.health.answers import DRIFT_P
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
@@ -22,6 +23,7 @@ from monitor.reporting.health.records import (
 )
 from monitor.reporting.health.sentences import (
     CheckKind,
+    Drifting,
     Factor,
     ImportsRefused,
     ModelLacks,
@@ -80,10 +82,13 @@ def with_volumetric(judged: Conformity, probability_out: float | None) -> Confor
 
 
 def new_this_week(
-    noted: Sequence[Change], explanation: MachineExplanation | None, quality: DataQuality
+    noted: Sequence[Change],
+    explanation: MachineExplanation | None,
+    quality: DataQuality,
+    drifting: tuple[Drifting, ...] = (),
 ) -> NewThisWeek:
     """What is new this week: changes, then steps at events, then events, what the model lacks, and data that never
-    came in."""
+    came in; and what is ``drifting``."""
     every: list[Said] = [
         change.what
         for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)
@@ -93,7 +98,26 @@ def new_this_week(
     every += imports_refused(quality.refused_imports)
     missing = () if explanation is None else explanation.missing[:1]
     lacking = tuple(ModelLacks(effect.effect) for effect in missing)
-    return NewThisWeek(tuple(every[:MOST_NAMED]), max(0, len(every) - MOST_NAMED), lacking)
+    return NewThisWeek(tuple(every[:MOST_NAMED]), max(0, len(every) - MOST_NAMED), lacking, drifting)
+
+
+def due_by_drift(state: State, check: NextCheck) -> str | None:
+    """The parameter whose drift may have taken a machine out of tolerance with which nothing was wrong."""
+    fine = state in (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
+    return check.parameter if fine and check.kind is CheckKind.PASSED else None
+
+
+def drifting_to_limit(
+    state: State, parameters: Sequence[ParameterHealth], due: str | None
+) -> tuple[Drifting, ...]:
+    """The drift of the parameter that makes the state of a machine, where it is not by chance; else nothing."""
+    if due is None and state not in (State.OUT_OF_TOLERANCE, State.MAY_BE_OUT_OF_TOLERANCE):
+        return ()
+    judged = [each for each in parameters if each.name == due or (due is None and each.probability_out)]
+    worst = max(judged, key=lambda each: each.probability_out or 0.0, default=None)
+    if worst is None or worst.drift is None or worst.drift.p_value >= DRIFT_P:
+        return ()
+    return (Drifting(worst.name, worst.drift.per_year, worst.drift.u_per_year, worst.unit),)
 
 
 def imports_refused(refused: Sequence[RefusedImport]) -> tuple[ImportsRefused, ...]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from monitor.discovery import Fit, fit
+from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel
+from monitor.workflow.identify.mistaken_columns import with_mistake
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, resolve_for, subject_of
 
@@ -35,10 +37,16 @@ def curve_problem(curve: CurveCampaign, model: StoredModel) -> CurveProblem:
 
 
 def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | CurveFit:
-    """A version of a model fitted to a campaign. Raises DataError where the readings do not suffice."""
+    """A version of a model fitted to a campaign.
+
+    Raises DataError where the readings do not suffice, with what looks wrong in the file where that can be said.
+    """
     if isinstance(campaign, CurveCampaign):
         return campaign_method(campaign).fit(curve_problem(campaign, model))
-    return fit(machine_problem(campaign, model))
+    try:
+        return fit(machine_problem(campaign, model))
+    except DataError as refusal:
+        raise with_mistake(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from monitor.documents import to_document
-from monitor.exceptions import DataError, NotConvergedError
+from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
@@ -20,7 +20,7 @@ from monitor.store import (
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
-from monitor.workflow.identify.fitting import curve_problem
+from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.mistaken_columns import with_mistake
 from monitor.workflow.identify.request import IdentifyRequest
@@ -66,8 +66,10 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
             return Identified(curve_answer(fit, label(model)), None)
         try:
             identification, stored = identified(measured, model)
-        except NotConvergedError as refusal:
-            raise with_mistake(refusal, measured, model) from refusal
+        except DataError as refusal:
+            raise with_mistake(
+                refusal, measured, lambda changed: machine_problem(changed, model)
+            ) from refusal
         return Identified(machine_answer(measured.machine, identification), stored)
 
 

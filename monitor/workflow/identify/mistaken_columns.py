@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from monitor.exceptions import DataError
+from monitor.methods.chain.problem import ChainProblem
+from monitor.readers.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
-from monitor.store import StoredModel
-from monitor.workflow.identify.fitting import machine_problem
 
 
-def with_mistake(refusal: DataError, campaign: Campaign, model: StoredModel) -> DataError:
-    """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does."""
+def with_mistake(
+    refusal: DataError, campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
+) -> DataError:
+    """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
+
+    Columns that the import saw exchanged are said again. Else the changes are tried that would let the readings fit,
+    which takes up to half a minute; where none does, what else the import noticed of the columns is said.
+    """
+    exchanged = tuple(exchanged_columns(campaign))
+    if exchanged:
+        return _with_sentences(refusal, exchanged)
     # Loaded here: only readings that contradict the file need the search.
     from monitor.discovery import find_mistakes
     from monitor.reporting.machine_finding import mistake_sentence
     from monitor.workflow.explain.machine_answer import mistakes_found
 
-    mistakes = find_mistakes(campaign, lambda changed: machine_problem(changed, model), None)
-    return DataError(f"{refusal}. {mistake_sentence(mistakes_found(mistakes))}") if mistakes else refusal
+    mistakes = find_mistakes(campaign, problem_of, None)
+    said = (mistake_sentence(mistakes_found(mistakes)),) if mistakes else column_doubts(campaign)
+    return _with_sentences(refusal, said) if said else refusal
+
+
+def _with_sentences(refusal: DataError, said: Sequence[str]) -> DataError:
+    return DataError(". ".join((str(refusal), *(sentence[0].upper() + sentence[1:] for sentence in said))))

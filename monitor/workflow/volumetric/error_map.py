@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,12 +95,11 @@ class AtPose:
     u_um: Array
 
 
-def at_pose(mapped: VolumetricMap, pose: int = 0) -> AtPose:
-    """The part of a map that can be drawn; the first ``pose`` has all rotary axes at zero.
+def drawn_axes(chain: Chain, ranges: Mapping[str, tuple[float, float]]) -> list[int]:
+    """Return the numbers of the linear axes along X, Y and Z, over whose ``ranges`` (mm) a map is drawn.
 
     Raises InputError for a machine without three linear axes that moved.
     """
-    error, chain = mapped.error, mapped.errors.chain
     # In the order of the machine's directions, as the components of the vectors are; a chain has its own.
     linear = sorted(
         (index for index, joint in enumerate(chain.joints) if not joint.turns),
@@ -110,12 +110,22 @@ def at_pose(mapped: VolumetricMap, pose: int = 0) -> AtPose:
             f"the map is drawn for three linear axes along X, Y and Z; '{chain.topology}' has {len(linear)} linear axes"
             f"{', not along these' if len(linear) == 3 else ''}"
         )
-    flat = [name for name, (first, last) in mapped.ranges.items() if not last > first]
+    flat = [name for name, (first, last) in ranges.items() if not last > first]
     if flat:
         raise InputError(
             f"the map is drawn over a volume, but the campaign stood still along {' and '.join(flat)}: say the "
             "strokes in [machine.axes] of its campaign.toml, or leave the map out"
         )
+    return linear
+
+
+def at_pose(mapped: VolumetricMap, pose: int = 0) -> AtPose:
+    """The part of a map that can be drawn; the first ``pose`` has all rotary axes at zero.
+
+    Raises InputError for a machine without three linear axes that moved.
+    """
+    error, chain = mapped.error, mapped.errors.chain
+    linear = drawn_axes(chain, mapped.ranges)
     each = mapped.points**3
     rows = slice(pose * each, (pose + 1) * each)
     signs = np.array([chain.joints[index].sign for index in linear])

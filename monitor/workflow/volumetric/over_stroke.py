@@ -8,12 +8,14 @@ import numpy as np
 import scipy
 
 from monitor.exceptions import InputError
+from monitor.methods.model import chain_of
 from monitor.records import Array
 from monitor.reporting.svg.map_slices import Slice, slices_of
 from monitor.store import Database
 from monitor.uncertainty.volumetric import VolumetricError
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.volumetric.answer import VolumetricAnswer
-from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose
+from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose, drawn_axes, ranges_of
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.stating import map_answer
 from monitor.workflow.volumetric.volumetric import map_run
@@ -76,6 +78,10 @@ def over_stroke(db: Database, request: OverStrokeRequest) -> OverStrokeAnswer:
 
     Raises NotFoundError, DataError, InputError for a machine without three linear axes or a pose that is not there.
     """
+    # A robot has no strokes: said before anything is evaluated, which takes seconds.
+    campaign = machine_campaign(db, request.campaign, "map", lambda method: method.map)
+    chain = chain_of(campaign.machine)
+    drawn_axes(chain, ranges_of(campaign, chain)[0])
     mapped = map_run(db, request.of_run(request.run))
     stated = map_answer(mapped)
     if request.minus is not None:

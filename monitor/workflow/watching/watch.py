@@ -1,5 +1,7 @@
 """One look at a watched folder: what came and is at rest is imported, identified, reported and told.
 
+Where no report is asked for, what the next one rests on is computed: on Monday it only has to be written.
+
 An arrival is marked as done after it was told, by its path and fingerprint. Whatever is killed before starts again at
 the next look, where the import says "unchanged" and what is identified stays so: only telling may happen twice, and
 only for a look that died while it told. Looks at one database take turns, so that a second watcher finds nothing left.
@@ -26,6 +28,7 @@ from monitor.store import (
     save_analysis,
     stored_analyses,
 )
+from monitor.workflow.health.ahead import compute_ahead
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.weeks import week_of
@@ -163,14 +166,18 @@ def _needs_identification(db: Database, imported: ImportedFolder) -> bool:
 
 
 def _reported(db: Database, arrived: Sequence[ArrivedCampaign], reports: Path | None) -> ReportAnswer | None:
-    """The report of the week of the last run that came; None where no machine was measured or none is asked for."""
+    """The report of the week of the last run that came; None where no machine was measured or none is asked for, when
+    its results are computed ahead."""
     names = {campaign.campaign for campaign in arrived}
     last_runs = [
         row.last_run_at.date()
         for row in list_campaigns(db)
         if row.campaign in names and row.rows is None and row.last_run_at is not None
     ]
-    if reports is None or not last_runs:
+    if not last_runs:
+        return None
+    if reports is None:
+        compute_ahead(db, names, date.today())
         return None
     week = week_of(min(max(last_runs), date.today()))
     return report(db, ReportRequest(week.name, out=reports, made_at=datetime.now().astimezone()))

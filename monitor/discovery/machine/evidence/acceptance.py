@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from monitor.discovery.machine.evidence.noise_doubt import NoiseDoubt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
@@ -33,7 +34,7 @@ from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
-from monitor.discovery.search.sign_flips import p_value_by_flips
+from monitor.discovery.search.sign_flips import FEWEST, p_value_by_flips
 
 # Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
 BLOCK = 15
@@ -80,6 +81,10 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._units = (scene.run, blocks_of_runs(scene), *alone)
         self._flexible = FlexibleErrors(scene, drivers)
         self._wander = tracker_wander(scene)
+        runs = len(scene.fit.problem.runs)
+        # One run's residual holds the effect that is sought, and its correlation errs on the side of silence.
+        few = scene.fit.whitening is not None and 1 < runs <= FEWEST
+        self._doubt = NoiseDoubt(scene) if few else None
         self._weighed: Memory[float] = Memory()
         self._accepted: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
@@ -110,6 +115,10 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 return False
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
+        if self._doubt is not None:
+            tries = candidate.variant.tries * candidate.variant.odds * self._families
+            if self._doubt.p_value(others, candidate) * tries > limit:
+                return False
         return self.predicts(others, candidate)
 
     def predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:

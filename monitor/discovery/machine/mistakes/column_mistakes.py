@@ -13,7 +13,13 @@ from monitor.records import Array, Campaign
 
 #: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
 MOST_TARGETS = 12
-MEASURED = ("tracker_", "plane_", "paraboloid_", "direction_")
+MEASURED = ("tracker_", "plane_", "paraboloid_")
+DIRECTION = ("direction_x", "direction_y", "direction_z")
+#: What a left-handed frame of the directions is, where they are mapped and where they are written.
+MIRRORED = (
+    "the directions were mirrored (`azimuth_from` of their mapping counts the other way round; or of the columns "
+    "direction_x, direction_y and direction_z two were exchanged or one has the other sign)"
+)
 #: Columns of a sensor of two spots, and the columns of its spots.
 SPOTS = (("plane_u_um", "plane_v_um"), ("paraboloid_u_um", "paraboloid_v_um"))
 ACROSS = (("plane_u_um", "paraboloid_u_um"), ("plane_v_um", "paraboloid_v_um"))
@@ -31,18 +37,33 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
     machine, readings = campaign.machine, campaign.probings.readings
     linear = [axis for axis in readings if machine.is_linear(axis)]
     turning = [axis for axis in readings if not machine.is_linear(axis) and np.ptp(readings[axis]) > 0]
-    measured = [name for name in campaign.probings.channels if name.startswith(MEASURED)]
+    measured = [
+        name for name in campaign.probings.channels if name.startswith(MEASURED) and name not in DIRECTION
+    ]
+    directed = DIRECTION[0] in campaign.probings.channels
+    if directed:
+        # Any of the three columns will do: the frame of what is seen turns as it likes.
+        yield MIRRORED, _of_channels(_scaled(DIRECTION[1:2], -1.0))
     yield from _exchanged_axes(linear, turning)
     yield from _turned_axes(linear, turning)
     yield from _exchanged_channels(measured)
     for name in measured:
         yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
     yield from _axes_in_other_units(linear, turning)
-    if "direction_x" in measured:
+    if directed:
         yield from _angles_of_mounts(turning)
     if measured and measured[0].startswith("tracker_"):
         yield f"{', '.join(measured)} were in metres", _of_channels(_scaled(measured, 1e3))
     yield from _exchanged_targets(campaign)
+
+
+def direction_mistakes(campaign: Campaign) -> Iterator[Trial]:
+    """Mistakes of single columns of directions: tried where nothing of ``column_mistakes`` is enough, since all of them
+    mirror the directions, and where their frame may turn one is like the other."""
+    directions = [name for name in campaign.probings.channels if name in DIRECTION]
+    yield from _exchanged_channels(directions)
+    for name in directions:
+        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
 
 
 def target_word(campaign: Campaign) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from monitor.discovery.machine.evidence.robust import RobustFit
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.mistakes.column_mistakes import column_mistakes
+from monitor.discovery.machine.mistakes.column_mistakes import Undo, column_mistakes, direction_mistakes
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms
 from monitor.discovery.machine.mistakes.target_mistakes import relabelled
 from monitor.methods import campaign_method
@@ -40,18 +40,22 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
     if other_names is not None:
         return (other_names,)
     part = _worst_run(campaign, fit)
-    cures = [
-        (what, undo, rms)
-        for what, undo in column_mistakes(campaign)
-        if (rms := cured_rms(undo(part), problem_of, before)) is not None
-    ]
+    cures: list[tuple[str, Undo, float]] = []
+    for trials in (column_mistakes, direction_mistakes):
+        if not cures:
+            cures = [
+                (what, undo, rms)
+                for what, undo in trials(campaign)
+                if (rms := cured_rms(undo(part), problem_of, before)) is not None
+            ]
     best = min((rms for *_, rms in cures), default=0.0)
     mistakes = [
         Mistake(what, before, after)
         for what, undo, rms in cures
         if rms <= 2.0 * best and (after := cured_rms(undo(campaign), problem_of, before)) is not None
     ]
-    return tuple(sorted(mistakes, key=lambda mistake: mistake.rms_undone))
+    # Those that do the same leave the same, but for rounding; they stay in the order in which they are tried.
+    return tuple(sorted(mistakes, key=lambda mistake: float(f"{mistake.rms_undone:.2g}")))
 
 
 def find_other_names(campaign: Campaign, problem_of: Maker, first: RobustFit) -> tuple[Mistake, ...]:

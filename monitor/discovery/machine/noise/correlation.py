@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.machine import MOTION
-from monitor.methods.chain.problem import ChainProblem
+from monitor.discovery.machine.noise.rows import Rows
 from monitor.records import Array
 
 # Correlations of neighbours and shares of the correlated part that are tried; neighbours on this grid differ by less
@@ -59,38 +58,21 @@ def caution(correlation: Correlation | None) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
-    into the directions of the readings (None where they are the readings); what stands behind is no reading.
-
-    ``begins`` (R, T) marks touches that another instrument made than the one before: they have no neighbour before
-    them. ``read`` (R, T) is how many of the d numbers there are. None: one instrument, all numbers.
-    """
-
-    weighted: npt.NDArray[np.bool_]
-    numbers: int
-    turned: Array | None
-    begins: npt.NDArray[np.bool_] | None = None
-    read: Array | None = None
-
-    @property
-    def count(self) -> int:
-        """How many of the N numbers are of readings."""
-        return int(self.weighted.shape[1]) * self.numbers
-
-
-@dataclass(frozen=True)
 class Filters:
-    """The filters of Kalman of C correlations for runs in which the touches ``weighted`` (R, T) were read."""
+    """The filters of Kalman of C correlations for runs in which the touches ``weighted`` (R, T) were read, each of them
+    (R, T) after its neighbour."""
 
     correlations: tuple[Correlation, ...]
     weighted: npt.NDArray[np.bool_]
     begins: npt.NDArray[np.bool_] | None = None
+    steps: Array | None = None
 
     @cached_property
     def _rho(self) -> Array:
-        """What every touch has of the one before (C, R, T): nothing where another instrument begins."""
+        """What every touch has of its neighbour before (C, R, T), so many ``steps`` ago: nothing where it has none."""
         rho = np.array([correlation.rho for correlation in self.correlations])[:, None, None]
+        if self.steps is not None:
+            rho = rho**self.steps
         goes_on = np.ones(self.weighted.shape) if self.begins is None else ~self.begins
         return np.asarray(rho * goes_on)
 
@@ -155,10 +137,17 @@ class Whitening:
     def factors(self) -> tuple[Array, Array]:
         """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
         determinant of the noise covariance for unit variance."""
-        filters = Filters((self.correlation,), self.rows.weighted, self.rows.begins)
-        runs, touches = self.rows.weighted.shape
+        rows = self.rows
+        filters = Filters((self.correlation,), rows.by_neighbours(rows.weighted), rows.begins, rows.steps)
+        runs, touches = rows.weighted.shape
         unit = np.broadcast_to(np.eye(touches), (runs, touches, touches))
-        return filters.apply(unit)[0], filters.logarithm(self.rows.numbers, self.rows.read)[0]
+        read = None if rows.read is None else rows.by_neighbours(rows.read)
+        triangles, logarithm = filters.apply(unit)[0], filters.logarithm(rows.numbers, read)[0]
+        if rows.order is None:
+            return triangles, logarithm
+        back = np.argsort(rows.order, axis=1)
+        run = np.arange(runs)[:, None, None]
+        return triangles[run, back[:, :, None], back[:, None, :]], logarithm
 
     def __call__(self, numbers: Array) -> Array:
         """Independent numbers (..., R, N) of equal variance from correlated ones."""
@@ -184,36 +173,6 @@ class Whitening:
         numbers = np.array(white)
         numbers[:, : rows.count] = readings.reshape(len(white), rows.count)
         return numbers
-
-
-def rows_of(problem: ChainProblem) -> Rows:
-    """The layout of the whitened numbers of a problem."""
-    is_number, numbers = problem.is_number, problem.sigma.shape[1]
-    # Rows of several instruments differ in how many numbers they have: what a kind does not have is not lacking.
-    weighted = np.isfinite(problem.sigma) | ~is_number
-    runs = len(problem.runs)
-    padded = problem.padded(weighted.astype(float)).reshape(runs, -1, numbers)
-    is_weighted = np.all(padded > 0.5, axis=-1)
-    series = problem.series
-    if is_number.all() and not np.ptp(series):
-        return Rows(is_weighted, numbers, None)
-    read = problem.padded(is_number.astype(float)).reshape(runs, -1, numbers).sum(axis=2)
-    of_touch = problem.padded(series[:, None].astype(float) + 1.0).reshape(runs, -1)
-    begins = np.diff(of_touch, axis=1, prepend=0.0) != 0.0
-    return Rows(is_weighted, numbers, None, begins, read * is_weighted)
-
-
-def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
-    """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
-    no vectors of as many joints."""
-    chain, measured = problem.context.chain, list(problem.measured_joints)
-    if len(measured) != 3 or problem.sigma.shape[1] != 3:
-        return None
-    along = np.array([chain.joints[index].direction for index in measured])
-    moved = problem.observe(np.einsum("nrac,ac->nra", by_error[:, :, measured, MOTION, :3], along))
-    # Directions are at right angles but for errors of microradians.
-    turned = problem.padded(np.swapaxes(moved, 1, 2).reshape(len(moved), -1)[:, :, None])
-    return turned.reshape(len(problem.runs), -1, 3, 3)
 
 
 def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Array:
@@ -268,7 +227,7 @@ class NoiseDesign:
 
         Of several runs only what they do not share counts; their means take their part of the degrees of freedom.
         """
-        readings, rest = self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+        readings, rest = self._parts_of(residual)
         if self._resemblance(readings) < NOTICED:
             return None
         criterion = dict(zip(GRID, self._criteria(readings, rest).tolist(), strict=True))
@@ -288,6 +247,23 @@ class NoiseDesign:
         slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
         return max((best, *slow), key=slowness)
 
+    def likelihoods(self, residual: Array) -> list[tuple[Correlation | None, float]]:
+        """Every correlation that is tried with the restricted likelihood of residuals (R, N), the largest of them 1."""
+        criteria = self._criteria(*self._parts_of(residual))
+        relative = np.exp(-0.5 * (criteria - criteria.min()))
+        return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
+
+    def deviance(self, residual: Array, correlation: Correlation | None) -> float:
+        """Minus twice the logarithm of the restricted likelihood of residuals (R, N) under a correlation of the grid,
+        at the variance that makes it largest."""
+        index = GRID.index(GRID[0] if correlation is None else correlation)
+        number = float(self._number[index])
+        return float(self._criteria(*self._parts_of(residual))[index]) - number * float(np.log(number))
+
+    def _parts_of(self, residual: Array) -> tuple[Array, Array]:
+        """What of residuals (R, N) says how neighbours resemble each other."""
+        return self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+
     @cached_property
     def _runs(self) -> npt.NDArray[np.int64]:
         runs = len(self.basis)
@@ -295,7 +271,7 @@ class NoiseDesign:
 
     @cached_property
     def _weighted(self) -> npt.NDArray[np.bool_]:
-        return np.asarray(self.rows.weighted[self._runs])
+        return np.asarray(self.rows.by_neighbours(self.rows.weighted)[self._runs])
 
     @cached_property
     def _own(self) -> tuple[Array, Array]:
@@ -307,17 +283,19 @@ class NoiseDesign:
         return (len(self.basis) - 1) / len(self.basis) if len(self.basis) > 1 else 1.0
 
     def _parts(self, numbers: Array) -> tuple[Array, Array]:
-        """Columns (R, N, k) as readings (R, T, d k) in their own directions, and what is no reading (R, e, k)."""
+        """Columns (R, N, k) as readings (R, T, d k) in their own directions and after their neighbours, and what is no
+        reading (R, e, k)."""
         rows = self.rows
         runs, touches = self._weighted.shape
         readings = numbers[:, : rows.count].reshape(runs, touches, rows.numbers, -1)
         if rows.turned is not None:
             readings = rows.turned[self._runs] @ readings
+        readings = rows.by_neighbours(readings, self._runs)
         readings = np.where(self._weighted[..., None, None], readings, 0.0)
         rest = numbers[:, rows.count :]
         # What setups state (the length of a bar) may contradict another instrument: that is no noise of readings, and
         # would be taken for an offset of all readings of the setup, noise that hardly changes.
-        return readings.reshape(runs, touches, -1), rest if rows.begins is None else rest[:, :0]
+        return readings.reshape(runs, touches, -1), rest if rows.read is None else rest[:, :0]
 
     def _resemblance(self, readings: Array) -> float:
         """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
@@ -339,7 +317,9 @@ class NoiseDesign:
     def _numbers(self) -> float:
         """How many numbers were read."""
         rows = self.rows
-        read = rows.numbers * self._weighted if rows.read is None else rows.read[self._runs]
+        read = (
+            rows.numbers * self._weighted if rows.read is None else rows.by_neighbours(rows.read)[self._runs]
+        )
         return float(np.sum(read))
 
     def _of_one_series(self, lag: int) -> Array:
@@ -362,8 +342,12 @@ class NoiseDesign:
         able = whites.able
         fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
         squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
-        number = self._share * (self._numbers - able.sum(axis=(1, 2)))
-        return np.asarray(self._share * whites.logarithm + number * np.log(np.maximum(squares, 1e-300)))
+        return np.asarray(self._share * whites.logarithm + self._number * np.log(np.maximum(squares, 1e-300)))
+
+    @cached_property
+    def _number(self) -> Array:
+        """The degrees of freedom (C,) under every correlation."""
+        return np.asarray(self._share * (self._numbers - self._whites.able.sum(axis=(1, 2))))
 
     @cached_property
     def _whites(self) -> _Whites:
@@ -372,14 +356,15 @@ class NoiseDesign:
         values, vectors = np.linalg.eigh(np.concatenate(products))
         able = values > SMALLEST_EIGENVALUE
         filters = self._filters(GRID)
-        read = None if self.rows.read is None else self.rows.read[self._runs]
+        read = None if self.rows.read is None else self.rows.by_neighbours(self.rows.read)[self._runs]
         logarithm = filters.logarithm(self.rows.numbers, read).sum(axis=1)
         logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
         return _Whites(filters, values, vectors, logarithm)
 
     def _filters(self, correlations: Sequence[Correlation]) -> Filters:
         begins = None if self.rows.begins is None else self.rows.begins[self._runs]
-        return Filters(tuple(correlations), self._weighted, begins)
+        steps = None if self.rows.steps is None else self.rows.steps[self._runs]
+        return Filters(tuple(correlations), self._weighted, begins, steps)
 
     def _products(self, correlations: Sequence[Correlation]) -> Array:
         """The products (C, R, p, p) of the filtered span of what is unknown with itself."""

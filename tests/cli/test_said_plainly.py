@@ -1,0 +1,94 @@
+"""What people met in their first hours: each is answered with what to type, and a list holds what it counts."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from monitor.cli.folder_patterns import in_full
+from monitor.exceptions import InputError
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_a_pattern_that_no_shell_wrote_out_is_written_out_here(tmp_path: Path) -> None:
+    for name in ("b", "a", "c d"):
+        (tmp_path / "shop" / name).mkdir(parents=True)
+    assert in_full([tmp_path / "shop" / "*"]) == [tmp_path / "shop" / name for name in ("a", "b", "c d")]
+    assert in_full([tmp_path / "no*", Path("x")][1:]) == [Path("x")]
+    with pytest.raises(InputError, match=r"nothing matches .*z\*: the folder .*shop has a, b, c d$"):
+        in_full([tmp_path / "shop" / "z*"])
+    with pytest.raises(InputError, match=r"nothing matches .*: there is no folder .*mill$"):
+        in_full([tmp_path / "mill" / "*"])
+    (tmp_path / "[odd]").mkdir()
+    assert in_full([tmp_path / "[odd]"]) == [tmp_path / "[odd]"]
+
+
+def test_folders_by_a_pattern_are_imported(typed: Any, tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES / "tilting-table", tmp_path / "shop" / "tilting-table")
+    db = tmp_path / "x.duckdb"
+    assert "tilting-table: imported, 4 runs" in typed("import", tmp_path / "shop" / "*", db=db).out
+    refused = typed("import", tmp_path / "shop" / "mill*", db=db)
+    assert (refused.status, refused.out) == (2, "")
+    assert "shop has tilting-table" in refused.err
+
+
+def test_the_fleet_has_a_row_for_a_machine_without_numbers(typed: Any, tmp_path: Path) -> None:
+    db = tmp_path / "x.duckdb"
+    assert typed("import", EXAMPLES / "tilting-table", EXAMPLES / "ball-bar", db=db).status == 0
+    assert typed("identify", "tilting-table", db=db).status == 0
+    answer = typed("fleet", "--json", db=db).document
+    assert (answer["machines"], answer["without_numbers"]) == (1, ["CENTRE-4"])
+    said = typed("fleet", db=db).out
+    assert "2 machines, 1 of them without numbers, 32 values" in said
+    assert any(
+        line.split()[:2] == ["-", "CENTRE-4"] and "not judged: not identified" in line
+        for line in said.splitlines()
+    )
+    assert typed("identify", "ball-bar", db=db).status == 0
+    assert "without_numbers" not in typed("fleet", "--json", db=db).document
+    assert "not judged: not identified" not in typed("fleet", db=db).out
+
+
+def test_a_kind_of_event_is_no_note(typed: Any, db: Path) -> None:
+    refused = typed("event", "HU40-T", "Crash", "--at", "2026-03-05", db=db)
+    assert (refused.status, refused.out) == (2, "")
+    assert "'crash' is a kind of event" in refused.err
+    assert "give --kind crash and say in words what happened" in refused.err
+    recorded = typed("event", "HU40-T", "spindle hit the vice", "--at", "2026-03-05", db=db)
+    assert "recorded as a note, which does not split the history; --kind crash, repair" in recorded.out
+    split = typed("event", "HU40-T", "spindle hit the vice", "--kind", "crash", "--at", "2026-03-05", db=db)
+    assert "recorded as a note" not in split.out
+
+
+def test_who_has_no_backup_learns_how_to_make_one(typed: Any, tmp_path: Path) -> None:
+    refused = typed("restore", tmp_path / "none.duckdb", db=tmp_path / "back.duckdb")
+    assert (refused.status, refused.out) == (2, "")
+    assert "none.duckdb; `monitor backup FILE` makes one, to be put back later" in refused.err
+    (tmp_path / "bare.duckdb").write_bytes(b"x")
+    refused = typed("restore", tmp_path / "bare.duckdb", db=tmp_path / "back.duckdb")
+    assert "so it cannot be checked; `monitor backup FILE` writes both" in refused.err
+
+
+def test_one_explanation_measures_by_one_root_mean_square(typed: Any, tmp_path: Path) -> None:
+    """What is left with all findings is the RMS of the first line, beside the same expectation."""
+    db = tmp_path / "x.duckdb"
+    assert typed("import", EXAMPLES / "hidden-reversal-x", db=db).status == 0
+    said = typed("explain", "hidden-reversal-x", db=db).out
+    document = typed("explain", "hidden-reversal-x", "--json", db=db).document
+    remaining, expected = document["remaining"]["rms_um"], document["expected_rms_um"]
+    assert [effect["effect"] for effect in document["missing"]] == ["EXX:reversal"]
+    assert f"expected {expected:.2f} µm from the probe's stated uncertainty" in said
+    assert f"with all of this in the model: RMS {remaining:.2f} µm, expected {expected:.2f} µm" in said
+
+
+def test_the_circles_of_a_ball_bar_say_about_which_centre(typed: Any, tmp_path: Path) -> None:
+    db = tmp_path / "x.duckdb"
+    assert typed("import", EXAMPLES / "ball-bar", db=db).status == 0
+    said = typed("standards", "ball-bar", "--setup", "bar-xy", db=db).out
+    assert "circular deviation about its least-squares circle, counter-clockwise" in said
+    assert "bi-directional circular deviation about the least-squares circle of both senses" in said
+    assert "largest radial deviation about the centre of G, clockwise" in said

@@ -1,0 +1,39 @@
+"""Effects that are ticked are added together: one version of the model, and one step of the error."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CURVE = "load-cell"
+
+
+@pytest.fixture
+def own(imported: Path, serve: Any, tmp_path: Path) -> Any:
+    """A server of a copy of the database that the test may write to."""
+    copy = tmp_path / "own.duckdb"
+    shutil.copyfile(imported, copy)
+    return serve(copy, False)
+
+
+def test_ticked_effects_are_one_version_by_rank(own: Any) -> None:
+    form = {"proof": own.proof(), "once": "1", "campaign": CURVE, "to": "curve@1", "latest": "curve@1"}
+    # By rank as numbers: the tenth is not before the second.
+    answer = own.client.post(
+        "/model/add", data={**form, "ticked-10": "load_N:sin1", "ticked-2": "load_N:poly2"}
+    )
+    assert answer.status_code == 303
+    assert "load_N%3Apoly2%2C+load_N%3Asin1+were+added" in answer.headers["location"]
+    versions = [model for model in own.ask("models")[1]["models"] if model["name"] == "curve"]
+    assert [version["added"] for version in versions] == [[], ["load_N:poly2", "load_N:sin1"]]
+
+
+def test_without_a_tick_nothing_is_made_and_it_is_said(own: Any) -> None:
+    form = {"proof": own.proof(), "once": "1", "campaign": CURVE, "to": "curve@1"}
+    page = own.sent("/model/add", data=form)
+    assert page.status_code == 400
+    assert "no effect is ticked" in page.text
+    assert len([model for model in own.ask("models")[1]["models"] if model["name"] == "curve"]) == 1
