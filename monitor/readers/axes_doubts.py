@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations, permutations
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.readers.unit_doubts import (
     DISTANCE_TOLERANCE,
@@ -92,11 +93,11 @@ def _steps_in_faces(campaign: Campaign) -> tuple[Array, Array]:
     names = [f"normal_{axis}" for axis in "xyz"]
     if not all(name in probings.channels for name in names):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    rows = probings.run == probings.run[0]
+    rows: npt.NDArray[np.bool_] = np.asarray(probings.run == probings.run[0], dtype=np.bool_)
     for axis, values in probings.readings.items():
         if not campaign.machine.is_linear(axis):
-            rows &= np.abs(values) < ZERO_RAD
-    rows &= ~np.isin(probings.target, [ball.id for ball in campaign.artefact.balls])
+            rows = rows & (np.abs(values) < ZERO_RAD)
+    rows = rows & ~np.isin(probings.target, [ball.id for ball in campaign.artefact.balls])
     normal = np.column_stack([probings.channels[name][rows] for name in names])
     read = np.column_stack([probings.readings[axis][rows] for axis in AXES])
     steps, along = [np.zeros((0, 3))], [np.zeros((0, 3))]
