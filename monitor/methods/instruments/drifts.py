@@ -83,9 +83,9 @@ def _judged(
         return None
     score = float(beside @ residual)
     removed = (score / length) ** 2
-    left = max(float(np.sum(residual[at] ** 2)) - removed, 0.0)
-    if chdtrc(free, left) < DOUBTFUL and removed < MOST * (left + removed - free):
+    remaining = max(float(np.sum(residual[at] ** 2)) - removed, 0.0)
+    if chdtrc(free, remaining) < DOUBTFUL and removed < MOST * (remaining + removed - free):
         return None
-    deviation = np.sqrt(max(1.0, left / free))
+    deviation = np.sqrt(max(1.0, remaining / free))
     p = 2.0 * float(stdtr(free, -abs(score) / length / deviation))
     return -score / length**2, float(deviation) / length, p
