@@ -260,9 +260,8 @@ class Setup:
     ``direction`` and ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
-    that in which a vector is read; ``known`` names the unknowns held as stated; ``certificate`` is the instrument's.
-    ``drift_uncertainty`` (mm or rad) is the standard uncertainty of what its numbers drift from its first row of a run
-    to its last, None where they do not.
+    that in which a vector is read; ``known`` names the unknowns held as stated; ``drift_uncertainty`` (mm or rad) is
+    that of what its numbers drift over its rows of a run.
     """
 
     id: str
@@ -287,8 +286,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Artefact:
-    """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
-    conditions of a self-calibration; the setups of instruments."""
+    """Balls, scale bar, reflectors, tables and conditions of a self-calibration, setups: what the method has."""
 
     id: str
     balls: tuple[Ball, ...]
@@ -313,7 +311,6 @@ class Run:
 @dataclass(frozen=True)
 class Probings:
     """All probings of a campaign, row by row in file order (n rows).
-
     ``run`` and ``sequence`` are integers (n,), ``time`` seconds since the run's start (n,), ``target`` ball
     names (n,), ``readings`` axis name to (n,) in mm or rad, ``channels`` recorded column to (n,) in the unit
     that its name ends in, NaN where a cell is empty.

@@ -124,7 +124,7 @@ def _setup(table: Table) -> Setup | None:
         known=_known(table, form),
         turn_uncertainty=_stated(table, "urad") if form.turns else None,
         certificate=table.text("certificate"),
-        drift_uncertainty=_drift(table, form) if form.drifts else None,
+        drift_uncertainty=_drift(table, form),
     )
     table.finish()
     return None if len(table.faults) > before else setup
@@ -155,6 +155,8 @@ def _uncertainty(table: Table, form: ReadingFormat) -> float | None:
 
 def _drift(table: Table, form: ReadingFormat) -> float | None:
     """The standard uncertainty of the drift over a run in mm or rad; None where it is not stated."""
+    if not form.drifts:
+        return None
     right, wrong = ("urad", "um") if form.angular else ("um", "urad")
     other = f"{_DRIFT_UNCERTAINTY}_{wrong}"
     if other in table.data:

@@ -59,33 +59,33 @@ def _of_run(problem: InstrumentProblem, run: int, jacobian: Array, residual: Arr
         for number, name in enumerate(part.reading.numbers):
             column = np.zeros(len(residual))
             column[rows * numbers + number] = elapsed / sigma[:, number]
-            seen = _seen(column, read, basis, residual)
-            if seen is not None:
-                yield SetupDrift(run, part.id, name, *seen, angular=part.reading.angular)
+            judged = _judged(column, read, basis, residual)
+            if judged is not None:
+                yield SetupDrift(run, part.id, name, *judged, angular=part.reading.angular)
 
 
 def _rows_of(part: Part, of_run: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], Array]:
     """The places of a setup's rows among those of a run, and the time of each from 0 to 1."""
-    mine, here, there = np.intersect1d(of_run, part.at, assume_unique=True, return_indices=True)
-    return here, part.rows.elapsed[there] if len(mine) else np.zeros(0)
+    common, of_setup, in_part = np.intersect1d(of_run, part.at, assume_unique=True, return_indices=True)
+    return of_setup, part.rows.elapsed[in_part] if len(common) else np.zeros(0)
 
 
-def _seen(
+def _judged(
     column: Array, at: npt.NDArray[np.int64], basis: Array, residual: Array
 ) -> tuple[float, float, float] | None:
     """Size in mm, standard uncertainty and p of a drift (m,), for a setup that read the numbers ``at``; None where none
     could be seen."""
     size = float(np.linalg.norm(column))
-    own = column - basis @ (basis.T @ column)
-    length = float(np.linalg.norm(own))
+    beside = column - basis @ (basis.T @ column)
+    length = float(np.linalg.norm(beside))
     free = len(at) - float(np.sum(basis[at] ** 2)) - 1.0
     if size == 0.0 or length < SHOWN * size or free < 1.0:
         return None
-    score = float(own @ residual)
+    score = float(beside @ residual)
     removed = (score / length) ** 2
-    left = max(float(np.sum(residual[at] ** 2)) - removed, 0.0)
-    if chdtrc(free, left) < DOUBTFUL and removed < MOST * (left + removed - free):
+    remaining = max(float(np.sum(residual[at] ** 2)) - removed, 0.0)
+    if chdtrc(free, remaining) < DOUBTFUL and removed < MOST * (remaining + removed - free):
         return None
-    deviation = np.sqrt(max(1.0, left / free))
+    deviation = np.sqrt(max(1.0, remaining / free))
     p = 2.0 * float(stdtr(free, -abs(score) / length / deviation))
     return -score / length**2, float(deviation) / length, p

@@ -55,14 +55,14 @@ class Part:
 
     def prior(self) -> tuple[tuple[int, float], ...]:
         """Unknowns that are known with a standard uncertainty: index and u in mm or rad; they are 0 as stated."""
-        own = len(self.reading.unknowns)
+        first = len(self.reading.unknowns)
         u = 0.0 if self.drift is None else self.drift
-        return (*self.reading.prior(), *((own + index, u) for index in range(len(self._drifts))))
+        return (*self.reading.prior(), *((first + index, u) for index in range(len(self._drifts))))
 
     def shown(self, stance: Stance, values: Array) -> Shown:
         """What the instrument shows, for unknowns (m, q) row by row."""
-        own = len(self.reading.unknowns)
-        shown = self.reading.shown(stance, values[:, :own], self.rows)
+        first = len(self.reading.unknowns)
+        shown = self.reading.shown(stance, values[:, :first], self.rows)
         if not self._drifts:
             return shown
         elapsed = self.rows.elapsed
@@ -70,6 +70,6 @@ class Part:
         by_own = np.zeros((*shown.residual.shape, 0)) if shown.by_own is None else shown.by_own
         return replace(
             shown,
-            residual=shown.residual + elapsed[:, None] * values[:, own:],
+            residual=shown.residual + elapsed[:, None] * values[:, first:],
             by_own=np.concatenate([by_own, drifted], axis=2),
         )
