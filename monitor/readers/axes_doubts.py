@@ -94,22 +94,22 @@ def _steps_in_faces(campaign: Campaign) -> tuple[Array, Array]:
     if not all(name in probings.channels for name in names):
         return np.zeros((0, 3)), np.zeros((0, 3))
     rows: npt.NDArray[np.bool_] = np.asarray(probings.run == probings.run[0], dtype=np.bool_)
-    for axis, values in probings.readings.items():
-        if not campaign.machine.is_linear(axis):
+    for name, values in probings.readings.items():
+        if not campaign.machine.is_linear(name):
             rows = rows & (np.abs(values) < ZERO_RAD)
     rows = rows & ~np.isin(probings.target, [ball.id for ball in campaign.artefact.balls])
     normal = np.column_stack([probings.channels[name][rows] for name in names])
     read = np.column_stack([probings.readings[axis][rows] for axis in AXES])
     steps, along = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for place in range(3):
+    for axis in range(3):
         for side in (1.0, -1.0):
-            face = read[side * normal[:, place] > ALONG_AN_AXIS]
+            face = read[side * normal[:, axis] > ALONG_AN_AXIS]
             if len(face) < 2:
                 continue
             of_face = face[1:] - face[:-1]
             of_face = of_face[np.linalg.norm(of_face, axis=1) > 0.0]
             steps.append(of_face)
-            along.append(np.tile(np.eye(3)[place], (len(of_face), 1)))
+            along.append(np.tile(np.eye(3)[axis], (len(of_face), 1)))
     return np.concatenate(steps), np.concatenate(along)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.exceptions import DataError
-from monitor.methods.chain.gross import Deviation, GrossReading, as_reading
+from monitor.methods.chain.deviation import Deviation
+from monitor.methods.chain.gross import GrossReading, as_reading
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns

@@ -187,7 +187,8 @@ def routes() -> APIRouter:
         sums = _summed(request, machines)
         answer, waiting = sums.answer, sums.waiting
         rows = _with_unnumbered(sums, machines)
-        classes: dict[str, Urgency] = {**URGENCIES, WITHOUT_NUMBERS: NOT_IDENTIFIED}
+        classes: dict[str, Urgency] = {str(each): word for each, word in URGENCIES.items()}
+        classes[WITHOUT_NUMBERS] = NOT_IDENTIFIED
         counts = {label: sum(row.attention == label for row in rows) for label in classes}
         shown = [
             row
