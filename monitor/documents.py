@@ -93,6 +93,12 @@ def data_key(field: dataclasses.Field[Any]) -> str:
 
 
 def _plain(value: object) -> Any:
+    # Most of an answer: asked for last, each of them was asked first whether it is a dataclass.
+    kind = type(value)
+    if kind is float:
+        return value if math.isfinite(value) else None  # type: ignore[arg-type]
+    if kind is str or kind is int or value is None:
+        return value
     if isinstance(value, (Sentence, Path)):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -15,20 +15,19 @@ from typing import TYPE_CHECKING, Protocol
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.chain.gross import gross_readings
-from monitor.methods.chain.identification import Identification, StepwiseCoefficient, TakenUp
-from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import AdviceOf, identification
-from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.model import Model
 from monitor.methods.rehearsal import YES, Able, Rehearsal
-from monitor.methods.standard_test import StandardTestRows
 from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
+    from monitor.methods.chain.identification import Identification, StepwiseCoefficient, TakenUp
+    from monitor.methods.chain.least_squares import Solution
+    from monitor.methods.chain.results import AdviceOf
     from monitor.methods.curve.fit import CurveFit
+    from monitor.methods.curve.problem import CurveProblem
+    from monitor.methods.standard_test import StandardTestRows
 
 
 @dataclass(frozen=True)
@@ -253,6 +252,8 @@ class Method:
 def _suspected(problem: ChainProblem) -> str:
     """Which readings are grossly off, as the end of a refusal; empty where none stands out, or the same target in most
     runs: then the file is wrong throughout, not a row."""
+    from monitor.methods.chain.gross import gross_readings
+
     gross = gross_readings(problem)
     runs_of_target = Counter(target for _, target in {(reading.run, reading.target) for reading in gross})
     if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
@@ -342,6 +343,8 @@ class ChainMethod(Method):
         ``solve`` gives the solution of the problem. Raises DataError where the readings do not suffice or contradict
         the machine file, EffectError where the model names an effect that the machine or the data do not have.
         """
+        from monitor.methods.chain.results import identification
+
         model = model or self.own_model
         problem = self.problem_of(campaign, model)
         self.refuse(campaign, problem)

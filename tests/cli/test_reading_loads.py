@@ -94,3 +94,37 @@ def test_the_version_is_said_without_numpy_and_the_database() -> None:
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.splitlines()[1] == "[]"
+
+
+def test_a_verb_that_ends_is_not_looked_through_for_cycles(reading_database: Path) -> None:
+    # Registered before the verb's own, so called after it.
+    code = (
+        "import atexit, gc, sys\natexit.register(lambda: print(gc.get_freeze_count() > 10_000, gc.get_count()[0]))\n"
+        f"sys.argv[1:] = ['--db', {str(reading_database)!r}, '--quiet', 'campaigns']\n"
+        "from monitor.cli import main\nsys.exit(main())"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.split()[-2] == "True"
+    assert answer.stderr == ""
+
+
+def test_statistics_alone_load_no_solver_of_curves_and_no_notes(reading_database: Path) -> None:
+    lines = {
+        "stats|five-days": [
+            *(
+                "monitor.methods.chain.gross",
+                "monitor.methods.chain.results",
+                "monitor.methods.curve.problem",
+            ),
+            *("monitor.methods.standard_test", "monitor.reporting.run_notes", "monitor.discovery"),
+        ],
+        "trend|HU40-T": ["monitor.reporting.run_notes", "monitor.store.results", "monitor.methods"],
+        "fleet": ["monitor.reporting.run_notes", "monitor.store.results", "monitor.methods"],
+    }
+    for line, unneeded in lines.items():
+        code = (
+            f"import sys\nfrom monitor.cli import main\nmain(['--db', {str(reading_database)!r}, '--quiet', "
+            f"*{line.split('|')!r}])\nprint(sorted({set(unneeded)!r} & set(sys.modules)))"
+        )
+        answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert answer.stdout.splitlines()[-1] == "[]", line

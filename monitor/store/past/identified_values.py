@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,9 @@ import numpy.typing as npt
 from monitor.records import Array
 from monitor.store.connection import Database
 from monitor.store.past.gathering import BY_PARAMETER, PORTION, gather
-from monitor.store.results import StoredIdentification
+
+if TYPE_CHECKING:
+    from monitor.store.results import StoredIdentification
 
 
 @dataclass(frozen=True)

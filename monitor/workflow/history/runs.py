@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from monitor.exceptions import NotFoundError, did_you_mean
-from monitor.reporting.run_notes import LeftOutNoted, SameHoursNoted
 from monitor.store import MachineHistory, RecordedRun
+
+if TYPE_CHECKING:
+    from monitor.reporting.run_notes import LeftOutNoted, SameHoursNoted
 
 
 def selected_campaigns(history: MachineHistory, campaigns: tuple[str, ...]) -> MachineHistory:
@@ -54,6 +57,10 @@ def same_hours(history: MachineHistory) -> list[SameHoursNoted]:
         if ends > latest:
             latest, holder = ends, name
     groups = {tuple(sorted(names)) for names in group.values() if len(names) > 1}
+    if not groups:
+        return []
+    from monitor.reporting.run_notes import SameHoursNoted
+
     return [SameHoursNoted(names) for names in sorted(groups)]
 
 
@@ -85,5 +92,7 @@ def possible_campaigns(
         if overlapped is None:
             selected.append(name)
         else:
+            from monitor.reporting.run_notes import LeftOutNoted
+
             remarks.append(LeftOutNoted(name, overlapped))
     return set(selected), remarks

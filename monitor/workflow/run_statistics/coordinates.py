@@ -9,7 +9,6 @@ import numpy as np
 from monitor.documents import Said
 from monitor.methods import Unable, campaign_method
 from monitor.records import Array, Campaign
-from monitor.reporting.run_notes import RunsOfSeveralPlans
 from monitor.statistics import Homogeneity
 from monitor.units import DEGREE
 from monitor.workflow.run_statistics.answer import CoordinateStatistics
@@ -53,7 +52,12 @@ def probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | Sai
     comparable = campaign_method(campaign).coordinates
     if isinstance(comparable, Unable):
         return comparable.why
-    return coordinates(campaign, runs) or RunsOfSeveralPlans()
+    several = coordinates(campaign, runs)
+    if several is None:
+        from monitor.reporting.run_notes import RunsOfSeveralPlans
+
+        return RunsOfSeveralPlans()
+    return several
 
 
 def coordinate_statistics(campaign: Campaign, runs: list[int], groups: list[str]) -> CoordinateStatistics:
