@@ -54,6 +54,10 @@ def named(key: str) -> Mapping[str, Any]:
     return {"key": key}
 
 
+#: What JSON has as Python has it.
+_AS_THEY_ARE = frozenset({str, int, bool, type(None)})
+
+
 def to_document(record: object) -> dict[str, Any]:
     """Convert a frozen dataclass to what JSON has: dict, list, str, int, float, bool and None."""
     document = _plain(record)
@@ -94,11 +98,12 @@ def data_key(field: dataclasses.Field[Any]) -> str:
 
 def _plain(value: object) -> Any:
     # Most of an answer: asked for last, each of them was asked first whether it is a dataclass.
-    kind = type(value)
-    if kind is float:
-        return value if math.isfinite(value) else None  # type: ignore[arg-type]
-    if kind is str or kind is int or value is None:
-        return value
+    if type(value) is float:
+        return value if math.isfinite(value) else None
+    return value if type(value) in _AS_THEY_ARE else _taken_apart(value)
+
+
+def _taken_apart(value: object) -> Any:
     if isinstance(value, (Sentence, Path)):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
