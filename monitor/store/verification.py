@@ -77,10 +77,10 @@ def unrecorded(db: Database) -> tuple[str, ...]:
 
     Nothing is hashed; what was cut off with all that it records leaves no trace but a hash kept elsewhere.
     """
+    # In this order: what another session stores in between has its entry already.
+    keys = sorted(_keys(db))
     audited = _audited(db)
-    return tuple(
-        _without_entry(subject, key) for subject, key, _ in sorted(_keys(db)) if (subject, key) not in audited
-    )
+    return tuple(_without_entry(subject, key) for subject, key, _ in keys if (subject, key) not in audited)
 
 
 def _audited(db: Database) -> dict[tuple[str, str], str]:
