@@ -64,8 +64,10 @@ def test_what_is_stored_while_the_audit_is_compared_has_its_entry(
             monkeypatch.setattr(verification, read.__name__, storing(read))
         assert unrecorded(db) == ()
         assert len(stored) == 2
+        assert verify_audit(db).faults == ()
+        assert len(stored) == 5
         db.execute("DELETE FROM audit WHERE entry = (SELECT max(entry) FROM audit)")
-        assert unrecorded(db) == ("event 2 is in the database, but not in the audit",)
+        assert unrecorded(db) == ("event 5 is in the database, but not in the audit",)
 
 
 @pytest.mark.parametrize(
