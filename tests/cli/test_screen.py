@@ -24,6 +24,7 @@ OTHER = frozenset(
             "autocorrelation",
             "axes",
             "bartlett",
+            "by_chance",
             "anova_f",
             "e_n",
             "k",

@@ -147,7 +147,7 @@ def with_columns(folder: Path, change: Callable[[dict[str, str]], dict[str, str]
         ),
         (
             lambda row: row | {"direction_y": repr(-float(row["direction_y"]))},
-            "the sign of direction_y were the other",
+            "the directions were mirrored (`azimuth_from` of their mapping counts the other way round",
         ),
     ],
 )

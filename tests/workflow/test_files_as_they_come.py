@@ -162,11 +162,16 @@ def test_files_and_mapping_are_stored_byte_for_byte(db, tmp_path):
     assert again.state == "unchanged"
 
 
-def test_a_refusal_of_files_is_recorded_under_their_mapping(db, tmp_path):
+@pytest.mark.parametrize(
+    ("end", "told"),
+    [("", r"laser-X\.rtl, line 62: .* the file is cut here"), ("\n", "run-count: 5 runs are announced and")],
+)
+def test_a_refusal_of_files_is_recorded_under_their_mapping(db, tmp_path, end, told):
     folder = tmp_path / "cut"
     shutil.copytree(EXAMPLES / NAMES[0], folder)
     text = (folder / "laser-X.rtl").read_text(encoding="ascii")
-    (folder / "laser-X.rtl").write_text(text[: len(text) // 2], encoding="ascii")
-    with pytest.raises(CampaignError, match="run-count: 5 runs are announced and"):
+    half = text[: len(text) // 2]
+    (folder / "laser-X.rtl").write_text(half[: half.rindex(end)] + end if end else half, encoding="ascii")
+    with pytest.raises(CampaignError, match=told):
         import_folders(db, ImportRequest([folder]))
     assert db.rows("SELECT campaign FROM v_refused_imports") == [(NAMES[0],)]

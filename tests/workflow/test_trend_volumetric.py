@@ -163,7 +163,7 @@ def test_the_command_prints_the_forecast_the_next_check_and_the_backtest(path: P
     assert "limit 216 µm; reaches its limit on 20" in said
     assert "at the next check, " in said
     assert " of 8 past days, each foretold by the days before it, lay in the interval (" in said
-    assert "later values (" in said
+    assert "each day forecast from the days before it: " in said
     assert main(["--db", str(path), "trend", "HU40-T", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     tested = document["parameters"]["EC0Y"]["backtest"]
