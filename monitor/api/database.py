@@ -210,7 +210,7 @@ def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) 
     def day(written: date | str) -> date:
         try:
             return written if isinstance(written, date) else date.fromisoformat(written)
-        except ValueError as fault:
+        except (TypeError, ValueError) as fault:
             raise InputError(f"'{written}' is no day; write 2026-01-12") from fault
 
     values = {**options, "out": Path(out), "like": str(like)}

@@ -8,9 +8,9 @@ import gc
 #: Objects made before Python looks for cycles among them (700). While modules are loaded it finds none, and looking
 #: takes a tenth of the time of a verb that reads; arrays are freed without it.
 _OF_A_VERB = 100_000
-#: Python's own (gc.set_threshold). With that of a verb the oldest objects are looked at once in ten million: a server
-#: kept every answer that was part of a cycle, 1.9 GB after 20 minutes.
-_USUAL = (700, 10, 10)
+#: Python's own, which its versions change. With that of a verb the oldest objects are looked at once in ten million: a
+#: server kept every answer that was part of a cycle, 1.9 GB after 20 minutes.
+_USUAL = gc.get_threshold()
 
 
 def collect_rarely() -> None:

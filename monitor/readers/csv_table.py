@@ -41,11 +41,10 @@ def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
-    plain = plain_csv(text)
-    if is_cut(plain):
-        faults.add(file, plain.count("\n") + 1, None, CUT)
+    if is_cut(text):
+        faults.add(file, text.count("\n") + 1, None, CUT)
         return None
-    lines = plain.split("\n")
+    lines = plain_csv(text).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)

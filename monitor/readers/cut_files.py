@@ -28,7 +28,7 @@ def is_cut(text: str) -> bool:
     """Whether the last line has no end and its last number fewer decimals than all those above it have."""
     if text.endswith("\n"):
         return False
-    *lines, last = text.split("\n")
+    *lines, last = text.replace("\r\n", "\n").split("\n")
     pattern = _LAST_WITH_COMMA if _SEPARATED.search(last) and "." not in last else _LAST_NUMBER
     end = pattern.search(last.rstrip(".,"))
     cells = len(_SEPARATED.findall(last)) + last.count(",")

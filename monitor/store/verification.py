@@ -60,6 +60,9 @@ def verify_audit(db: Database) -> Verification:
     ]
     audited = _audited(db)
     stored = {(content.subject, content.key): content for content in _contents(db)}
+    # What another session stored meanwhile has its entry by now, and is for the next verification.
+    for recorded in _audited(db).keys() - audited.keys():
+        stored.pop(recorded, None)
     for subject, key in sorted(audited.keys() | stored.keys()):
         name = f"{subject} {key}"
         if (subject, key) not in stored:
@@ -77,10 +80,10 @@ def unrecorded(db: Database) -> tuple[str, ...]:
 
     Nothing is hashed; what was cut off with all that it records leaves no trace but a hash kept elsewhere.
     """
+    # In this order: what another session stores in between has its entry already.
+    keys = sorted(_keys(db))
     audited = _audited(db)
-    return tuple(
-        _without_entry(subject, key) for subject, key, _ in sorted(_keys(db)) if (subject, key) not in audited
-    )
+    return tuple(_without_entry(subject, key) for subject, key, _ in keys if (subject, key) not in audited)
 
 
 def _audited(db: Database) -> dict[tuple[str, str], str]:

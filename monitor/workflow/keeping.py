@@ -64,8 +64,8 @@ class VerifyRequest:
 
     ``anchor`` is a hash of the chain that was kept elsewhere: on paper, on a certificate or in a report. ``recompute``
     is how many identifications, drawn at random, are computed anew; ``seed`` draws those of an earlier verification
-    again. ``trusted`` is a file of trusted signers
-    (certificates in PEM or DER, or fingerprints): every signed certificate has to be of one of them.
+    again. ``trusted`` is a file of trusted signers (certificates in PEM or DER, or fingerprints): every signed
+    certificate has to be of one of them.
 
     Raises InputError for what is no hash or number.
     """

@@ -8,7 +8,6 @@ the pattern do: each gets the deviation of one of its days from their mean, draw
 from __future__ import annotations
 
 import calendar
-import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,11 +26,11 @@ from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.file_names import file_name
 from monitor.workflow.simulation import PEAK_UM
+from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
 
 #: The mean month of the Gregorian calendar, in days.
 DAYS_A_MONTH = 365.2425 / 12.0
 MOST_CAMPAIGNS = 1000
-TRUTH = "truth.csv"
 
 
 @dataclass(frozen=True)
@@ -115,19 +114,6 @@ class LikeAnswer:
     message: str
 
 
-@dataclass(frozen=True)
-class _TrueValue:
-    """A row of the file of true values."""
-
-    machine: str
-    campaign: str
-    run: int
-    started_at: str
-    parameter: str
-    value: float
-    unit: str
-
-
 def simulate_like(request: LikeRequest, *, progress: Callable[[str], None] = lambda name: None) -> LikeAnswer:
     """Write campaigns like that of a folder. Raises CampaignError of the folder, InputError, EffectError, DataError."""
     pattern = read_campaign(Path(request.like))
@@ -175,10 +161,7 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
             folders.append(str(folder))
             truth += _true_values(dated, likeness, local, units)
     file = request.out / TRUTH
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(_TrueValue.__dataclass_fields__)
-        writer.writerows([getattr(row, key) for key in _TrueValue.__dataclass_fields__] for row in truth)
+    write_truth(file, truth)
     message = messages.likenesses_written(
         request.out, len(folders), len(request.machines), (pattern.name, method.name), TRUTH
     )
@@ -245,10 +228,10 @@ def _errors(
 
 def _true_values(
     dated: Campaign, likeness: Likeness, local: Array, units: dict[str, tuple[str, float]]
-) -> list[_TrueValue]:
+) -> list[TrueValue]:
     started = {run.run: run.started_at.isoformat() for run in dated.runs}
     return [
-        _TrueValue(
+        TrueValue(
             dated.machine.id, dated.name, int(run), started[int(run)], name, local[row, column] / factor, unit
         )
         for row, run in enumerate(likeness.problem.runs)

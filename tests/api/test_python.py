@@ -245,6 +245,7 @@ def test_campaigns_like_one_of_yours_are_written(tmp_path: Path) -> None:
         ({"machines": "M1"}, 'like needs start, such as start="2026-01-12"'),
         ({"start": "2026-01-12"}, r"like needs machines, such as machines=\(\"M1\", \"M2\"\)"),
         ({"machines": "M1", "start": "12 May"}, "'12 May' is no day; write 2026-01-12"),
+        ({"machines": "M1", "start": 2026}, "'2026' is no day; write 2026-01-12"),
         (
             {"machines": "M1", "start": "2026-01-12", "month": 3},
             "there is no option 'month'; did you mean 'months'",

@@ -9,7 +9,9 @@ import pytest
 
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
+from monitor.readers.csv_table import parse_csv
 from monitor.readers.cut_files import is_cut
+from monitor.readers.faults import Faults
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROWS = "".join(f"{number},{number / 3:.2f}\n" for number in range(1, 9))
@@ -57,6 +59,17 @@ def test_numbers_without_trailing_zeros_and_whole_numbers_are_no_signs() -> None
     assert not is_cut("".join(f"{number},{10 + number}\n" for number in range(1, 30)) + "9,3")
     # Two columns of whole numbers, one line a row: the comma separates them.
     assert not is_cut("".join("1,79\n" for _ in range(30)) + "2,8")
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_a_table_of_a_campaign_is_looked_at_as_it_is_written(mark: str, ends: str) -> None:
+    """Windows ends its lines otherwise, and what semicolons separate is written anew before it is read."""
+    table = ("a,b\n" + ROWS).replace(",", mark).replace("\n", ends)
+    for last, reads in (("9,3.00", True), ("9,3.0", False)):
+        faults = Faults(["t.csv"])
+        assert (parse_csv("t.csv", table + last.replace(",", mark), faults) is not None) is reads
+        assert [fault.line for fault in faults.sorted()] == ([] if reads else [10])
 
 
 def test_a_decimal_comma_counts_where_something_else_separates() -> None:

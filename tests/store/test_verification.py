@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +17,9 @@ from monitor.store import (
     Database,
     audit,
     import_campaign,
+    record_event,
+    unrecorded,
+    verification,
     verify_audit,
 )
 
@@ -32,6 +39,35 @@ def test_untouched_database_is_in_order(filled: Database) -> None:
 
 def test_empty_database_is_in_order(db: Database) -> None:
     assert verify_audit(db).faults == ()
+
+
+def test_what_is_stored_while_the_audit_is_compared_has_its_entry(
+    tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sessions of a server do not keep each other from writing."""
+    campaign = make_campaign("one")
+    with Database(tmp_path / "shop.duckdb") as db, closing(db.session("another")) as other:
+        import_campaign(db, campaign)
+        stored: list[str] = []
+
+        def storing(read: Callable[[Database], Any]) -> Callable[[Database], Any]:
+            def then_stored(session: Database) -> Any:
+                answer = read(session)
+                answer = answer if isinstance(answer, dict) else list(answer)
+                record_event(other, campaign.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "note", "x")
+                stored.append(read.__name__)
+                return answer
+
+            return then_stored
+
+        for read in (verification._audited, verification._keys):
+            monkeypatch.setattr(verification, read.__name__, storing(read))
+        assert unrecorded(db) == ()
+        assert len(stored) == 2
+        assert verify_audit(db).faults == ()
+        assert len(stored) == 5
+        db.execute("DELETE FROM audit WHERE entry = (SELECT max(entry) FROM audit)")
+        assert unrecorded(db) == ("event 5 is in the database, but not in the audit",)
 
 
 @pytest.mark.parametrize(

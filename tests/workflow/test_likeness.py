@@ -16,6 +16,7 @@ from monitor.methods.chain.likeness import Likeness
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.workflow.likeness import Drift, LikeRequest, Step, simulate_like
+from monitor.workflow.true_values import is_truth
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 START = date(2024, 1, 31)
@@ -71,6 +72,7 @@ def test_months_drift_steps_and_scatter_are_those_asked_for(tmp_path: Path) -> N
     names = [f"{machine}-2024-0{month}" for machine in "AB" for month in (1, 2, 3)]
     assert [Path(folder).name for folder in answer.folders] == names
     assert sorted(path.name for path in (tmp_path / "shop").iterdir()) == [*names, "truth.csv"]
+    assert is_truth(Path(answer.truth))
     with Path(answer.truth).open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     first_runs = {

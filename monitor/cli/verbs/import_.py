@@ -59,10 +59,12 @@ def run(options: Namespace) -> int:
             output.say(imported.message)
             for note in imported.notes:
                 output.say(f"note: {note}")
+        for file in answer.passed_over or ():
+            output.say(f"note: {file} passed over: the true values of a rehearsal, no campaign")
     for refused in answer.refused:
         print(f"monitor: {refused.why}", file=sys.stderr)
     if answer.refused:
         names = ", ".join(refused.folder for refused in answer.refused)
-        count = len(answer.refused)
-        print(f"monitor: {count} of {len(request.folders)} folders refused: {names}", file=sys.stderr)
+        count, every = len(answer.refused), len(answer.refused) + len(answer.imported)
+        print(f"monitor: {count} of {every} folders refused: {names}", file=sys.stderr)
     return 2 if answer.refused else 0

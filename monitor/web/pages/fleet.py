@@ -44,8 +44,7 @@ PAGE_SIZE = 40
 class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
-    numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not
-    explain it."""
+    numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it."""
 
     machine: str
     plant: str

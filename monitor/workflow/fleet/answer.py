@@ -61,7 +61,8 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
     part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
-    ``without_numbers`` are machines of which no run has numbers under that model, which no row stands for.
+    ``without_numbers`` are machines of which no run has numbers, which no row stands for; not said of a model that was
+    asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
     ``models_lacking`` by machine those whose stored comparison says that something is missing from it.
     """

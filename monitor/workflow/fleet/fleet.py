@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
@@ -123,7 +123,8 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     """
     cells = _cells_of(db, request.model)
     sums, most = cells.sums, request.top or None
-    volumetric = volumetric_rows(db, set(sums.machine.tolist()))
+    numbered = set(sums.machine.tolist())
+    volumetric = volumetric_rows(db, numbered)
     measured = [(cells.row(index), float(cells.measure[index])) for index in cells.order[:most]]
     measured += [(row, share_of_limit(row)) for row in volumetric]
     measured.sort(
@@ -136,7 +137,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
 
         noticed = weekly_notices(db)
     return FleetAnswer(
-        machines=len(np.unique(sums.machine)),
+        machines=len(numbered),
         rows=len(sums.machine) + len(volumetric),
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
@@ -150,11 +151,14 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
         models_lacking=(unexplained_machines(db) or None) if request.model is None else None,
-        without_numbers=tuple(
-            name for name in machines_with_runs(db) if name not in set(sums.machine.tolist())
-        )
-        or None,
+        # Under a model by its name those of other methods are lacking, which have numbers of their own.
+        without_numbers=_without_numbers(db, numbered) or None if request.model is None else None,
     )
+
+
+def _without_numbers(db: Database, numbered: Container[str]) -> tuple[str, ...]:
+    """Return the machines of which a run was imported, and that are not among the ``numbered`` ones."""
+    return tuple(name for name in machines_with_runs(db) if name not in numbered)
 
 
 def _refuted(db: Database, model: str | None) -> dict[str, RefutedCampaign]:

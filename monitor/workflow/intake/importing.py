@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from monitor.documents import OMITTED
 from monitor.exceptions import CampaignError, InputError, StoreError
 from monitor.readers import (
     MAPPING,
@@ -33,6 +34,7 @@ from monitor.store import (
 from monitor.workflow.intake.copied_runs import check_copies
 from monitor.workflow.intake.curve_base import check_base
 from monitor.workflow.intake.gross_doubts import gross_doubts
+from monitor.workflow.true_values import is_truth
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,12 @@ class RefusedFolder:
 
 @dataclass(frozen=True)
 class ImportAnswer:
-    """The imported folders in their order, and those that were refused."""
+    """The imported folders in their order, those that were refused, and the files of true values among them, which
+    belong to a rehearsal and were ``passed_over``."""
 
     imported: tuple[ImportedFolder, ...]
     refused: tuple[RefusedFolder, ...] = ()
+    passed_over: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -114,12 +118,13 @@ def import_folders(
 ) -> ImportAnswer:
     """Import every folder, all or nothing each; one that is refused does not hinder the others.
 
-    Every refusal is recorded, but of a dry run. Raises CampaignError with all faults of a folder that was asked for
-    alone, StoreError where the database cannot be written.
+    The file of true values that a rehearsal wrote is passed over where it is named beside folders. Every refusal is
+    recorded, but of a dry run. Raises CampaignError with all faults of a folder that was asked for alone, StoreError
+    where the database cannot be written.
     """
     answers: list[ImportedFolder] = []
     refused: list[RefusedFolder] = []
-    sources = _sources(request)
+    sources, passed_over = _sources(request)
     for source in sources:
         progress(str(source.path))
         try:
@@ -133,16 +138,19 @@ def import_folders(
             if len(sources) == 1:
                 raise
             refused.append(RefusedFolder(str(source.path), str(error)))
-    return ImportAnswer(tuple(answers), tuple(refused))
+    return ImportAnswer(tuple(answers), tuple(refused), passed_over or None)
 
 
-def _sources(request: ImportRequest) -> list[_Source]:
+def _sources(request: ImportRequest) -> tuple[list[_Source], tuple[str, ...]]:
+    """Return what is imported, and what is passed over; a name that stands alone was meant."""
     if request.mapping is None:
-        return [_Source(Path(folder)) for folder in request.folders]
+        named = [Path(folder) for folder in request.folders]
+        passed_over = [path for path in named if len(named) > 1 and is_truth(path)]
+        return [_Source(path) for path in named if path not in passed_over], tuple(map(str, passed_over))
     files: list[Path] = []
     for folder in map(Path, request.folders):
         files += files_in(folder) if folder.is_dir() else [folder]
-    return [_Source(request.mapping, request.mapping, tuple(files), request.campaign)]
+    return [_Source(request.mapping, request.mapping, tuple(files), request.campaign)], ()
 
 
 def _read(db: Database, source: _Source) -> _Reading:

@@ -15,6 +15,7 @@ from monitor.uncertainty.monte_carlo.sourced_trials import Moves, output_moves
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.sensitivity import Sensitivity
 from monitor.units import Unit
+from monitor.workflow.selections.readings import SelectedReadings
 from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
 from monitor.workflow.uncertainty.inputs import holding_for
 from monitor.workflow.uncertainty.request import Asked
@@ -56,9 +57,14 @@ class Beside:
 
 
 def beside_readings(
-    campaign: Campaign, fit: Fit, run: Linearised, source: CovarianceSource, asked: Asked
+    campaign: Campaign,
+    fit: Fit,
+    run: Linearised,
+    source: CovarianceSource,
+    asked: Asked,
+    selected: SelectedReadings | None,
 ) -> Beside:
-    """What counts beside readings whose covariance is from ``source``.
+    """What counts beside readings whose covariance is from ``source``, of the ``selected`` runs where there are any.
 
     Raises InputError for a source that does not fit or counts twice, DataError where days cannot be known.
     """
@@ -72,7 +78,7 @@ def beside_readings(
     of_days = (between_days(components),) if adds_days else ()
     counted = counted_columns(
         run.run, run.sensitivity.unknowns, campaign, number, sources,
-        shown_part(source.kind, _runs_of_days(fit, campaign), adds_days),
+        shown_part(source.kind, _runs_of_days(fit, campaign, selected), adds_days),
     )  # fmt: skip
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
@@ -89,8 +95,10 @@ def beside_readings(
     )
 
 
-def _runs_of_days(fit: Fit, campaign: Campaign) -> list[int]:
-    """How many runs of the fit each of its days has."""
+def _runs_of_days(fit: Fit, campaign: Campaign, selected: SelectedReadings | None) -> list[int]:
+    """How many of the runs that show the scatter each of their days has: those selected, else all of the fit."""
+    if selected is not None:
+        return list(Counter(selected.days.tolist()).values())
     day = {run.run: run.day for run in campaign.runs}
     return list(Counter(day[int(number)] for number in fit.problem.runs).values())
 

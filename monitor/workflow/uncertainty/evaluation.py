@@ -172,7 +172,7 @@ def _propagated(
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
     units = _units(fit, names)
-    added = beside_readings(campaign, fit, Linearised(run, at, index, names, units), source, asked)
+    added = beside_readings(campaign, fit, Linearised(run, at, index, names, units), source, asked, selected)
     propagated = _Propagated(
         run, at, names, units, inputs, inputs, (*added.of_sources, *added.of_days), source, added.behind,
         added.moves, added.of_days,

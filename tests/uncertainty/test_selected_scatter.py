@@ -1,0 +1,52 @@
+"""A source shared by a day beside the scatter of selected runs: the days of these count, not those of the campaign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from monitor.sources import Quantity, Sharing, Source
+from monitor.store import Database, import_campaign
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def _with_runs(campaign: Campaign, name: str, numbers: list[int]) -> Campaign:
+    """Some runs of a campaign under another name."""
+    keep = np.isin(campaign.probings.run, numbers)
+    runs = tuple(run for run in campaign.runs if run.run in numbers)
+    return replace(campaign, name=name, runs=runs, probings=campaign.probings.rows(keep))
+
+
+def test_a_run_alone_takes_the_days_of_the_runs_that_are_selected(tmp_path: Path) -> None:
+    """Ten runs on five days show 8/9 of the variance of a value a day: a ninth is left to a run of one day."""
+    whole = read_campaign(EXAMPLES / "five-days")
+    assert isinstance(whole, Campaign)
+    by_day: dict[int, list[int]] = {}
+    for run in whole.runs:
+        by_day.setdefault(run.day, []).append(run.run)
+    ten = [number for numbers in by_day.values() for number in numbers[1:3]]
+    assert (len(by_day), len(ten)) == (5, 10)
+    with Database(tmp_path / "shop.duckdb", threads=1) as db:
+        import_campaign(db, _with_runs(whole, "alone", [whole.runs[0].run]))
+        import_campaign(db, _with_runs(whole, "ten", ten))
+
+        def variances(*sources: Source) -> np.ndarray:
+            request = UncertaintyRequest(
+                "alone", method="guf", select="ten", model_uncertainty=False, sources=sources
+            )
+            return np.array(list(uncertainty(db, request).guf.u.values())) ** 2
+
+        source = Source(name="air", quantity=Quantity.DRIFT, size=5e-3)
+        none = variances()
+        always, a_day = (
+            variances(replace(source, shared_by=shared)) - none for shared in (Sharing.ALL_RUNS, Sharing.DAY)
+        )
+        assert np.max(always) > 0.0
+        np.testing.assert_allclose(a_day, always / 9.0, rtol=1e-6, atol=1e-9 * float(np.max(always)))
