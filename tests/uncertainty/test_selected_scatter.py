@@ -9,6 +9,7 @@ import numpy as np
 
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.reporting.budget import HoldsFor
 from monitor.sources import Quantity, Sharing, Source
 from monitor.store import Database, import_campaign
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -50,3 +51,17 @@ def test_a_run_alone_takes_the_days_of_the_runs_that_are_selected(tmp_path: Path
         )
         assert np.max(always) > 0.0
         np.testing.assert_allclose(a_day, always / 9.0, rtol=1e-6, atol=1e-9 * float(np.max(always)))
+
+
+def test_the_scatter_of_selected_runs_holds_for_their_days(tmp_path: Path) -> None:
+    """Was: for those of the run's own campaign, so that of a run alone it was said to hold within a day."""
+    whole = read_campaign(EXAMPLES / "five-days")
+    assert isinstance(whole, Campaign)
+    by_day: dict[int, list[int]] = {}
+    for run in whole.runs:
+        by_day.setdefault(run.day, []).append(run.run)
+    with Database(tmp_path / "shop.duckdb", threads=1) as db:
+        import_campaign(db, _with_runs(whole, "alone", [whole.runs[0].run]))
+        import_campaign(db, _with_runs(whole, "ten", [each for runs in by_day.values() for each in runs[:2]]))
+        request = UncertaintyRequest("alone", method="guf", select="ten", model_uncertainty=False)
+        assert uncertainty(db, request).holds_for is HoldsFor.CAMPAIGN

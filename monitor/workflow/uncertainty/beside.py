@@ -73,12 +73,13 @@ def beside_readings(
     sources = all_sources(campaign, asked.sources)
     refuse_twice(sources, asked.linear_axes, chain)
     components = components_of(fit, campaign, run.run, rows, run.names)
-    holds = holding_for(source, components.days)
+    runs_of_days = _runs_of_days(fit, campaign, selected)
+    holds = holding_for(source, len(runs_of_days))
     adds_days = asked.holds_for is HoldsFor.CAMPAIGN and holds is not HoldsFor.CAMPAIGN
     of_days = (between_days(components),) if adds_days else ()
     counted = counted_columns(
         run.run, run.sensitivity.unknowns, campaign, number, sources,
-        shown_part(source.kind, _runs_of_days(fit, campaign, selected), adds_days),
+        shown_part(source.kind, runs_of_days, adds_days),
     )  # fmt: skip
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
