@@ -78,6 +78,17 @@ def test_the_fleet_has_a_row_for_a_machine_without_numbers(typed: Any, tmp_path:
         assert "not judged: not identified" not in typed("fleet", *of, db=db).out
 
 
+def test_the_fleet_prints_no_more_machines_without_numbers_than_rows_asked_for(
+    typed: Any, tmp_path: Path
+) -> None:
+    db = tmp_path / "x.duckdb"
+    assert typed("import", EXAMPLES / "tilting-table", EXAMPLES / "ball-bar", db=db).status == 0
+    said = typed("fleet", "--top", "1", db=db).out
+    assert said.count("not judged: not identified") == 1
+    assert "1 more without numbers; --top 0 names all" in said
+    assert typed("fleet", "--top", "0", db=db).out.count("not judged: not identified") == 2
+
+
 def test_a_kind_of_event_is_no_note(typed: Any, db: Path) -> None:
     refused = typed("event", "HU40-T", "Crash", "--at", "2026-03-05", db=db)
     assert (refused.status, refused.out) == (2, "")

@@ -47,6 +47,7 @@ def run(options: Namespace) -> int:
         return 0
     answer = on_screen(answer)
     without = answer.without_numbers or ()
+    named = without[: options.top or None]
     count = answer.machines + len(without)
     lacking = f", {len(without)} of them without numbers" if without else ""
     output.table(
@@ -54,9 +55,11 @@ def run(options: Namespace) -> int:
         "q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
          "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
-        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in without), *(_cells(row) for row in answer.table)],
+        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named), *(_cells(row) for row in answer.table)],
         text_columns=6,
     )  # fmt: skip
+    if len(named) < len(without):
+        output.say(f"{len(without) - len(named)} more without numbers; --top 0 names all")
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
