@@ -82,7 +82,9 @@ def test_the_fleet_prints_no_more_machines_without_numbers_than_rows_asked_for(
     typed: Any, tmp_path: Path
 ) -> None:
     db = tmp_path / "x.duckdb"
-    assert typed("import", EXAMPLES / "tilting-table", EXAMPLES / "ball-bar", db=db).status == 0
+    folders = [EXAMPLES / name for name in ("tilting-table", "ball-bar", "l-shape")]
+    assert typed("import", *folders, db=db).status == 0
+    assert typed("identify", "tilting-table", db=db).status == 0
     said = typed("fleet", "--top", "1", db=db).out
     assert said.count("not judged: not identified") == 1
     assert "1 more without numbers; --top 0 names all" in said

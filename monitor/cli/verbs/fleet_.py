@@ -46,20 +46,7 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     answer = on_screen(answer)
-    without = answer.without_numbers or ()
-    named = without[: options.top or None]
-    count = answer.machines + len(without)
-    lacking = f", {len(without)} of them without numbers" if without else ""
-    output.table(
-        f"{count} machine{'' if count == 1 else 's'}{lacking}, {answer.values} values; "
-        "q: false discovery rate over all rows",
-        ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
-         "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
-        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named), *(_cells(row) for row in answer.table)],
-        text_columns=6,
-    )  # fmt: skip
-    if len(named) < len(without):
-        output.say(f"{len(without) - len(named)} more without numbers; --top 0 names all")
+    _table(answer, options.top)
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
@@ -84,6 +71,24 @@ def run(options: Namespace) -> int:
             f"type `monitor identify {answer.not_identified[0]}`"
         )
     return 0
+
+
+def _table(answer: FleetAnswer, most: int) -> None:
+    """Print the rows, and before them the machines without numbers, of these too no more than ``most`` (0: all)."""
+    without = answer.without_numbers or ()
+    named = without[: most or None]
+    count = answer.machines + len(without)
+    lacking = f", {len(without)} of them without numbers" if without else ""
+    output.table(
+        f"{count} machine{'' if count == 1 else 's'}{lacking}, {answer.values} values; "
+        "q: false discovery rate over all rows",
+        ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
+         "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
+        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named), *(_cells(row) for row in answer.table)],
+        text_columns=6,
+    )  # fmt: skip
+    if len(named) < len(without):
+        output.say(f"{len(without) - len(named)} more without numbers; --top 0 names all")
 
 
 def _say_of_machines(answer: FleetAnswer) -> None:
