@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from monitor.readers import read_campaign
 from monitor.records import Campaign
@@ -25,18 +26,28 @@ def _with_runs(campaign: Campaign, name: str, numbers: list[int]) -> Campaign:
     return replace(campaign, name=name, runs=runs, probings=campaign.probings.rows(keep))
 
 
-def test_a_run_alone_takes_the_days_of_the_runs_that_are_selected(tmp_path: Path) -> None:
-    """Ten runs on five days show 8/9 of the variance of a value a day: a ninth is left to a run of one day."""
-    whole = read_campaign(EXAMPLES / "five-days")
-    assert isinstance(whole, Campaign)
+@pytest.fixture(scope="module")
+def whole() -> Campaign:
+    campaign = read_campaign(EXAMPLES / "five-days")
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+def _two_of_every_day(campaign: Campaign, first: int) -> list[int]:
+    """The numbers of two runs of each of five days, from the ``first`` of the day."""
     by_day: dict[int, list[int]] = {}
-    for run in whole.runs:
+    for run in campaign.runs:
         by_day.setdefault(run.day, []).append(run.run)
-    ten = [number for numbers in by_day.values() for number in numbers[1:3]]
+    ten = [number for numbers in by_day.values() for number in numbers[first : first + 2]]
     assert (len(by_day), len(ten)) == (5, 10)
+    return ten
+
+
+def test_a_run_alone_takes_the_days_of_the_runs_that_are_selected(whole: Campaign, tmp_path: Path) -> None:
+    """Ten runs on five days show 8/9 of the variance of a value a day: a ninth is left to a run of one day."""
     with Database(tmp_path / "shop.duckdb", threads=1) as db:
         import_campaign(db, _with_runs(whole, "alone", [whole.runs[0].run]))
-        import_campaign(db, _with_runs(whole, "ten", ten))
+        import_campaign(db, _with_runs(whole, "ten", _two_of_every_day(whole, 1)))
 
         def variances(*sources: Source) -> np.ndarray:
             request = UncertaintyRequest(
@@ -53,15 +64,10 @@ def test_a_run_alone_takes_the_days_of_the_runs_that_are_selected(tmp_path: Path
         np.testing.assert_allclose(a_day, always / 9.0, rtol=1e-6, atol=1e-9 * float(np.max(always)))
 
 
-def test_the_scatter_of_selected_runs_holds_for_their_days(tmp_path: Path) -> None:
+def test_the_scatter_of_selected_runs_holds_for_their_days(whole: Campaign, tmp_path: Path) -> None:
     """Was: for those of the run's own campaign, so that of a run alone it was said to hold within a day."""
-    whole = read_campaign(EXAMPLES / "five-days")
-    assert isinstance(whole, Campaign)
-    by_day: dict[int, list[int]] = {}
-    for run in whole.runs:
-        by_day.setdefault(run.day, []).append(run.run)
     with Database(tmp_path / "shop.duckdb", threads=1) as db:
         import_campaign(db, _with_runs(whole, "alone", [whole.runs[0].run]))
-        import_campaign(db, _with_runs(whole, "ten", [each for runs in by_day.values() for each in runs[:2]]))
+        import_campaign(db, _with_runs(whole, "ten", _two_of_every_day(whole, 0)))
         request = UncertaintyRequest("alone", method="guf", select="ten", model_uncertainty=False)
         assert uncertainty(db, request).holds_for is HoldsFor.CAMPAIGN
