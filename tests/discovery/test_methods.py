@@ -43,11 +43,13 @@ def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
     assert told.comparison.verdict is Verdict.EXPLAINED
 
 
-@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4))])
+@pytest.mark.parametrize(
+    "seed", [100, 102, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (103, 104, 105, 106))]
+)
 def test_a_tool_that_goes_astray_while_it_touches_is_no_effect(trial, seed):
     """A drift of X shows in the touches along X alone; held against those before it, whatever their direction, it was
-    told as one or two effects in each of three campaigns (an error of free shape, a bent axis)."""
-    assert trial.groups(trial.explained(trial.rotary(np.random.default_rng(seed), 2, walk=0.25))) == []
+    told as an effect in each of these campaigns (an error of free shape, a bent axis)."""
+    assert trial.groups(trial.explained(trial.rotary(np.random.default_rng([seed, 4]), 4, walk=0.25))) == []
 
 
 def test_free_form_nothing_is_missing(trial):
