@@ -105,10 +105,10 @@ def _units(chain: Chain) -> Iterator[tuple[str, Array, str]]:
     linear = [index for index, joint in enumerate(chain.joints) if not joint.turns]
     for unit in mistaken_for_mm():
         for count in range(len(linear), 0, -1):
-            for chosen in combinations(linear, count):
+            for subset in combinations(linear, count):
                 scale = np.ones(len(chain.joints))
-                scale[list(chosen)] = unit.factor
-                names = sorted(f"{chain.joints[index].name.lower()}_mm" for index in chosen)
+                scale[list(subset)] = unit.factor
+                names = sorted(f"{chain.joints[index].name.lower()}_mm" for index in subset)
                 yield " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])), scale, UNIT_WORDS[unit]
 
 
