@@ -289,8 +289,8 @@ class Database:
     def attached(self, path: Path, name: str) -> Iterator[datetime]:
         """Attach a second database file under a name for a block that sees a ``snapshot`` of the first.
 
-        Yield its moment (UTC). No other thread uses this session meanwhile. Not to be called in ``reading``: a file is not detached before
-        the moment is over.
+        Yield its moment (UTC). No other thread uses this session meanwhile. Not to be called in ``reading``: a file is
+        not detached before the moment is over.
         """
         with ExitStack() as turn:
             turn.enter_context(self._one_writes)
