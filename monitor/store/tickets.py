@@ -61,10 +61,10 @@ class WritersTicket:
 
     def is_next(self) -> bool:
         """Whether nobody comes before this writer. The file of turns is free, and stays so until one takes it."""
-        now = time.monotonic()
+        moment = time.monotonic()
         if self._free_since is None:
-            self._free_since = now
-        if self._number is None or now - self._free_since > _OVERTAKEN_S:
+            self._free_since = moment
+        if self._number is None or moment - self._free_since > _OVERTAKEN_S:
             return True
         if _locked_byte(self._file, _WRITERS, self._number) is not None:
             return False
@@ -77,6 +77,7 @@ class WritersTicket:
         self._free_since = self._behind_readers = None
 
     def give_back(self) -> None:
+        """Give the ticket back: whoever comes behind is no longer kept waiting by it."""
         if self._number is not None:
             _lock(self._file, fcntl.F_UNLCK, self._number)
             self._number = None
