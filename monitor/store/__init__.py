@@ -107,6 +107,7 @@ if TYPE_CHECKING:
         machine_events as machine_events,
         record_event as record_event,
     )
+    from monitor.store.held_sizes import held_bytes as held_bytes
     from monitor.store.identifications import (
         identification_by_number as identification_by_number,
         identification_numbers as identification_numbers,
@@ -230,6 +231,7 @@ else:
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
             "probing_counts",
+            "held_sizes": "held_bytes",
             "recalling": "Recalled",
             "results": "LackOfFit StoredIdentification StoredRun",
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",
