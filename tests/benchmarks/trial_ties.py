@@ -2,7 +2,8 @@
 
 ``python tests/benchmarks/trial_ties.py [SEEDS [FIRST]]`` prints the table of docs/trials-discovery.md. An effect is hidden by
 the independent simulator; where `explain` names rivals, the campaign is measured again by a fresh seed, with the poses
-that were offered added (all balls at each), or with the temperature no longer going with the warm-up. A tie is broken
+that were offered added (all balls at each), or with the temperature no longer going with the warm-up, within the runs
+where that is asked for. A tie is broken
 rightly where the hidden effect is then named and none of the rivals that the action was for.
 """
 
@@ -55,7 +56,13 @@ def independent(schedule, run, fraction, rng):
     return level[run - 1] + 0.05 * rng.standard_normal(len(run))
 
 
-def explained(plan_name: str, hidden: str, seed: int, poses=(), together: bool = True) -> Explanation:
+def within_runs(schedule, run, fraction, rng):
+    """The same range, gone through in every run, up or down by turns: within a run is what the action asks for."""
+    way = np.where(run % 2, fraction, 1.0 - fraction)
+    return 20.0 + 6.0 * way + 0.05 * rng.standard_normal(len(run))
+
+
+def explained(plan_name: str, hidden: str, seed: int, poses=(), temperature=following) -> Explanation:
     rng = np.random.default_rng(seed)
     plan = simulator.cold_cold_plan() if plan_name == "cold-cold" else simulator.five_days_plan()
     more = [
@@ -68,7 +75,7 @@ def explained(plan_name: str, hidden: str, seed: int, poses=(), together: bool =
         rng, days=1 if plan_name == "one day" else 4, runs_per_day=8 if plan_name == "one day" else 3
     )
     effect = simulator.Effect(hidden, peak_um=8.0, **({"tau_s": TAU_S} if "warmup" in hidden else {}))
-    channels = {"x_axis_degC": following if together else independent} if plan_name == "one day" else None
+    channels = {"x_axis_degC": temperature} if plan_name == "one day" else None
     machine = simulator.hu40(None, [effect])
     told = simulator.simulate(plan, machine, schedule, rng, noise_um=1.0, channels=channels)
     campaign = virtual.as_campaign(plan, machine, schedule, told, stated_um=1.0)
@@ -114,7 +121,8 @@ def main() -> None:
                     counts["nothing"] += 1
                     continue
                 counts["acted"] += 1
-                after = explained(plan_name, hidden, 9000 + first_seed + seed, found.separation.poses, together=False)
+                asked = within_runs if any(tie.within_runs for tie in ties) else independent
+                after = explained(plan_name, hidden, 9000 + first_seed + seed, found.separation.poses, asked)
                 groups = [
                     {family(e.effect), *(family(r.effect) for r in e.rivals)} for e in after.missing[:1]
                 ]
