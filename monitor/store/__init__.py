@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         check_analysis as check_analysis,
         latest_documents as latest_documents,
         latest_maps as latest_maps,
+        latest_text as latest_text,
         load_analysis as load_analysis,
         save_analysis as save_analysis,
         stored_analyses as stored_analyses,
@@ -201,7 +202,7 @@ else:
         __name__,
         {
             "analyses": "StoredAnalysis analysis_text check_analysis latest_documents latest_maps "
-            "load_analysis save_analysis stored_analyses",
+            "latest_text load_analysis save_analysis stored_analyses",
             "archiving": "Archived archive_faults archive_files archived_count",
             "audit": "AuditEntry anchored_entry chain_faults last_anchor last_entries",
             "campaigns": "Imported import_campaign import_curve load_campaign",
