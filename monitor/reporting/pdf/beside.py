@@ -1,4 +1,4 @@
-"""Loads the layout engine in a process of its own while the command reads its database; certificates are laid out there.
+"""Loads the layout engine in a process of its own while the command reads its database, and lays certificates out.
 
 What lays out a page takes as long to load as a database to open and a result to read; on two cores both are done at
 once. The process is forked before the database is opened, and only where the command has one thread: a fork takes the
