@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from monitor.cli.deferred import defer_unneeded
 from monitor.cli.garbage import collect_rarely
 from monitor.cli.parser import parse
 from monitor.exceptions import InputError, MonitorError
@@ -26,7 +25,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; the exit status."""
     if arguments is None:
         collect_rarely()
-        defer_unneeded()
         _one_thread()
     typed = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):
