@@ -232,7 +232,7 @@ def test_no_temporary_file_is_left_to_the_garbage_collector(
 ) -> None:
     """A verb ends without collecting: each certificate left its fonts, 1.5 MB, in the temporary folder."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    face = "@font-face { font-family: Our; src: url(font:%s) }" % FONT_FILES[0][2]
+    face = f"@font-face {{ font-family: Our; src: url(font:{FONT_FILES[0][2]}) }}"
     page = f"<html><style>{face}</style><body style='font-family: Our'>text</body></html>"
     was_collecting = gc.isenabled()
     gc.disable()
