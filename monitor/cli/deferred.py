@@ -1,4 +1,8 @@
-"""Modules of numpy that nothing here asks for: loaded when somebody does, not where scipy names them."""
+"""Modules of numpy that nothing here asks for: loaded when somebody does, not where scipy names them.
+
+What they do is not changed: they stand where an import would put them, and load themselves at the first question (the
+recipe of importlib's documentation). Only a process that answers one question does so.
+"""
 
 from __future__ import annotations
 
