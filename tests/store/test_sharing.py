@@ -118,8 +118,8 @@ def test_who_is_not_given_the_processor_between_two_transactions_keeps_the_turn(
     """An import and the note on it wait once, also on a busy machine; a fit between two transactions lets others in."""
     clocks = {"monotonic": 0.0, "process_time": 0.0}
     Database(path).close()
+    monkeypatch.setattr(SharedDatabase, "_watch", lambda self, opening: None)
     with SharedDatabase(path) as db:
-        monkeypatch.setattr(SharedDatabase, "_watch", lambda self, opening: None)
         stopped = {name: lambda name=name: clocks[name] for name in clocks}
         monkeypatch.setattr("monitor.store.sharing.time", SimpleNamespace(**stopped))
         taken = 0
