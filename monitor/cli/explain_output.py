@@ -150,9 +150,17 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     if tie.broken_by is TieBreak.DRIVERS:
         both = len(tie.drivers) == 2
         if tie.within_runs:
-            runs = f"runs within which {drivers} change" + ("" if both else "s") + (", not together" if both else "")
+            runs = (
+                f"runs within which {drivers} change"
+                + ("" if both else "s")
+                + (", not together" if both else "")
+            )
         else:
-            runs = f"runs in which {drivers} do not go together" if both else f"runs at several values of {drivers}"
+            runs = (
+                f"runs in which {drivers} do not go together"
+                if both
+                else f"runs at several values of {drivers}"
+            )
         return f"to tell {rivals} apart, measure {runs}, and record {'both' if both else 'it'}"
     if tie.broken_by is TieBreak.INDEXATIONS:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"

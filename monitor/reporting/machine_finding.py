@@ -96,8 +96,8 @@ ONE_RUN = (
 def fits_too_well(times: float) -> str:
     """The sentence about readings that fit so many times better than they should."""
     return (
-        f"the readings fit {times:.0f} times better than their stated standard uncertainty: look whether lengths are in "
-        "another unit (inches fit 25 times too well) or the stated value is too large"
+        f"the readings fit {times:.0f} times better than their stated standard uncertainty: look whether lengths are "
+        "in another unit (inches fit 25 times too well) or the stated value is too large"
     )
 
 

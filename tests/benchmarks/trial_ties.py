@@ -1,10 +1,10 @@
 """Ties that `explain` reports, and whether the next campaign, made as it says, breaks them rightly.
 
-``python tests/benchmarks/trial_ties.py [SEEDS [FIRST]]`` prints the table of docs/trials-discovery.md. An effect is hidden by
-the independent simulator; where `explain` names rivals, the campaign is measured again by a fresh seed, with the poses
-that were offered added (all balls at each), or with the temperature no longer going with the warm-up, within the runs
-where that is asked for. A tie is broken
-rightly where the hidden effect is then named and none of the rivals that the action was for.
+``python tests/benchmarks/trial_ties.py [SEEDS [FIRST]]`` prints the table of docs/trials-discovery.md. An effect is
+hidden by the independent simulator; where `explain` names rivals, the campaign is measured again by a fresh seed, with
+the poses that were offered added (all balls at each), or with the temperature no longer going with the warm-up, within
+the runs where that is asked for. A tie is broken rightly where the hidden effect is then named and none of the rivals
+that the action was for.
 """
 
 from __future__ import annotations

@@ -184,7 +184,9 @@ def test_noise_doubt_is_the_mean_of_generalised_least_squares_over_the_correlati
     for others in ([], every[:1]):
         mean = 0.0
         for index in best:
-            covariance = scipy.linalg.block_diag(*(covariance_of(GRID[index], each, stated) for each in turned))
+            covariance = scipy.linalg.block_diag(
+                *(covariance_of(GRID[index], each, stated) for each in turned)
+            )
             before = np.concatenate([base, *effects[: len(others)]], axis=1)
             rest, rank = generalised(covariance, residual.reshape(-1), before)
             after, all_rank = generalised(

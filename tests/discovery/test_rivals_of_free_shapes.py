@@ -29,8 +29,8 @@ def campaign(virtual_campaigns, simulator):
 
 
 def test_a_shift_of_a_head_and_its_turn_are_rivals_in_every_shape(campaign):
-    """By rigid bodies: a turn of B by e moves a tip that stands r below it by e times r across, and so does a shift of B
-    along X; along Y and Z it moves nothing."""
+    """By rigid bodies: a turn of B by e moves a tip that stands r below it by e times r across, and so does a shift of
+    B along X; along Y and Z it moves nothing."""
     fitted = fit(problem_of(campaign).for_search())
     effect = parse_effect("EXB:free(7,8,10,11,13)", fitted.problem.context.chain)
     scene = scene_of(fitted, [Variant("EXB:free", effect)])

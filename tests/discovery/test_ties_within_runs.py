@@ -31,7 +31,9 @@ def test_what_the_runs_take_up_has_to_change_within_them(virtual_campaigns) -> N
         "EYY:poly2@x_axis_degC": False,
         "EYY:poly2": False,
     }
-    found = SimpleNamespace(effect="EZC1:const@x_axis_degC", separation=Separation((), 0.0, 0.0), within_runs=True)
+    found = SimpleNamespace(
+        effect="EZC1:const@x_axis_degC", separation=Separation((), 0.0, 0.0), within_runs=True
+    )
     (tie,) = ties_of(found, ("EZC1:const@warmup",), is_touched=True)
     assert tie.within_runs
     sentence = "measure runs within which x_axis_degC and warmup change, not together, and record both"

@@ -85,7 +85,11 @@ class RivalSearch:
 def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
     """The free shape of an effect as that of the other errors of its axis: no scan has these, and with one length of
     the tool a turn of a head and a shift of it move the tip alike."""
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free) or effect.term.stage != MOTION:
+    if (
+        not isinstance(effect, ChainEffect)
+        or not isinstance(effect.shape, Free)
+        or effect.term.stage != MOTION
+    ):
         return []
     others = [
         replace(effect, term=replace(effect.term, symbol=f"E{letter}{effect.joint.name}", component=index))
