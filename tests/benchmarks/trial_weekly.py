@@ -2,8 +2,8 @@
 
 ``python tests/benchmarks/trial_weekly.py [MACHINES [SEED]]`` prints the tables of docs/trials-statistics.md (numpy;
 some five minutes for 1000 machines in the first row, a fifth of them in the others). Each fleet is followed for five
-years of weeks; a tenth of its parameters steps once, by 1 to 4 standard deviations, at any week. A notice is false where nothing
-changed since the series began (or began anew).
+years of weeks; a tenth of its parameters steps once, by 1 to 4 standard deviations, at any week. A notice is false
+where nothing changed since the series began (or began anew).
 
 The rival that knows where to look is a CUSUM of that one parameter which knows mean, scatter and the size of the step,
 with a limit that a parameter without a step passes within the five years in 5 %.
