@@ -57,9 +57,10 @@ def independent(schedule, run, fraction, rng):
 
 
 def within_runs(schedule, run, fraction, rng):
-    """The same range, gone through in every run, up or down by turns: within a run is what the action asks for."""
-    way = np.where(run % 2, fraction, 1.0 - fraction)
-    return 20.0 + 6.0 * way + 0.05 * rng.standard_normal(len(run))
+    """The same range, gone through within the runs: each from one temperature to another, as the hall has them."""
+    begins, ends = rng.uniform(20.0, 26.0, (2, schedule.runs))
+    way = begins[run - 1] * (1.0 - fraction) + ends[run - 1] * fraction
+    return way + 0.05 * rng.standard_normal(len(run))
 
 
 def explained(plan_name: str, hidden: str, seed: int, poses=(), temperature=following) -> Explanation:
