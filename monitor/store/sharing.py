@@ -95,6 +95,12 @@ class SharedDatabase(Database):
 
     @contextmanager
     def reading(self) -> Iterator[None]:
+        """Show the database of one moment in this block: nobody else stores anything meanwhile."""
+        with self._kept():
+            yield
+
+    @contextmanager
+    def _kept(self) -> Iterator[None]:
         with self._used():
             self._blocks += 1
             try:

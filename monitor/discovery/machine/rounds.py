@@ -122,13 +122,13 @@ class ChainSearch:
         rest = without(orthonormal(under.nuisance.shared), under.white.reshape(-1, 1))
         free = first.degrees_of_freedom - under.degrees_of_freedom + 2 * (correlation is not None)
         families = len({variant.family for variant in self.variants})
-        chosen = [finding.candidate for finding in latest.refined]
-        tries = [families * each.variant.tries * each.variant.odds for each in chosen]
+        candidates = [finding.candidate for finding in latest.refined]
+        tries = [families * each.variant.tries * each.variant.odds for each in candidates]
         price = free * np.log(design.contrasts) + 2.0 * np.sum(np.log(tries))
         # Readings of a target that scatters are counted by less: in its own unit each is as likely.
         units = 2.0 * np.sum(np.log((under.problem.sigma / first.problem.sigma)[under.has_weight]))
         deviance = design.deviance(float(np.sum(rest**2)), correlation)
-        return deviance + float(price + units) + sum(map(price_of_parts, chosen))
+        return deviance + float(price + units) + sum(map(price_of_parts, candidates))
 
 
 NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]

@@ -148,6 +148,13 @@ def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()
     return html_of("certificate.html", context, extra_fonts)
 
 
+def load_certificate() -> None:
+    """Load what the first certificate needs: its template, the widths of letters, the letters of our fonts."""
+    _environment().get_template("certificate.html")
+    in_mm("0", LETTERS_PT)
+    _letters(None)
+
+
 def certificate_pdf(
     record: CertificateRecord,
     extra_fonts: Sequence[Path] = (),
