@@ -91,13 +91,19 @@ def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnec
             f"back by the next verb of somebody who may write: `monitor --db {path} verify`"
         )
     connection = duckdb.connect(path, read_only=read_only, config=config)
-    # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
-    connection.execute("SET enable_progress_bar = false")
+    show_no_progress(connection)
     if not read_only and _has_log(path):
         # What it replayed is written into the file when it is closed, whether or not anything is added.
         with contextlib.suppress(StoreError):
             keep_blocks(path)
     return connection
+
+
+def show_no_progress(connection: duckdb.DuckDBPyConnection) -> None:
+    """Keep DuckDB from drawing a bar where a process looks interactive to it: between the lines of a JSON document."""
+    # A notebook without ipywidgets has no bar, and DuckDB refuses to be told so.
+    with contextlib.suppress(duckdb.InvalidInputException):
+        connection.execute("SET enable_progress_bar = false")
 
 
 def busy(path: str, holder: Holder | None, patience: Patience) -> BusyError:

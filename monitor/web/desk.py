@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from threading import Event, RLock
 from typing import Any, TypeVar
 
-from monitor.exceptions import MonitorError, NotFoundError
+from monitor.exceptions import MonitorError, NotFoundError, StoreError
 from monitor.stopping import StoppedError, stoppable
 from monitor.store import held_bytes
 from monitor.web.asking import Asker, ForbiddenError, check_role
@@ -36,6 +36,9 @@ MOST, MOST_BYTES = 200, 512_000_000
 REST = 10.0
 #: And no longer than this.
 LONGEST_REST_S = 60.0
+#: A refusal stands so long, as long as nothing is written: a page that asks two questions which are refused after a
+#: second each would compute one while it shows the other, for ever.
+REFUSAL_STANDS_S = 60.0
 
 Key = TypeVar("Key")
 
@@ -92,8 +95,16 @@ class Ticket:
 
     @property
     def is_good(self) -> bool:
-        """Whether it is under way, was taken back, or has an answer: what was refused is asked anew."""
-        return not self.is_done or not (self.future.cancelled() or self.future.exception())
+        """Whether it is under way, was taken back, has an answer, or a refusal that stands; a fault is asked anew."""
+        if not self.is_done:
+            return True
+        if self.future.cancelled():
+            return False
+        refusal = self.future.exception()
+        if not isinstance(refusal, MonitorError) or isinstance(refusal, StoreError):
+            return refusal is None
+        # Not noted yet: it ended just now.
+        return self.took_s is None or self.seconds < self.took_s + REFUSAL_STANDS_S
 
     def may_be_taken_back_by(self, user: User) -> bool:
         """Whether this user asked it, or is an approver."""
