@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from monitor.cli.deferred import defer_unneeded
 from monitor.cli.garbage import collect_rarely
 from monitor.cli.parser import parse
 from monitor.exceptions import InputError, MonitorError
@@ -26,7 +25,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; the exit status."""
     if arguments is None:
         collect_rarely()
-        defer_unneeded()
         _one_thread()
     typed = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):
@@ -34,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
-        return _run(typed)
+        return _run(typed, alone=arguments is None)
     except MonitorError as error:
         print(f"monitor: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -59,11 +57,13 @@ def _one_thread() -> None:
         os.environ[THREADS[0]] = "1"
 
 
-def _run(typed: Sequence[str]) -> int:
+def _run(typed: Sequence[str], *, alone: bool) -> int:
+    """Run a verb; one that is ``alone`` is all that this process is for."""
     for text in typed:
         if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
             raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
     options = parse(typed)
+    options.alone = alone
     if options.quiet and options.json:
         raise InputError("--quiet says nothing and --json says all: choose one")
     with _muted() if options.quiet else contextlib.nullcontext():

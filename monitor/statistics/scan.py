@@ -321,17 +321,17 @@ class Scanner:
         best_candidate = int((unexplained * likeliest.weight).argmin())
         column = self.columns[:, best_candidate]
         tailed = _kurtosis(likeliest, weighted, self.root * column) > 3.0 + TAILED * np.sqrt(24.0 / len(y))
+        nulls = [_Null(family, index, tailed) for family, index in self._not_refuted(best[:, 0], numbers)]
+        if self._phase is not None:
+            in_order = {0} | {null.shape for null in nulls if null.family == 0}
+            nulls += [_Null(0, index, tailed, season=True) for index in sorted(in_order)]
         p = 0.0
-        for family, index in self._not_refuted(best[:, 0], numbers):
-            members = list(self.families[family])
+        for null in nulls:
+            members = list(self.families[null.family])
             gain = float(plain[members].min() - best[members].min())
-            p = max(p, self._p_value(gain, _Null(family, index, tailed), level, rng, trials))
+            p = max(p, self._p_value(gain, null, level, rng, trials))
             if p > level:
                 break
-        if p <= level and self._phase is not None:
-            members = list(self.families[0])
-            gain = float(plain[members].min() - best[members].min())
-            p = max(p, self._p_value(gain, _Null(0, 0, tailed, season=True), level, rng, trials))
         return Scan(
             self.kinds[best_candidate],
             int(self.positions[best_candidate]),

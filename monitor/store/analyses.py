@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, TypedDict, Unpack
@@ -213,20 +213,39 @@ def stored_analyses(
     return tuple(_stored(row) for row in rows)
 
 
+@dataclass(frozen=True)
+class MappedRun:
+    """A run of which a map is stored: when it began (UTC) and its ``worst_um`` volumetric error."""
+
+    started_at: datetime
+    worst_um: float
+
+
 def latest_maps(db: Database, machine: str | None = None) -> dict[str, float]:
     """By machine, the worst volumetric error in µm of the map of its latest mapped run, partial maps among them; of one
     ``machine`` alone where it is named."""
+    return {name: runs[-1].worst_um for name, runs in mapped_runs(db, machine).items()}
+
+
+def mapped_runs(db: Database, machine: str | None = None) -> dict[str, list[MappedRun]]:
+    """By machine, its runs of which a map is stored, partial maps among them, in the order of measuring.
+
+    Of several maps of a run the one stored last counts. Of one ``machine`` alone where it is named."""
     rows = db.rows(
         """
-        SELECT c.machine, CAST((a.document ->> '$.worst.error_um') AS DOUBLE)
+        SELECT c.machine, r.started_at, CAST((a.document ->> '$.worst.error_um') AS DOUBLE)
         FROM analysis AS a JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id, run)
         WHERE a.kind IN ('volumetric map', 'partial volumetric map') AND c.campaign IS NOT NULL
               AND ($machine IS NULL OR c.machine = $machine)
-        QUALIFY row_number() OVER (PARTITION BY c.machine ORDER BY r.started_at DESC, a.analysis_id DESC) = 1
+        QUALIFY row_number() OVER (PARTITION BY campaign_id, run ORDER BY a.analysis_id DESC) = 1
+        ORDER BY r.started_at, a.analysis_id
         """,
         {"machine": machine},
     )
-    return {name: float(worst) for name, worst in rows}
+    mapped: dict[str, list[MappedRun]] = {}
+    for name, started_at, worst in rows:
+        mapped.setdefault(name, []).append(MappedRun(started_at.replace(tzinfo=UTC), float(worst)))
+    return mapped
 
 
 def _stored(row: tuple[Any, ...]) -> StoredAnalysis:

@@ -128,21 +128,3 @@ def test_statistics_alone_load_no_solver_of_curves_and_no_notes(reading_database
         )
         answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert answer.stdout.splitlines()[-1] == "[]", line
-
-
-def test_modules_that_scipy_only_names_are_loaded_by_whoever_asks_them(reading_database: Path) -> None:
-    code = (
-        "import sys\n"
-        f"sys.argv[1:] = ['--db', {str(reading_database)!r}, '--quiet', 'fleet']\n"
-        "from monitor.cli import main\nstatus = main()\n"
-        "named = {'numpy.f2py.crackfortran', 'numpy.testing._private'}\n"
-        "print(status, 'scipy.special' in sys.modules, sorted(named & set(sys.modules)))\n"
-        "import numpy.f2py\nfrom numpy.testing import assert_allclose\n"
-        "assert_allclose(1.0, 1.0)\n"
-        "print(callable(numpy.f2py.get_include), sorted(named - set(sys.modules)))"
-    )
-    answer = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.splitlines()[-2:] == ["0 True []", "True []"]
-    assert answer.stderr == ""

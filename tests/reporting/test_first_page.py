@@ -14,7 +14,7 @@ import pytest
 from monitor.documents import from_document, to_document
 from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
-from monitor.reporting.health.attention import attention
+from monitor.reporting.health.attention import attention, look_at
 from monitor.reporting.health.comparison import MissingEffect, ModelHealth
 from monitor.reporting.health.page import fleet_context
 from monitor.reporting.health.records import (
@@ -318,23 +318,38 @@ def cards_of(week: Fleet) -> list[dict[str, str]]:
     ]
 
 
+def drawn_of(*machines: MachineHealth) -> tuple[list[str], dict[str, tuple[str, ...]]]:
+    drawn, alike = attention([look_at(health) for health in machines])
+    return list(drawn), alike
+
+
 def test_cards_do_not_repeat_one_finding_while_another_is_not_drawn() -> None:
     """Five machines of one finding before a change and one that is due: each finding has its card, and the others
     of the first are named on it."""
     out = [replace(DRIFTED, machine=f"Drifted {index}") for index in range(1, 6)]
-    drawn, alike = attention([*out, CHANGED, due(), AWAY, GOOD])
-    assert [health.machine for health in drawn] == ["Drifted 1", "Stepped", "Mitsui"]
+    shop = [*out, CHANGED, due(), AWAY, GOOD]
+    drawn, alike = drawn_of(*shop)
+    assert drawn == ["Drifted 1", "Stepped", "Mitsui"]
     assert alike == {"Drifted 1": ("Drifted 2", "Drifted 3", "Drifted 4", "Drifted 5")}
-    week = replace(fleet(*out, CHANGED, due(), AWAY, GOOD)[0], attention=drawn, alike=alike)
+    records = tuple(health for health in shop if health.machine in drawn)
+    week = replace(fleet(*shop)[0], attention=records, alike=alike)
     assert "<strong>The same on:</strong> Drifted 2, Drifted 3, Drifted 4, Drifted 5</p>" in "".join(
         health_html(week, [])
     )
     # With room for all of them every machine has its picture.
-    drawn, alike = attention([*out[:2], CHANGED, GOOD])
-    assert [health.machine for health in drawn] == ["Drifted 1", "Drifted 2", "Stepped"]
-    assert alike == {}
-    drawn, alike = attention([GOOD])
-    assert ([health.machine for health in drawn], alike) == (["Good"], {})
+    assert drawn_of(*out[:2], CHANGED, GOOD) == (["Drifted 1", "Drifted 2", "Stepped"], {})
+    assert drawn_of(GOOD) == (["Good"], {})
+
+
+def test_cards_look_at_every_machine_and_count_those_that_they_do_not_name() -> None:
+    """Forty machines of one finding, and one of another behind them all."""
+    out = [replace(DRIFTED, machine=f"D{index:02d}") for index in range(40)]
+    drawn, alike = drawn_of(*out, CHANGED, GOOD)
+    assert drawn == ["D00", "D01", "Stepped"]
+    assert alike == {"D00": tuple(f"D{index:02d}" for index in range(2, 40))}
+    week = replace(fleet(*out, CHANGED, GOOD)[0], attention=(out[0], out[1], CHANGED), alike=alike)
+    page = "".join(health_html(week, []))
+    assert "<strong>The same on:</strong> D02, D03, D04, D05, D06, D07 and 32 more</p>" in page
 
 
 def test_what_the_model_lacks_is_why_a_machine_may_be_out() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from monitor.cli.database import ask, opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
+from monitor.reporting.pdf.beside import layout_beside
 from monitor.reporting.signature.long_term import LongTermMaterial
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
@@ -30,11 +32,6 @@ from monitor.workflow.certificate.request import (
     RemakeRequest,
     VerificationRequest,
     WithdrawalRequest,
-)
-from monitor.workflow.certificate.states import (
-    list_certificates,
-    show_certificate,
-    write_issued,
 )
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
@@ -160,11 +157,12 @@ def _issue(options: Namespace) -> int:
         options.campaign, options.number_of_run, options.replaces, options.reason, draft=options.draft,
         **issuing(options),
     )  # fmt: skip
-    # What lays out pages takes longer to load than a list of certificates to read.
-    from monitor.workflow.certificate.issue import issue
+    with _layout(options):
+        # What issues takes longer to load than a list of certificates to read.
+        from monitor.workflow.certificate.issue import issue
 
-    with opened(options, threads=1) as db, output.working("issuing"):
-        answer = ask(db, issue, request)
+        with opened(options, threads=1) as db, output.working("issuing"):
+            answer = ask(db, issue, request)
     return _issued(answer, options.json)
 
 
@@ -172,11 +170,20 @@ def _amend(options: Namespace) -> int:
     request = AmendmentRequest(
         options.replaces, options.reason, options.campaign, options.number_of_run, **issuing(options)
     )
-    from monitor.workflow.certificate.issue import amend
+    with _layout(options):
+        from monitor.workflow.certificate.issue import amend
 
-    with opened(options, threads=1) as db, output.working("issuing"):
-        answer = ask(db, amend, request)
+        with opened(options, threads=1) as db, output.working("issuing"):
+            answer = ask(db, amend, request)
     return _issued(answer, options.json)
+
+
+def _layout(options: Namespace) -> contextlib.AbstractContextManager[None]:
+    """The process that lays pages out while this one reads, where a command has one to itself and no server issues.
+
+    The database engine is not loaded yet: it has threads of its own, beside which no process is forked.
+    """
+    return layout_beside() if options.alone and options.server is None else contextlib.nullcontext()
 
 
 def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
@@ -190,6 +197,8 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
 def _writer(option: str) -> Callable[..., CertificateFileAnswer]:
     """What writes the file of an option; who verifies or lists certificates waits for no digital one."""
     if option == "--pdf":
+        from monitor.workflow.certificate.states import write_issued
+
         return write_issued
     from monitor.workflow.certificate.digital import write_digital, write_digital_page
 
@@ -215,6 +224,8 @@ def _show(options: Namespace) -> int:
                 written = ask(db, _writer(option), CertificateFileRequest(options.number, path))
             output.document(written) if options.json else output.say(written.file)
             return 0
+    from monitor.workflow.certificate.states import list_certificates, show_certificate
+
     with opened(options) as db:
         answer: CertificateShowAnswer | CertificatesAnswer = (
             ask(db, list_certificates, CertificatesRequest())

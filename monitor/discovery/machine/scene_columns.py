@@ -175,5 +175,6 @@ def _significant(projected: Array, scale: Array, first: float) -> tuple[Array, f
     keep = vectors[:, values > SMALLEST_SHARE**2]
     cleaned: Array = (keep @ keep.T) @ (projected / scale[:, None])
     # A coefficient of which nothing remains (a ball touched once) must not come back as rounding at full length.
-    cleaned[np.sqrt(np.sum(cleaned**2, axis=1)) <= SMALLEST_SHARE] = 0.0
-    return cleaned * scale[:, None], share
+    cleaned[np.sqrt(np.einsum("km,km->k", cleaned, cleaned)) <= SMALLEST_SHARE] = 0.0
+    cleaned *= scale[:, None]
+    return cleaned, share

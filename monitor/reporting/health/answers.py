@@ -351,8 +351,13 @@ def _without_judgement(rows: Sequence[FleetRow], parts: list[str], judged: int) 
 
 
 def _names(rows: Sequence[FleetRow]) -> str:
-    named = ", ".join(row.machine for row in rows[:_NAMED])
-    return named + (f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else "")
+    return first_names([row.machine for row in rows])
+
+
+def first_names(machines: Sequence[str]) -> str:
+    """Return the first names of machines as a sentence names them, and how many more there are."""
+    more = len(machines) - _NAMED
+    return ", ".join(machines[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _sentence(text: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from monitor.reporting.health.answers import URGENT, answers, concern, reason, to_do
+from monitor.reporting.health.answers import URGENT, answers, concern, first_names, reason, to_do
 from monitor.reporting.health.columns import column_widths
 from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
@@ -180,7 +180,7 @@ def _legend(rows: Sequence[FleetRow]) -> list[tuple[str, str, str]]:
 
 def _card(health: MachineHealth, alike: tuple[str, ...]) -> Card:
     return Card(
-        _line(fleet_row(health)), reason(health), to_do(health), ", ".join(alike), _card_picture(health)
+        _line(fleet_row(health)), reason(health), to_do(health), first_names(alike), _card_picture(health)
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor import __version__
 from monitor.records import Campaign
-from monitor.reporting.pdf.layout_engine import engine_versions
+from monitor.reporting.pdf.beside import engine_versions
 from monitor.store import Database, StoredModel
 from monitor.workflow.certificate.files import HashedFile, font_hashes
 from monitor.workflow.certificate.inputs import CertificateInputs, RunInputs

@@ -17,7 +17,7 @@ from monitor.reporting.certificate.laboratory import LaboratoryFile, read_labora
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
-from monitor.reporting.pdf.render import certificate_pdf
+from monitor.reporting.pdf.beside import certificate_pdf
 from monitor.reporting.signature.signing import sign, signer_of
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
 from monitor.store import (

@@ -19,7 +19,7 @@ from typing import BinaryIO
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
-from monitor.reporting.health.attention import LOOKED_AT, attention
+from monitor.reporting.health.attention import Looked, attention, look_at
 from monitor.reporting.health.records import (
     ALARMS,
     Fleet,
@@ -91,19 +91,19 @@ def report(
     with _engine(request, len(machines)) as engine:
         rows = _reported(db, machines, week, request, engine, progress)
         # Once all runs of the week are identified.
-        looks = weekly_notices(db, week).of_machines({row.machine for row, _ in rows}, week.name)
-        drawn, alike = attention(stored_health(db, number) for _, number in rows[:LOOKED_AT])
+        looks = weekly_notices(db, week).of_machines({row.machine for row, _, _ in rows}, week.name)
+        drawn, alike = attention([looked for _, _, looked in rows])
         fleet = Fleet(
             week.name, week.first, week.last, moment, f"machine-health-monitor {__version__}", options.risk,
-            tuple(row for row, _ in rows),
+            tuple(row for row, _, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
             noticed=tuple((notice.machine, weekly_sentence(notice)) for notice in looks.notices),
-            attention=drawn,
+            attention=tuple(stored_health(db, number) for row, number, _ in rows if row.machine in drawn),
             alike=alike,
             anchor=last_anchor(db),
         )  # fmt: skip
-        files = _write(db, fleet, [number for _, number in rows], request, engine)
+        files = _write(db, fleet, [number for _, number, _ in rows], request, engine)
     return _answer(fleet, week, files, looks)
 
 
@@ -143,8 +143,8 @@ def _reported(
     request: ReportRequest,
     engine: Engine,
     progress: Callable[[str], None],
-) -> list[tuple[FleetRow, int]]:
-    """The machines' lines by urgency, each with the number of its stored record."""
+) -> list[tuple[FleetRow, int, Looked]]:
+    """The machines' lines by urgency, each with the number of its stored record and what is found of it."""
     in_hand: deque[MachineWeek] = deque()
 
     def tasks() -> Iterator[tuple[Task | None]]:
@@ -162,7 +162,7 @@ def _reported(
             db, KIND, to_document(health), method=f"{week.name}, alarm above {request.options.risk:g}",
             machine=past.name.machine,
         )  # fmt: skip
-        rows.append((fleet_row(health), number))
+        rows.append((fleet_row(health), number, look_at(health)))
     return sorted(rows, key=lambda row: by_urgency(row[0]))
 
 
