@@ -47,7 +47,9 @@ def attention(machines: Sequence[Looked]) -> tuple[tuple[str, ...], dict[str, tu
         if looked.finding:
             alike.setdefault(looked.finding, []).append(looked.machine)
     with_card = [names[0] for names in alike.values()][:DRAWN]
-    with_card += [looked.machine for looked in machines if looked.machine not in with_card][: DRAWN - len(with_card)]
+    with_card += [looked.machine for looked in machines if looked.machine not in with_card][
+        : DRAWN - len(with_card)
+    ]
     others = {
         names[0]: tuple(name for name in names if name not in with_card)
         for names in alike.values()
