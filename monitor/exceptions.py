@@ -41,6 +41,10 @@ class DataError(InputError):
     """Readings, arrays or groups from which the requested result cannot be computed."""
 
 
+class MistakenUnitError(DataError):
+    """Readings that no machine of the file fits, with the unit that explains them: nothing else is to be looked for."""
+
+
 class NotConvergedError(DataError):
     """An adjustment that found no minimum: the readings contradict the file that describes the machine."""
 

@@ -74,6 +74,14 @@ def column_unit(column: str) -> Unit | None:
 
 #: Units that lengths in columns of mm are typed in by mistake, the commonest first.
 _MISTAKEN = (METRE, MICROMETRE, INCH, CENTIMETRE, TENTH_MILLIMETRE)
+#: What columns of mm are taken to be instead.
+UNIT_WORDS = {
+    METRE: "in metres",
+    MICROMETRE: "in µm",
+    INCH: "in inches",
+    CENTIMETRE: "ten times too small",
+    TENTH_MILLIMETRE: "ten times too large",
+}
 
 
 def mistaken_for_mm(ratio: float | None = None, tolerance: float = 0.02) -> tuple[Unit, ...]:

@@ -11,8 +11,13 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-#: What a user may install besides (tests/setup/supply.py); those for developers are not passed on.
-EXTRAS = ("", "sign", "token", "web", "completion", "excel", "cluster")
+#: Extras for developers: what they bring is not passed on.
+DEVELOPERS = {"dev", "release", "fuzz", "challenge", "manual"}
+#: What a user may install besides: every other extra.
+EXTRAS = (
+    "",
+    *sorted(set(metadata.metadata("machine-health-monitor").get_all("Provides-Extra") or ()) - DEVELOPERS),
+)
 
 pytestmark = pytest.mark.skipif(not (CHECKOUT / "constraints.txt").is_file(), reason="files of a checkout")
 
@@ -51,6 +56,13 @@ def test_the_set_up_compares_every_file_with_a_hash_and_installs_the_pinned_vers
         if re.search(r"extra == ['\"](dev|sign|token|web|cluster)['\"]|^[^;]*$", line)
     }
     assert needed <= set(hashed), "type: make supply"
+
+
+def test_the_bill_of_materials_is_that_of_every_extra_that_a_user_may_install() -> None:
+    listed = re.findall(
+        r'^EXTRAS = "([a-z,]+)"', (CHECKOUT / "tests/setup/supply.py").read_text("utf-8"), flags=re.M
+    )
+    assert sorted(listed[0].split(",")) == list(EXTRAS[1:])
 
 
 def test_every_package_that_comes_along_has_its_licence_listed() -> None:

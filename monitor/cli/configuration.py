@@ -67,13 +67,14 @@ def place() -> Path | None:
     """The file that is read; None where there is none. Raises InputError where $MONITOR_CONFIG names no file."""
     named = os.environ.get("MONITOR_CONFIG")
     if named:
-        if not Path(named).is_file():
+        if not os.path.isfile(named):
             raise InputError(
                 f"MONITOR_CONFIG names {named}, which is no file; `monitor config init` writes one"
             )
         return Path(named)
-    home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
-    return next((file for file in (Path(NAME), Path(home) / "monitor" / NAME) if file.is_file()), None)
+    home = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    # A folder that this user may not look into, as under another's $HOME, holds no configuration for him.
+    return next((file for file in (Path(NAME), Path(home) / "monitor" / NAME) if os.path.isfile(file)), None)
 
 
 def configuration() -> Configuration:

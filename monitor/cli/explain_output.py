@@ -147,10 +147,21 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: 
 def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
-    if tie.broken_by is TieBreak.DRIVERS and len(tie.drivers) == 2:
-        return f"to tell {rivals} apart, measure runs in which {drivers} do not go together, and record both"
     if tie.broken_by is TieBreak.DRIVERS:
-        return f"to tell {rivals} apart, measure runs at several values of {drivers}, and record it"
+        both = len(tie.drivers) == 2
+        if tie.within_runs:
+            runs = (
+                f"runs within which {drivers} change"
+                + ("" if both else "s")
+                + (", not together" if both else "")
+            )
+        else:
+            runs = (
+                f"runs in which {drivers} do not go together"
+                if both
+                else f"runs at several values of {drivers}"
+            )
+        return f"to tell {rivals} apart, measure {runs}, and record {'both' if both else 'it'}"
     if tie.broken_by is TieBreak.INDEXATIONS:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
     if tie.broken_by is TieBreak.PLAN:

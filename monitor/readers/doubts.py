@@ -16,7 +16,7 @@ import numpy as np
 from monitor.readers.axes_doubts import mistaken_axes
 from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
-from monitor.units import CENTIMETRE, DEGREE, INCH, METRE, MICROMETRE, TENTH_MILLIMETRE
+from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
 SHORTEST_TRAVEL = 5.0
@@ -24,14 +24,6 @@ SHORTEST_TRAVEL = 5.0
 FULL_TURN = 6.3
 #: People index at multiples of 5 degrees; radians of three decimals come back to them within 0.03 degrees.
 INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
-#: What columns of mm are taken to be instead.
-UNIT_WORDS = {
-    METRE: "in metres",
-    MICROMETRE: "in µm",
-    INCH: "in inches",
-    CENTIMETRE: "ten times too small",
-    TENTH_MILLIMETRE: "ten times too large",
-}
 #: Standard uncertainties of length standards: a millionth of the length is good, a thousandth is no calibration.
 LARGEST_SHARE = 1e-3
 #: mm between the calibrated length of a bar and the declared distance of its balls. They are places on one artefact,

@@ -93,6 +93,14 @@ ONE_RUN = (
 )
 
 
+def fits_too_well(times: float) -> str:
+    """The sentence about readings that fit so many times better than they should."""
+    return (
+        f"the readings fit {times:.0f} times better than their stated standard uncertainty: look whether lengths are "
+        "in another unit (inches fit 25 times too well) or the stated value is too large"
+    )
+
+
 def machine_sentences(finding: MachineFinding) -> str:
     """The finding in one or two sentences, for people who look rather than read."""
     if finding.mistakes:

@@ -145,7 +145,23 @@ def campaign_withdrawn(campaign: str) -> str:
 def likenesses_written(out: Path, campaigns: int, machines: int, pattern: tuple[str, str], truth: str) -> str:
     """Return what is said of campaigns that are like a ``pattern``: its name and its method."""
     name, method = pattern
-    return f"{out}: {campaigns} campaigns of {machines} machines like {name} ({method}); {truth} has the true values"
+    return (
+        f"{out}: {campaigns} campaign{'s' * (campaigns > 1)} of {machines} machine{'s' * (machines > 1)} "
+        f"like {name} ({method}); {truth} has the true values"
+    )
+
+
+def hardly_seen(effect: str, standard_deviations: float, certain_from_um: float | None) -> str:
+    """Return what follows where a plan shows a hidden effect too little for a search to find it, or not at all."""
+    if certain_from_um is None:
+        return (
+            f"; this plan cannot see {effect}: the errors that it identifies take up all that the effect does, so "
+            "neither compare nor explain can tell that it is there"
+        )
+    return (
+        f"; this plan shows {effect} by {standard_deviations:.2g} standard deviations of its readings: explain may "
+        f"see nothing of it; from a peak of {certain_from_um:.2g} µm on it sees that something is missing"
+    )
 
 
 def virtual_written(out: Path, runs: int, probings: int, hidden: tuple[str, float] | None) -> str:

@@ -115,6 +115,21 @@ class OffsetNoted(Sentence):
 
 
 @dataclass(frozen=True)
+class DisplacedNoted(Sentence):
+    """A work point of a setup that comes out ``distance`` mm from where campaign.toml states it."""
+
+    run: int
+    setup: str
+    distance: float
+
+    def __str__(self) -> str:
+        return (
+            f"run {self.run}: the work point of setup {self.setup} comes out {self.distance:.3g} mm from its "
+            "work_point_mm: check the signs, units and columns of the axes, and the points in campaign.toml"
+        )
+
+
+@dataclass(frozen=True)
 class CopiedRunsNoted(Sentence):
     """Runs that are equal in every reading because nothing in them is noise: residuals of ``rms``."""
 

@@ -35,6 +35,9 @@ REFUTED = 2.0
 #: Simulations until a p-value is clearly no finding (Besag and Clifford, Biometrika 78 (1991) 301): they end where so
 #: many exceedances, looked at after each block, had this probability at the level. Most searches end with the first.
 HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
+#: So many numbers of candidates and series are computed at once: few stay in the processor's cache, many save calls. A
+#: block of 20 runs (23 candidates) takes 1.1 ms whole and 2.2 ms in fifths; from 60 candidates on fifths are as fast.
+AT_ONCE = 32_768
 #: Values with heavy tails gain more by a change than normal ones. Where the kurtosis of what the best change leaves is
 #: above that of normal values, 3, by so many times its scatter, the root of 24/n, the series without a change are
 #: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with
@@ -217,8 +220,9 @@ class Scanner:
         """Minus twice the residual log-likelihood by shape (s, m): of no change, and of the best candidate."""
         plain = np.empty((len(places), weighted.shape[1]))
         best = np.empty_like(plain)
-        for start in range(0, weighted.shape[1], FIRST_BLOCK):
-            part = slice(start, start + FIRST_BLOCK)
+        width = BLOCK if BLOCK * len(self.kinds) <= AT_ONCE else FIRST_BLOCK
+        for start in range(0, weighted.shape[1], width):
+            part = slice(start, start + width)
             sums = self._sums(weighted[:, part])
             for i, prepared in enumerate(self.prepared[index] for index in places):
                 total, unexplained = self._residual(prepared, sums)
@@ -317,17 +321,17 @@ class Scanner:
         best_candidate = int((unexplained * likeliest.weight).argmin())
         column = self.columns[:, best_candidate]
         tailed = _kurtosis(likeliest, weighted, self.root * column) > 3.0 + TAILED * np.sqrt(24.0 / len(y))
+        nulls = [_Null(family, index, tailed) for family, index in self._not_refuted(best[:, 0], numbers)]
+        if self._phase is not None:
+            in_order = {0} | {null.shape for null in nulls if null.family == 0}
+            nulls += [_Null(0, index, tailed, season=True) for index in sorted(in_order)]
         p = 0.0
-        for family, index in self._not_refuted(best[:, 0], numbers):
-            members = list(self.families[family])
+        for null in nulls:
+            members = list(self.families[null.family])
             gain = float(plain[members].min() - best[members].min())
-            p = max(p, self._p_value(gain, _Null(family, index, tailed), level, rng, trials))
+            p = max(p, self._p_value(gain, null, level, rng, trials))
             if p > level:
                 break
-        if p <= level and self._phase is not None:
-            members = list(self.families[0])
-            gain = float(plain[members].min() - best[members].min())
-            p = max(p, self._p_value(gain, _Null(0, 0, tailed, season=True), level, rng, trials))
         return Scan(
             self.kinds[best_candidate],
             int(self.positions[best_candidate]),

@@ -161,5 +161,7 @@ def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = N
     """
     lines = block_lines(blocks, cycle=cycle)
     slope = np.where(lines.cyclic, lines.slope, np.where(np.isfinite(lines.slope), drift.slope, np.nan))
+    # Days that differ by rounding alone have no slope.
+    slope = np.where((lines.slope == 0.0) & (lines.u_slope == 0.0), 0.0, slope)
     u, p_value, season_p = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal)
     return CellDrift(slope, u, p_value, lines.widening, season_p, np.abs(_quotient(slope, lines.u_slope)))

@@ -158,7 +158,9 @@ def _result(
     fit: MixedFit, lines: BlockLines, at: float, y: Array, u: Array | None, columns: Array, p: float
 ) -> Trend:
     """The line without what rests on ranks; ``columns`` (n, e) are what is fitted beside it."""
-    slope, dof = float(fit.coefficients[-1]), float(lines.dof[0])
+    # Days that differ by rounding alone have no slope.
+    is_constant = lines.slope[0] == 0.0 and lines.u_slope[0] == 0.0
+    slope, dof = 0.0 if is_constant else float(fit.coefficients[-1]), float(lines.dof[0])
     seasonal = beside_season(np.array([slope]), lines.u_slope, lines.dof, lines.seasonal)
     u_slope, season_p = float(seasonal.u[0]), float(seasonal.season_p[0])
     # From the mean time of the blocks to that of the runs.

@@ -27,12 +27,15 @@ from monitor.store.refusals import (
 
 if TYPE_CHECKING:
     from monitor.store.analyses import (
+        MappedRun as MappedRun,
         StoredAnalysis as StoredAnalysis,
         analysis_text as analysis_text,
         check_analysis as check_analysis,
         latest_documents as latest_documents,
         latest_maps as latest_maps,
+        latest_text as latest_text,
         load_analysis as load_analysis,
+        mapped_runs as mapped_runs,
         save_analysis as save_analysis,
         stored_analyses as stored_analyses,
     )
@@ -107,6 +110,7 @@ if TYPE_CHECKING:
         machine_events as machine_events,
         record_event as record_event,
     )
+    from monitor.store.held_sizes import held_bytes as held_bytes
     from monitor.store.identifications import (
         identification_by_number as identification_by_number,
         identification_numbers as identification_numbers,
@@ -199,8 +203,8 @@ else:
     __getattr__, __dir__ = on_demand(
         __name__,
         {
-            "analyses": "StoredAnalysis analysis_text check_analysis latest_documents latest_maps "
-            "load_analysis save_analysis stored_analyses",
+            "analyses": "MappedRun StoredAnalysis analysis_text check_analysis latest_documents latest_maps "
+            "latest_text load_analysis mapped_runs save_analysis stored_analyses",
             "archiving": "Archived archive_faults archive_files archived_count",
             "audit": "AuditEntry anchored_entry chain_faults last_anchor last_entries",
             "campaigns": "Imported import_campaign import_curve load_campaign",
@@ -230,6 +234,7 @@ else:
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
             "probing_counts",
+            "held_sizes": "held_bytes",
             "recalling": "Recalled",
             "results": "LackOfFit StoredIdentification StoredRun",
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",

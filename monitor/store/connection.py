@@ -14,7 +14,7 @@ import contextlib
 import copy
 import threading
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -70,7 +70,7 @@ class Database:
         self.type_tolerances: Mapping[str, Mapping[str, float]] = {}
         self._lock = threading.RLock()
         self._one_writes = threading.RLock()  # of the sessions
-        self._in_transaction = False
+        self._in_transaction = self._sees_one_moment = False
         self._remembered: list[str] = []
         #: What was read and may be read again, where this process alone has the file and says so; None: read anew.
         self.recalled: Recalled | None = None
@@ -137,7 +137,48 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Show the database of one moment in this block: nobody writes meanwhile."""
+        """Show the database of one moment in this block, that of its first question; the block stores nothing.
+
+        Other sessions go on storing meanwhile, which is not seen before the end. A block inside another is of the same
+        moment.
+        """
+        with self._used() as connection:
+            if self._in_transaction or self._sees_one_moment:
+                yield
+                return
+            connection.begin()
+            self._sees_one_moment = True
+            try:
+                yield
+                connection.commit()
+            except BaseException:
+                _roll_back(connection)
+                raise
+            finally:
+                self._sees_one_moment = False
+
+    @contextmanager
+    def snapshot(self) -> Iterator[datetime]:
+        """Show, as ``reading``, the database of a moment (UTC) when nobody was storing anything; yield that moment.
+
+        What is stored later has a later time in the audit.
+        """
+        # In the order of ``transaction``: the turn of those who write before the session's own lock.
+        with ExitStack() as turn:
+            turn.enter_context(self._one_writes)
+            with self.reading():
+                moment = self._moment()
+                turn.close()
+                yield moment
+
+    def _moment(self) -> datetime:
+        # A transaction of DuckDB sees what there is at its first question to a file.
+        self.rows("SELECT 1 FROM audit LIMIT 0")
+        return utc_now()
+
+    @contextmanager
+    def _kept(self) -> Iterator[None]:
+        """Keep the file open in this block, for this thread alone."""
         with self._lock:
             yield
 
@@ -149,7 +190,7 @@ class Database:
         session = copy.copy(self)
         session.actor = actor
         session._lock = threading.RLock()
-        session._in_transaction = False
+        session._in_transaction = session._sees_one_moment = False
         with self._used() as connection:
             session._connection = connection.cursor()
         return session
@@ -226,8 +267,11 @@ class Database:
                 self._forget()
 
     def recall(self, key: Hashable, read: Callable[[], Record]) -> Record:
-        """Return what ``read`` read before under a key, if nothing was written since; a transaction reads anew."""
-        if self.recalled is None or self._in_transaction:
+        """Return what ``read`` read before under a key, if nothing was written since.
+
+        A transaction reads anew, and so does a block that sees a moment which may be past.
+        """
+        if self.recalled is None or self._in_transaction or self._sees_one_moment:
             return read()
         answer: Record = self.recalled.answer(key, read)
         return answer
@@ -242,20 +286,29 @@ class Database:
         return int(number)
 
     @contextmanager
-    def attached(self, path: Path, name: str) -> Iterator[None]:
-        """Attach a second database file under a name for this block; no other thread uses the database meanwhile."""
-        with self.reading(), self._used() as connection:
-            literal = str(path).replace("'", "''")
-            if not path.exists():
-                make_empty(str(path))
-            connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
-            try:
-                yield
-            except BaseException:
-                _roll_back(connection)
-                raise
-            finally:
-                connection.execute(f"DETACH {name}")
+    def attached(self, path: Path, name: str) -> Iterator[datetime]:
+        """Attach a second database file under a name for a block that sees a ``snapshot`` of the first.
+
+        Yield its moment (UTC). No other thread uses this session meanwhile. Not to be called in ``reading``: a file is
+        not detached before the moment is over.
+        """
+        with ExitStack() as turn:
+            turn.enter_context(self._one_writes)
+            with self._kept(), self._used() as connection:
+                literal = str(path).replace("'", "''")
+                if not path.exists():
+                    make_empty(str(path))
+                connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
+                try:
+                    with self.reading():
+                        moment = self._moment()
+                        turn.close()
+                        yield moment
+                except BaseException:
+                    _roll_back(connection)
+                    raise
+                finally:
+                    connection.execute(f"DETACH {name}")
 
     @contextmanager
     def transaction(self) -> Iterator[None]:

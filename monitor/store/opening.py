@@ -9,6 +9,7 @@ import os
 import shlex
 import stat
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 
 import duckdb
@@ -16,7 +17,7 @@ import duckdb
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
 from monitor.store.kept_blocks import ENDING, has_torn_blocks, keep_blocks, settle_blocks
-from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writer_at_work
+from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
 #: a quarter of DuckDB's own size reads a fleet's machine in half the time, and a small file is a third as large.
@@ -55,22 +56,29 @@ def connect(
     def last_holder() -> Holder | None:
         return holder
 
-    for _ in patience.tries(last_holder):
-        if read_only and patience.seconds > 0:
-            holder = writer_at_work(path)
-            if holder is not None:
-                continue
-        try:
-            return _opened(path, read_only, config)
-        except (duckdb.Error, ValueError) as fault:
-            holder = holder_in(str(fault))
-            if patience.seconds > 0 and _is_open_here(str(fault)):
-                holder = Holder(os.getpid(), "another part of this process")
+    with ticket_to_read(path) if read_only else nullcontext() as ticket:
+        for _ in patience.tries(last_holder):
+            holder = writer_at_work(path) if read_only and patience.seconds > 0 else None
             if holder is None:
-                if read_only and "replaying WAL" in str(fault):
-                    raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
-                raise StoreError(_in_words(path, read_only, str(fault))) from fault
+                try:
+                    return _opened(path, read_only, config)
+                except (duckdb.Error, ValueError) as fault:
+                    holder = _in_the_way(path, read_only, patience, fault)
+            if ticket is not None:
+                ticket.take()
     raise busy(path, holder, patience)
+
+
+def _in_the_way(path: str, read_only: bool, patience: Patience, fault: Exception) -> Holder:
+    """Return who has the file that could not be opened. Raises StoreError for what is no matter of waiting."""
+    holder = holder_in(str(fault))
+    if patience.seconds > 0 and _is_open_here(str(fault)):
+        holder = Holder(os.getpid(), "another part of this process")
+    if holder is None:
+        if read_only and "replaying WAL" in str(fault):
+            raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
+        raise StoreError(_in_words(path, read_only, str(fault))) from fault
+    return holder
 
 
 def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnection:
@@ -83,13 +91,19 @@ def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnec
             f"back by the next verb of somebody who may write: `monitor --db {path} verify`"
         )
     connection = duckdb.connect(path, read_only=read_only, config=config)
-    # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
-    connection.execute("SET enable_progress_bar = false")
+    show_no_progress(connection)
     if not read_only and _has_log(path):
         # What it replayed is written into the file when it is closed, whether or not anything is added.
         with contextlib.suppress(StoreError):
             keep_blocks(path)
     return connection
+
+
+def show_no_progress(connection: duckdb.DuckDBPyConnection) -> None:
+    """Keep DuckDB from drawing a bar where a process looks interactive to it: between the lines of a JSON document."""
+    # A notebook without ipywidgets has no bar, and DuckDB refuses to be told so.
+    with contextlib.suppress(duckdb.InvalidInputException):
+        connection.execute("SET enable_progress_bar = false")
 
 
 def busy(path: str, holder: Holder | None, patience: Patience) -> BusyError:

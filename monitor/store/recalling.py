@@ -7,8 +7,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any
 
-#: Answers that are held, two a machine: of some thirty machines that somebody looks at now.
-MOST = 64
+from monitor.store.held_sizes import held_bytes
+
+#: Answers that are held, two a machine: of some thirty machines that somebody looks at now; and their bytes. The
+#: latest is held whatever its size.
+MOST, MOST_BYTES = 64, 256_000_000
 
 
 class Recalled:
@@ -39,7 +42,15 @@ class Recalled:
                 if writes != self._writes:
                     return value
                 entry.values.append(value)
+                entry.bytes = held_bytes(value)
+                self._forget_oldest()
             return entry.values[0]
+
+    def _forget_oldest(self) -> None:
+        with self._lock:
+            total = sum(entry.bytes for entry in self._entries.values())
+            while total > MOST_BYTES and len(self._entries) > 1:
+                total -= self._entries.popitem(last=False)[1].bytes
 
 
 class _Entry:
@@ -48,3 +59,4 @@ class _Entry:
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.values: list[Any] = []
+        self.bytes = 0

@@ -31,6 +31,9 @@ from monitor.store.turns import Patience, turn_to_write, writer_at_work
 #: while nobody has taken the turn to write: what is computed between two questions of one verb.
 _IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
 _IDLE_ALONE_S = 0.3
+#: Whoever wrote and was not given the processor since, on a busy machine, is not idle: the second transaction of a verb
+#: would wait for another turn. It is once it computed for so long, or after so long by the clock, in s.
+_COMPUTED_S, _IDLE_AT_MOST_S = 0.005, 0.25
 #: How long it is kept without a pause, in s; longer only by the one question or transaction that is under way.
 _LONGEST_S = 0.5
 #: How long a process that ends waits for a question of another thread, in s.
@@ -76,7 +79,7 @@ class SharedDatabase(Database):
         self._turn = ExitStack()
         self._writes = False
         self._blocks = 0
-        self._opened_at = self._used_at = 0.0
+        self._opened_at = self._used_at = self._processor_used_s = 0.0
         self._openings = 0
         self._numbers: dict[str, int] = {}
         super().__init__(path, read_only=read_only, threads=threads, actor=actor)
@@ -95,6 +98,12 @@ class SharedDatabase(Database):
 
     @contextmanager
     def reading(self) -> Iterator[None]:
+        """Show the database of one moment in this block: nobody else stores anything meanwhile."""
+        with self._kept():
+            yield
+
+    @contextmanager
+    def _kept(self) -> Iterator[None]:
         with self._used():
             self._blocks += 1
             try:
@@ -118,7 +127,7 @@ class SharedDatabase(Database):
                 self._open_to_read()
             with super()._used() as connection:
                 yield connection
-            self._used_at = time.monotonic()
+            self._note_use()
 
     @contextmanager
     def _writing(self) -> Iterator[duckdb.DuckDBPyConnection]:
@@ -190,7 +199,8 @@ class SharedDatabase(Database):
 
     def _keep(self, connection: duckdb.DuckDBPyConnection) -> None:
         self._connection = connection
-        self._opened_at = self._used_at = time.monotonic()
+        self._opened_at = time.monotonic()
+        self._note_use()
         self._openings += 1
         _OPEN.add(self)
         threading.Thread(target=self._watch, args=(self._openings,), daemon=True).start()
@@ -214,11 +224,15 @@ class SharedDatabase(Database):
     def _may_have_written(self) -> bool:
         return self._writes
 
+    def _note_use(self) -> None:
+        self._used_at, self._processor_used_s = time.monotonic(), time.process_time()
+
     def _is_idle(self) -> bool:
         """Whether nothing was asked for so long that others may have the file."""
         idle_s = time.monotonic() - self._used_at
         if self._writes:
-            return idle_s > _IDLE_WRITING_S
+            computed_s = time.process_time() - self._processor_used_s
+            return idle_s > (_IDLE_WRITING_S if computed_s > _COMPUTED_S else _IDLE_AT_MOST_S)
         return idle_s > _IDLE_ALONE_S or (idle_s > _IDLE_READING_S and writer_at_work(self.path) is not None)
 
     def _is_open_since(self, opening: int) -> bool:

@@ -3,8 +3,9 @@
 DuckDB lets one process write or several read. It refuses at once, so whoever comes meanwhile asks again until it is let
 in. Asking alone would keep a writer out for as long as readers follow on each other. So whoever writes takes the turn
 first, a lock (``flock``) on a file beside the database, and whoever comes to read waits where the turn is taken: the
-readers who are in leave, and none comes in. A turn ends with its process, however that ends. Where the file beside
-cannot be made or read, as in a folder that is not writable, the lock of DuckDB decides alone.
+readers who are in leave, and none comes in. Who waits has a ticket (``tickets``), so that nobody is passed over. A turn
+ends with its process, however that ends. Where the file beside cannot be made or read, as in a folder that is not
+writable, the lock of DuckDB decides alone.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from monitor.store.tickets import ReadersTicket, writers_ticket
 
 try:
     import fcntl
@@ -100,22 +103,36 @@ def turn_to_write(path: str, patience: Patience) -> Iterator[Holder | None]:
         if file is None:
             yield None
             return
+        if _taken_in_order(file, patience):
+            with contextlib.suppress(OSError):
+                os.pwrite(file, f"{os.getpid():<{_PID_WIDTH}}\n".encode(), 0)
+            yield None
+        else:
+            yield _last_writer(file)
+
+
+def _taken_in_order(file: int, patience: Patience) -> bool:
+    """Take the turn when it is this process's; False where the patience ended before."""
+    with writers_ticket(file) as ticket:
         for _ in patience.tries(lambda: _last_writer(file)):
-            if _locked(file, fcntl.LOCK_EX):
-                with contextlib.suppress(OSError):
-                    os.pwrite(file, f"{os.getpid():<{_PID_WIDTH}}\n".encode(), 0)
-                yield None
-                return
-        yield _last_writer(file)
+            if not _is_free(file):
+                ticket.note_taken()
+            elif ticket.is_next() and _locked(file, fcntl.LOCK_EX):
+                return True
+    return False
+
+
+@contextmanager
+def ticket_to_read(path: str) -> Iterator[ReadersTicket]:
+    """Yield the ticket of one who comes to read; who has to wait takes it, and has it until this block ends."""
+    with _lock_file(path, make=False) as file:
+        yield ReadersTicket(file)
 
 
 def writer_at_work(path: str) -> Holder | None:
     """Return who has the turn to write, or waits with it for those who read to leave; None where nobody does."""
     with _lock_file(path, make=False) as file:
-        # Held for a moment: only those who write keep the turn.
-        if file is None or _locked(file, fcntl.LOCK_SH):
-            return None
-        return _last_writer(file)
+        return None if file is None or _is_free(file) else _last_writer(file)
 
 
 @contextmanager
@@ -155,6 +172,16 @@ def _readable_as(path: str, file: int, status: os.stat_result) -> None:
         wanted = stat.S_IMODE(os.stat(path).st_mode) & 0o666
         if status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) != wanted | 0o600:
             os.fchmod(file, wanted | 0o600)
+
+
+def _is_free(file: int) -> bool:
+    """Whether nobody has the turn."""
+    if not _locked(file, fcntl.LOCK_SH):
+        return False
+    # Held for a moment: only those who write keep the turn.
+    with contextlib.suppress(OSError):
+        fcntl.flock(file, fcntl.LOCK_UN)
+    return True
 
 
 def _locked(file: int, way: int) -> bool:

@@ -15,10 +15,11 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, Timeo
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from threading import Event, RLock
-from typing import Any
+from typing import Any, TypeVar
 
-from monitor.exceptions import MonitorError, NotFoundError
+from monitor.exceptions import MonitorError, NotFoundError, StoreError
 from monitor.stopping import StoppedError, stoppable
+from monitor.store import held_bytes
 from monitor.web.asking import Asker, ForbiddenError, check_role
 from monitor.web.freshness import Stamp, differ_by_imports
 from monitor.web.users import Role, User
@@ -27,13 +28,19 @@ from monitor.web.users import Role, User
 WORKERS = 2
 #: A page waits so long before it shows that something is being computed; a trend page has to come within 0.3 s.
 PATIENCE_S = 0.1
-#: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
-MOST = 200
+#: Answers that are held, and their bytes; the oldest is forgotten, and computed again when somebody asks. The one that
+#: was answered last is held whatever its size: whoever opens its page again would wait as long.
+MOST, MOST_BYTES = 200, 512_000_000
 #: Where only imports came since, an answer stands for so many times as long as it took: while somebody imports one
 #: campaign after the other, sums over the whole fleet take a tenth of one processor and not all of it.
 REST = 10.0
 #: And no longer than this.
 LONGEST_REST_S = 60.0
+#: A refusal stands so long, as long as nothing is written: a page that asks two questions which are refused after a
+#: second each would compute one while it shows the other, for ever.
+REFUSAL_STANDS_S = 60.0
+
+Key = TypeVar("Key")
 
 
 @dataclass
@@ -52,6 +59,8 @@ class Ticket:
     stamp: Stamp = ()
     #: How long it was computed; None while it is not.
     took_s: float | None = None
+    #: How many bytes the answer holds, about; 0 while there is none.
+    bytes: int = 0
     #: Who took it back; empty as long as nobody did.
     taken_back_by: str = ""
     #: What it said of how far it is, the latest last.
@@ -86,8 +95,16 @@ class Ticket:
 
     @property
     def is_good(self) -> bool:
-        """Whether it is under way, was taken back, or has an answer: what was refused is asked anew."""
-        return not self.is_done or not (self.future.cancelled() or self.future.exception())
+        """Whether it is under way, was taken back, has an answer, or a refusal that stands; a fault is asked anew."""
+        if not self.is_done:
+            return True
+        if self.future.cancelled():
+            return False
+        refusal = self.future.exception()
+        if not isinstance(refusal, MonitorError) or isinstance(refusal, StoreError):
+            return refusal is None
+        # Not noted yet: it ended just now.
+        return self.took_s is None or self.seconds < self.took_s + REFUSAL_STANDS_S
 
     def may_be_taken_back_by(self, user: User) -> bool:
         """Whether this user asked it, or is an approver."""
@@ -207,10 +224,32 @@ class Desk:
         ticket.took_s = ticket.seconds
         if future.cancelled() or future.exception() is not None:
             return
+        ticket.bytes = held_bytes(future.result())
         with self._lock:
+            # The one that was answered last is the last one of its kind.
+            self._answered_last.pop(asked, None)
             self._answered_last[asked] = ticket
             while len(self._answered_last) > MOST:
                 del self._answered_last[next(iter(self._answered_last))]
+            self._forget_beyond_bytes(ticket)
+
+    def _forget_beyond_bytes(self, latest: Ticket) -> None:
+        """Forget the oldest answers until the rest holds no more than ``MOST_BYTES``: those of before a write first."""
+        held = {
+            id(ticket): ticket.bytes for ticket in (*self._tickets.values(), *self._answered_last.values())
+        }
+        total = sum(held.values())
+        standing = {id(ticket) for ticket in self._tickets.values()}
+        oldest = sorted(
+            self._answered_last.values(), key=lambda ticket: (id(ticket) in standing, ticket.number)
+        )
+        for ticket in (*oldest, *self._tickets.values()):
+            if total <= MOST_BYTES:
+                return
+            if ticket is not latest and ticket.future.done():
+                total -= held.pop(id(ticket), 0)
+                self._answered_last = _without(self._answered_last, ticket)
+                self._tickets = _without(self._tickets, ticket)
 
     def begin(
         self,
@@ -306,3 +345,7 @@ class Desk:
         """Wait for what is being computed, so that nothing is left half; take back what waits."""
         for pool in (self._pool, self._quick, self._writers):
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _without(tickets: dict[Key, Ticket], forgotten: Ticket) -> dict[Key, Ticket]:
+    return {key: ticket for key, ticket in tickets.items() if ticket is not forgotten}

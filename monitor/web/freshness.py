@@ -12,6 +12,8 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Any
 
+from monitor.store import held_bytes
+
 #: Questions that read only, take milliseconds, and stand on pages that many people open.
 REMEMBERED = frozenset({"campaigns", "machines", "runs", "values"})
 #: Questions that may identify what nobody has identified yet.
@@ -20,8 +22,9 @@ IDENTIFYING = frozenset(
 )
 #: Their answers are made of identified values.
 _OF_VALUES = frozenset({"fleet", "values"})
-#: Answers that are held; the one that was not asked for longest is forgotten.
-_MOST = 256
+#: Answers that are held, and their bytes; the one that was not asked for longest is forgotten. The latest is held
+#: whatever its size: whoever opens its page again would wait as long.
+_MOST, _MOST_BYTES = 256, 256_000_000
 
 Stamp = tuple[int, ...]
 
@@ -38,7 +41,8 @@ class Freshness:
         self._lock = threading.Lock()
         self._all = self._imports = self._identified = 0
         self._of_machine: dict[str, int] = {}
-        self._answers: OrderedDict[tuple[str, str], tuple[Stamp, Any]] = OrderedDict()
+        self._answers: OrderedDict[tuple[str, str], tuple[Stamp, Any, int]] = OrderedDict()
+        self._bytes = 0
 
     def stamp(self, question: str, document: Mapping[str, Any]) -> Stamp:
         """Return what changes when the answer to a question may be another."""
@@ -69,7 +73,7 @@ class Freshness:
         """Return the key of a question now, and its answer where it was asked before (else None)."""
         key = (question, json.dumps(document, sort_keys=True, default=str), self.stamp(question, document))
         with self._lock:
-            stamp, answer = self._answers.get(key[:2], ((), None))
+            stamp, answer, _ = self._answers.get(key[:2], ((), None, 0))
             if answer is None or stamp != key[2]:
                 return key, None
             self._answers.move_to_end(key[:2])
@@ -77,7 +81,9 @@ class Freshness:
 
     def remember(self, key: tuple[str, str, Stamp], answer: Any) -> None:
         """Hold an answer under the key that its question had before it was asked, in place of the one before."""
+        size = held_bytes(answer)
         with self._lock:
-            self._answers[key[:2]] = (key[2], answer)
-            while len(self._answers) > _MOST:
-                self._answers.popitem(last=False)
+            self._bytes += size - self._answers.pop(key[:2], ((), None, 0))[2]
+            self._answers[key[:2]] = (key[2], answer, size)
+            while len(self._answers) > _MOST or (self._bytes > _MOST_BYTES and len(self._answers) > 1):
+                self._bytes -= self._answers.popitem(last=False)[1][2]

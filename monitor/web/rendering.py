@@ -77,6 +77,7 @@ def _environment() -> Environment:
         "probability": words.probability,
         "day": words.day,
         "counted": words.counted,
+        "so_far": words.so_far,
         "listed": words.listed,
         "what_breaks": words.what_breaks,
         "embedded": _embedded,

@@ -15,7 +15,9 @@ from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.attention import ATTENTION, Attention
 
 if TYPE_CHECKING:
+    from monitor.web.desk import Ticket
     from monitor.workflow.fleet.answer import FleetTableRow
+    from monitor.workflow.plan.test_answer import TestAnswer
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,9 @@ NOT_IDENTIFIED = Urgency(
     _OPEN.word,
     "identify: its readings are here, its errors are not computed from them yet",
 )
+#: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
+UNEXPLAINED = "the model does not explain the latest readings"
+DOES_NOT_FIT = Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "")
 NOT_MEASURED = Urgency(_OPEN.colour, _OPEN.shape, "not measured", "measure it, and import the campaign")
 
 #: Powers of ten below this are written as such.
@@ -159,11 +164,31 @@ def counted(count: int, word: str, plural: str | None = None) -> str:
     return f"{count} {word if count == 1 else plural or word + 's'}"
 
 
+def so_far(ticket: Ticket) -> str:
+    """Say how long something has been computed, and whether it waits or is being stopped."""
+    seconds = f"{counted(int(ticket.seconds), 'second')} so far"
+    if ticket.is_stopping:
+        return f"{seconds}, {ticket.taken_back_by} is stopping it"
+    return seconds if ticket.is_running else f"{seconds}, waiting for others"
+
+
 def listed(names: Iterable[str], most: int = 6) -> str:
     """Return some names and how many more there are."""
     every = list(names)
     rest = f" and {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + rest
+
+
+def _another_instrument(test: TestAnswer | None) -> str:
+    if test is None:
+        return "measure the same movements with another instrument"
+    ends = [
+        f"{axis.rpartition('_')[0].upper()} {number(low)} to {number(high)}{' mm' if axis.endswith('_mm') else '°'}"
+        for axis, (low, high) in test.axes.items()
+        if low != high
+    ]
+    moving = f" with {', '.join(ends)}" if ends else ""
+    return f"measure {counted(test.poses, 'pose')} with the {test.instrument}{moving}"
 
 
 def what_breaks(tie: Tie) -> str:
@@ -172,8 +197,17 @@ def what_breaks(tie: Tie) -> str:
     recorded = "both" if len(tie.drivers) == 2 else "it"
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: f"measure runs at several values of {drivers}, and record {recorded}",
+        TieBreak.DRIVERS: (
+            f"measure runs within which {drivers} change{', not together' if len(tie.drivers) == 2 else 's'}, and "
+            f"record {recorded}"
+            if tie.within_runs
+            else f"measure runs at several values of {drivers}, and record {recorded}"
+        ),
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
+        TieBreak.MORE_POSES: (
+            f"measure more poses over the whole range of {' and '.join(tie.axes)}, and some under another load"
+        ),
+        TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.NOTHING: "no touch of these targets does: they move the tip alike, and one correction serves both",
     }[tie.broken_by]

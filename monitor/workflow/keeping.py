@@ -220,8 +220,7 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     Raises InputError for a lake, too.
     """
     _refuse_lake(db, "copied")
-    with db.reading():
-        copy = (take_increment if request.incremental else take_backup)(db, request.target)
+    copy = (take_increment if request.incremental else take_backup)(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())
     span = copy.span
     assert span is not None  # of those made by this version

@@ -10,12 +10,13 @@ from __future__ import annotations
 import calendar
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError, did_you_mean
 from monitor.methods import campaign_method
 from monitor.methods.chain.likeness import Likeness
@@ -25,6 +26,7 @@ from monitor.reporting import messages
 from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.file_names import file_name
+from monitor.workflow.sight import EffectSight, effect_sight
 from monitor.workflow.simulation import PEAK_UM
 from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
 
@@ -106,12 +108,16 @@ class LikeRequest:
 
 @dataclass(frozen=True)
 class LikeAnswer:
-    """The folders that were written, and the file with the true value of every parameter in every run."""
+    """The folders that were written, and the file with the true value of every parameter in every run.
+
+    ``sight`` says what the plan shows of the hidden effect, in each campaign alike.
+    """
 
     folders: tuple[str, ...]
     truth: str
     seed: int
     message: str
+    sight: EffectSight | None = field(default=None, metadata=OMITTED)
 
 
 def simulate_like(request: LikeRequest, *, progress: Callable[[str], None] = lambda name: None) -> LikeAnswer:
@@ -143,10 +149,11 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
                 f"{pattern.name} has no parameter '{parameter}'; {did_you_mean(parameter, units)}"
                 f"it has {', '.join(units)}"
             )
-    added = None
+    added = sight = None
     if request.effect is not None:
-        peak = PEAK_UM if request.peak_um is None else request.peak_um
-        added = likeness.hidden(request.effect, MICROMETRE.to_internal(peak))
+        peak = MICROMETRE.to_internal(PEAK_UM if request.peak_um is None else request.peak_um)
+        added = likeness.hidden(request.effect, peak)
+        sight = effect_sight(likeness.problem, request.effect, peak)
     rng = np.random.default_rng(request.seed)
     folders, truth = [], []
     for machine in request.machines:
@@ -165,7 +172,9 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
     message = messages.likenesses_written(
         request.out, len(folders), len(request.machines), (pattern.name, method.name), TRUTH
     )
-    return LikeAnswer(tuple(folders), str(file), request.seed, message)
+    if sight is not None and request.effect is not None and not sight.is_certain:
+        message += messages.hardly_seen(request.effect, sight.standard_deviations, sight.certain_from_um)
+    return LikeAnswer(tuple(folders), str(file), request.seed, message, sight)
 
 
 def _units(likeness: Likeness) -> Sequence[tuple[str, float]]:

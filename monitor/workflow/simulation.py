@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError, did_you_mean
-from monitor.methods import Rehearsal, methods
+from monitor.methods import Rehearsal, campaign_method, methods
 from monitor.readers import write_campaign
 from monitor.reporting import messages
 from monitor.units import MICROMETRE
+from monitor.workflow.sight import EffectSight, effect_sight
 
 #: Largest displacement of a hidden effect where the request names none, µm.
 PEAK_UM = 5.0
@@ -70,7 +72,10 @@ class SimulateRequest:
 
 @dataclass(frozen=True)
 class SimulateAnswer:
-    """What was written; ``peak_um`` is None where nothing is hidden."""
+    """What was written; ``peak_um`` is None where nothing is hidden.
+
+    ``sight`` says what the plan shows of the hidden effect.
+    """
 
     folder: str
     campaign: str
@@ -81,6 +86,7 @@ class SimulateAnswer:
     runs: int
     probings: int
     message: str
+    sight: EffectSight | None = field(default=None, metadata=OMITTED)
 
 
 def simulate(request: SimulateRequest) -> SimulateAnswer:
@@ -95,6 +101,14 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
     write_campaign(campaign, request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
     hidden = (request.effect, request.peak) if request.effect else None
+    message = messages.virtual_written(request.out, runs, probings // runs, hidden)
+    sight = None
+    if request.effect is not None:
+        method = campaign_method(campaign)
+        problem = method.problem_of(campaign, method.own_model)
+        sight = effect_sight(problem, request.effect, MICROMETRE.to_internal(request.peak))
+        if not sight.is_certain:
+            message += messages.hardly_seen(request.effect, sight.standard_deviations, sight.certain_from_um)
     return SimulateAnswer(
         folder=str(request.out),
         campaign=campaign.name,
@@ -104,7 +118,8 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         seed=request.seed,
         runs=runs,
         probings=probings,
-        message=messages.virtual_written(request.out, runs, probings // runs, hidden),
+        message=message,
+        sight=sight,
     )
 
 

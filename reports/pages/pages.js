@@ -26,6 +26,34 @@ function read(id) {
 
 const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "lasso2d", "select2d"] };
 
+// The offset from UTC of the run nearest to a moment: the axis shows the shop's clock.
+function offsetAt(canvas, time) {
+  const times = canvas.data.flatMap((trace) => trace.x).filter((at) => /T.*([+-]\d\d:\d\d|Z)$/.test(at));
+  const apart = (at) => Math.abs(Date.parse(at.slice(0, 16)) - Date.parse(time.replace(" ", "T").slice(0, 16)));
+  const nearest = times.reduce((best, at) => (best === "" || apart(at) < apart(best) ? at : best), "");
+  return nearest === "" ? "Z" : nearest.match(/([+-]\d\d:\d\d|Z)$/)[0];
+}
+
+// A click between the runs of a trend puts its time into the form of an event; a drag zooms, and is none.
+function takeTimes(canvas) {
+  const at = document.querySelector('form[action="/machine/event"] input[name="at"]');
+  if (at === null || canvas.dataset.takesTimes) {
+    return;
+  }
+  canvas.dataset.takesTimes = "1";
+  canvas.addEventListener("click", (event) => {
+    const pad = event.target.closest(".nsewdrag");
+    if (pad === null) {
+      return;
+    }
+    const time = String(canvas._fullLayout.xaxis.p2d(event.clientX - pad.getBoundingClientRect().left));
+    at.value = time.replace(" ", "T").padEnd(16, "T00:00").slice(0, 16) + offsetAt(canvas, time);
+    const text = at.form.querySelector('input[name="text"]');
+    text.focus();
+    text.scrollIntoView({ block: "center" });
+  });
+}
+
 function draw(figure) {
   const chart = JSON.parse(figure.querySelector("script.figure").textContent);
   const canvas = figure.querySelector(".canvas");
@@ -33,7 +61,12 @@ function draw(figure) {
     drawScene(canvas, chart);
   } else {
     canvas.style.height = chart.layout.height + "px"; // what the style sheet has no rule for
-    Plotly.react(canvas, coloured(chart.data), coloured(chart.layout), SETTINGS).then(() => { canvas.dataset.drawn = "1"; });
+    Plotly.react(canvas, coloured(chart.data), coloured(chart.layout), SETTINGS).then(() => {
+      canvas.dataset.drawn = "1";
+      if (figure.dataset.key === "trend") {
+        takeTimes(canvas);
+      }
+    });
   }
 }
 
@@ -269,10 +302,27 @@ function watchLater(section) {
   watcher.observe(section);
 }
 
-// A page that waits loads itself again, where one is in it; an address that ends in #scene would not be by its head alone.
-if (document.querySelector("p.waiting") !== null) {
+function loadAgain() {
   setTimeout(() => location.reload(), 2000);
 }
+
+// A page that waits loads itself again once that is computed: to make and draw it anew takes the time of what it waits for.
+function waitFor(note) {
+  const ask = () => fetch("/work/state?number=" + note.dataset.number, { credentials: "same-origin" }).then((answer) => {
+    if (answer.status !== 202) {
+      location.reload();
+      return null;
+    }
+    return answer.json().then((work) => {
+      note.querySelector(".so-far").textContent = work.so_far;
+      return ask();
+    });
+  });
+  ask().catch(loadAgain);
+}
+
+// In the browser's own way an address that ends in #scene would not be loaded anew.
+document.querySelectorAll("p.waiting").forEach((note) => (note.dataset.number ? waitFor(note) : loadAgain()));
 document.querySelectorAll("[data-later]").forEach(watchLater);
 prepareScene();
 drawAll();

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -55,3 +57,23 @@ def test_a_notebook_runs(notebook: Path, tmp_path: Path, monkeypatch: pytest.Mon
         text = shown("".join(cell["source"]), f"{notebook.name}, code cell {number}", namespace)
         tables += "<table" in text
     assert tables >= 2
+
+
+def test_a_database_opens_in_a_notebook_without_widgets(tmp_path: Path) -> None:
+    """DuckDB refuses every setting of its bar there. It takes a process without a main file, with a kernel for one."""
+    code = (
+        "import sys, types\n"
+        "shell = types.SimpleNamespace(config={'IPKernelApp': {}})\n"
+        "sys.modules['IPython'] = types.SimpleNamespace(get_ipython=lambda: shell)\n"
+        "sys.modules['ipywidgets'] = None\n"
+        "import duckdb\n"
+        "try:\n    duckdb.connect().execute('SET enable_progress_bar = false')\n"
+        "except duckdb.InvalidInputException as fault:\n    print('ipywidgets' in str(fault))\n"
+        "import monitor as mm\n"
+        "with mm.open('shop.duckdb', new=True) as db:\n    print(len(db.machines()))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert answer.stderr == ""
+    assert answer.stdout.splitlines() == ["True", "0"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -9,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from monitor.cli.configuration import configuration
 from monitor.cli.moments import moment
 from monitor.cli.parser import VERBS
 
@@ -46,6 +49,24 @@ def test_the_database_is_the_typed_the_environments_the_configurations(
     monkeypatch.setenv("MONITOR_DB", "other.duckdb")
     assert "there is no database other.duckdb" in typed("campaigns").err
     assert "there is no database typed.duckdb" in typed("--db", "typed.duckdb", "campaigns").err
+
+
+def test_the_configuration_of_another_user_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Under the home of somebody else, as `sudo -u` leaves it: a fault of the software until 2026-11-26."""
+    configured('language = "de"\n', str(tmp_path / "home" / "monitor" / "monitor.toml"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    assert configuration().language == "de"
+
+    def forbidden(path: object, *_: object, **__: object) -> os.stat_result:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    with monkeypatch.context() as as_another:
+        as_another.setattr(os, "stat", forbidden)
+        assert configuration().language is None
+    monkeypatch.delenv("XDG_CONFIG_HOME")
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr("pwd.getpwuid", lambda number: {}[number])
+    assert configuration().language is None
 
 
 def test_laboratory_language_and_time_zone_are_used(typed: Any, db: Path, laboratory: Path) -> None:

@@ -17,7 +17,7 @@ from environment import CHECKOUT, EXTRAS as INSTALLED, HASHES
 from installed_wheel import build, say
 
 #: What users may install; no tools for developers.
-EXTRAS = "sign,token,web,completion,excel,cluster,lake"
+EXTRAS = "sign,token,web,completion,excel,qif,cluster,lake"
 #: Licences that ask a user of the product for no more than a notice, or for the sources of that library alone (MPL).
 ALLOWED = (
     "0BSD", "Apache", "BSD", "CC0-1.0", "DFSG approved", "HPND", "ISC", "MIT", "MPL", "Mozilla", "PSF",

@@ -15,7 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from monitor.store import Database, Holder, Patience, SharedDatabase, list_campaigns, verify_audit
@@ -35,7 +35,10 @@ PATIENCE_S = 300.0
 
 @dataclass
 class Tally:
-    """What a process did: questions answered, campaigns acknowledged, refusals, and its longest wait and hold in s."""
+    """What a process did: questions answered, campaigns acknowledged, refusals, its longest wait and question in s.
+
+    ``holds_s`` are the times for which it held the file to write.
+    """
 
     kind: str
     answered: int
@@ -43,6 +46,20 @@ class Tally:
     refused: list[str]
     longest_wait_s: float
     longest_question_s: float
+    waits_s: list[float] = field(default_factory=list)
+    holds_s: list[float] = field(default_factory=list)
+
+
+class TimedDatabase(SharedDatabase):
+    """Notes how long it held the file to write, from when it was open until it is let go, in s."""
+
+    holds_s: list[float]
+
+    def _let_go(self) -> None:
+        wrote = self._writes
+        super()._let_go()
+        if wrote:
+            self.holds_s.append(time.monotonic() - self._opened_at)
 
 
 @dataclass(frozen=True)
@@ -73,7 +90,8 @@ def work(kind: str, number: int, database: Path, example: Path, load: Load) -> T
             patience = Patience(PATIENCE_S, _nothing)
             begin = time.monotonic()
             try:
-                with SharedDatabase(database, threads=1, actor=kind, patience=patience) as db:
+                with TimedDatabase(database, threads=1, actor=kind, patience=patience) as db:
+                    db.holds_s = tally.holds_s
                     if kind == "importer":
                         name = f"campaign-{number}-{tally.answered}"
                         import_folders(db, ImportRequest([_folder(example, Path(room) / name, name)]))
@@ -86,6 +104,7 @@ def work(kind: str, number: int, database: Path, example: Path, load: Load) -> T
             except Exception as error:
                 tally.refused.append(f"{type(error).__name__}: {error}")
             tally.answered += 1
+            tally.waits_s.append(patience.longest_s)
             tally.longest_wait_s = max(tally.longest_wait_s, patience.longest_s)
             tally.longest_question_s = max(tally.longest_question_s, time.monotonic() - begin)
             time.sleep(pauses.uniform(0.0, 2 * load.pause_s))
@@ -136,6 +155,18 @@ def lost(database: Path, tallies: list[Tally]) -> list[str]:
     return faults
 
 
+def _spread(seconds: list[float]) -> dict[str, float]:
+    """Return median, 95 % point and the longest of some times, in s; nothing of none."""
+    if not seconds:
+        return {}
+    ordered = sorted(seconds)
+    return {
+        "median": round(ordered[len(ordered) // 2], 3),
+        "95 %": round(ordered[int(0.95 * len(ordered))], 3),
+        "longest": round(ordered[-1], 3),
+    }
+
+
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seconds", type=float, default=600)
@@ -167,6 +198,8 @@ def main() -> int:
                     "processes": len(those),
                     "answered": sum(tally.answered for tally in those),
                     "refused": sum(len(tally.refused) for tally in those),
+                    "waits_s": _spread([wait for tally in those for wait in tally.waits_s]),
+                    "held_to_write_s": _spread([hold for tally in those for hold in tally.holds_s]),
                     "longest_wait_s": round(max((tally.longest_wait_s for tally in those), default=0.0), 2),
                     "longest_question_s": round(
                         max((tally.longest_question_s for tally in those), default=0.0), 2

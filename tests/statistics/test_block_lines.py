@@ -13,6 +13,7 @@ from monitor.exceptions import DataError
 from monitor.statistics import backtest, predict
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.days.seasonal_slopes import SeasonAhead, beside_season
+from monitor.statistics.sufficient import drift_from_sums, drift_in_blocks
 from monitor.statistics.trend import trend
 
 
@@ -296,3 +297,29 @@ def test_a_season_may_be_any_part_of_a_slope_or_hide_as_much():
     bend = line.season_ahead.at(later[1]) - replace(line.season_ahead, bend=0.0).at(later[1])
     of_season = 28.0 * abs(line.slope) / np.sqrt(3.0) + bend
     assert now[1] == pytest.approx(np.hypot(before[1], of_season))
+
+
+@pytest.mark.parametrize("origin", [0.0, 17.3])
+def test_days_that_differ_by_rounding_alone_do_not_drift(origin):
+    """A campaign that was imported again under other names: means of equal values, added in other orders."""
+    rng = np.random.default_rng(20261126)
+    t = 365.25 * np.arange(5.0)
+    runs = rng.normal(17.3, 1.4, 44)
+    # As SQL adds them: the mean of the same runs to a few last bits of its level.
+    means = runs.mean() - origin + np.spacing(17.3) * rng.integers(-4, 5, (50, 5))
+    assert (np.ptp(means, axis=1) > 0.0).all()
+    lines = block_lines(replace(cut(means, t), origin=np.full(50, origin)), cycle=365.25)
+    sums = [np.full(50, 5.0), np.full(50, t.sum()), np.full(50, t @ t), means.sum(axis=1)]
+    drift = drift_from_sums(*sums, (means**2).sum(axis=1), means @ t)
+    drift = drift_in_blocks(drift, replace(cut(means, t), origin=np.full(50, origin)), cycle=365.25)
+    for slope, u in ((lines.slope, lines.u_slope), (drift.slope, drift.u)):
+        assert (slope == 0.0).all()
+        assert (u == 0.0).all()
+    assert (drift.p_value == 1.0).all()
+    if not origin:
+        values, times = np.concatenate([rng.permutation(runs) for _ in t]), np.repeat(t, 44)
+        line = trend(values, times, days=np.repeat(np.arange(5), 44))
+        assert (line.slope, line.u_slope, line.p_value) == (0.0, 0.0, 1.0)
+    # What is a hundred times as much as rounding counts.
+    moved = block_lines(replace(cut(means + 1e-11 * t / t[-1], t), origin=np.full(50, origin)))
+    assert (moved.slope > 0.0).all()

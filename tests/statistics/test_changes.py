@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.statistics import find_changes
+from monitor.statistics import find_changes, scan
 from monitor.statistics.changes import _Search, _Series
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scanner
@@ -276,3 +276,35 @@ def test_a_part_of_a_yearly_wave_of_one_scatter_is_no_change_and_a_step_of_six_i
     assert rate_at_most(called, 150, 0.015)
     assert plain / 150 > 0.1
     assert seen / 150 > 0.9
+
+
+def test_a_wave_that_is_too_long_to_show_is_allowed_for_beside_runs_that_follow_each_other():
+    t, rng = 7.0 * np.arange(20), np.random.default_rng(20)
+    with_season, without = (Scanner(t, None, "constant", None, cycle) for cycle in (365.25, None))
+    p_values = []
+    while len(p_values) < 15:
+        wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, 365.25)) / 365.25)
+        y = first_order(rng, len(t), 0.6) + wave
+        p, p_season = (
+            each.scan(y, np.random.default_rng(1), 499, 1.0).p_value for each in (without, with_season)
+        )
+        if p < 0.3:
+            p_values.append((p, p_season))
+    # Allowed for beside independent runs alone, it raised 7 of 17 such.
+    assert sum(p_season > p for p, p_season in p_values) >= 13, p_values
+
+
+@pytest.mark.parametrize("base", ["constant", "line"])
+def test_the_statistic_of_a_series_is_the_same_however_many_are_computed_at_once(base, monkeypatch):
+    # Of 20 runs 500 series are computed at once, of 80 a fifth of them.
+    for n in (20, 80):
+        day = np.arange(n) // 4
+        scanner = Scanner(np.arange(n, dtype=float), None, base, day)
+        series = np.random.default_rng(n).standard_normal((n, scan.BLOCK))
+        gains = []
+        for at_once in (0, scan.AT_ONCE, 10**9):
+            monkeypatch.setattr(scan, "AT_ONCE", at_once)
+            gains.append([scanner._gain(series, family) for family in range(3)])
+        monkeypatch.undo()
+        np.testing.assert_allclose(gains[1], gains[0], rtol=1e-12, atol=1e-10)
+        np.testing.assert_allclose(gains[2], gains[0], rtol=1e-12, atol=1e-10)

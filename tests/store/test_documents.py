@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import datetime, timedelta, timezone
 
 import pytest
@@ -12,6 +13,7 @@ from monitor.records import Campaign
 from monitor.store import (
     Database,
     import_campaign,
+    latest_text,
     list_events,
     load_analysis,
     record_event,
@@ -63,6 +65,30 @@ def test_result_that_is_the_latest_already_is_not_stored_again(db: Database, cam
         first + 3,
     ]
     assert load_analysis(db, "trend").document == DOCUMENT
+
+
+def test_a_latest_result_that_was_read_before_is_not_read_again(
+    db: Database, campaign: Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import_campaign(db, campaign)
+    machine = campaign.machine.id
+    assert latest_text(db, "trend", method="m", machine=machine) is None
+    first = save_analysis(db, "trend", DOCUMENT, method="m", seed=3, machine=machine)
+    assert latest_text(db, "trend", method="m") is None
+    latest = latest_text(db, "trend", method="m", machine=machine)
+    assert latest is not None
+    assert (latest.number, json.loads(latest.text), latest.seed) == (first, DOCUMENT, "3")
+
+    def save(document: dict[str, object], seed: int) -> int:
+        return save_analysis(
+            db, "trend", document, method="m", seed=seed, repeated=False, machine=machine, latest=latest
+        )
+
+    with monkeypatch.context() as nothing_is_asked:
+        nothing_is_asked.setattr(db, "rows", None)
+        assert save(DOCUMENT, 3) == first
+    # Another seed or another document is news.
+    assert [save(DOCUMENT, 4), save({"n": 1}, 3)] == [first + 1, first + 2]
 
 
 def test_document_that_is_not_json(db: Database) -> None:

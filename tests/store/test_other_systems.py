@@ -173,6 +173,7 @@ def posix_uses(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 #: Where they stand, each behind a look whether the system has it: the folder of the package, then the file.
 LOOKED_FOR = {
+    "store/tickets.py": {"fcntl"},
     "store/turns.py": {"fcntl", "os.O_CLOEXEC", "os.O_NOFOLLOW", "os.O_NONBLOCK", "os.pread", "os.pwrite",
                        "os.geteuid", "os.fchmod"},
     "store/kept_blocks.py": {"fcntl", "os.O_NOFOLLOW", "os.O_NONBLOCK", "os.pread", "os.pwrite", "os.fchmod"},

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import duckdb
 import pytest
@@ -108,6 +109,30 @@ def test_the_file_is_let_go_while_nothing_is_asked(path: Path) -> None:
             time.sleep(0.01)
         assert not _is_open(path)
         assert list_campaigns(db) == ()
+
+
+@pytest.mark.parametrize(("computed_s", "turns"), [(0.0, 1), (10.0, 2)])
+def test_who_is_not_given_the_processor_between_two_transactions_keeps_the_turn(
+    path: Path, monkeypatch: pytest.MonkeyPatch, computed_s: float, turns: int
+) -> None:
+    """An import and the note on it wait once, also on a busy machine; a fit between two transactions lets others in."""
+    clocks = {"monotonic": 0.0, "process_time": 0.0}
+    Database(path).close()
+    with SharedDatabase(path) as db:
+        monkeypatch.setattr(SharedDatabase, "_watch", lambda self, opening: None)
+        stopped = {name: lambda name=name: clocks[name] for name in clocks}
+        monkeypatch.setattr("monitor.store.sharing.time", SimpleNamespace(**stopped))
+        taken = 0
+        for _ in range(2):
+            taken += not db._writes
+            save(db)
+            clocks["monotonic"] += 0.1
+            clocks["process_time"] += computed_s
+            if db._is_idle():
+                db._let_go()
+        assert taken == turns
+        clocks["monotonic"] += 10.0
+        assert db._connection is None or db._is_idle()
 
 
 def _is_open(path: Path) -> bool:

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("fastapi", reason="the extra web is not installed")
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import BusyError, NotFoundError
 from monitor.web import desk as desk_module
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
@@ -26,9 +26,12 @@ class _Asked:
 
     def __init__(self) -> None:
         self.freshness, self.go, self.count, self.refuses = Freshness(), threading.Event(), 0, False
+        self.fault: Exception | None = None
 
     def __call__(self, user: User, question: str, document: Any, files: Any = None) -> int:
         self.go.wait(60.0)
+        if self.fault is not None:
+            raise self.fault
         if self.refuses:
             raise NotFoundError("nothing was identified")
         self.count += 1
@@ -97,6 +100,42 @@ def test_nothing_rests_longer_than_a_minute_and_a_refusal_not_at_all(asked: tupl
         refused.answer(60.0)
     assert before is ticket
     assert desk.answered_last(*SUMS) is ticket
+
+
+def test_a_refusal_stands_until_something_is_written_or_a_minute_went_by(asked: tuple[Desk, _Asked]) -> None:
+    """A page that asks two questions which are refused later than it waits was never complete."""
+    desk, asker = asked
+    asker.refuses = True
+    asker.go.set()
+    questions = [("residuals", {"campaign": "c"}), ("residuals by driver", {"campaign": "c"})]
+    for _ in range(3):
+        tickets = [desk.ask(ADA, *question) for question in questions]
+        for ticket in tickets:
+            with pytest.raises(NotFoundError, match="nothing was identified"):
+                ticket.answer(60.0)
+    assert [ticket.number for ticket in tickets] == [1, 2]
+    tickets[0].asked_at -= desk_module.REFUSAL_STANDS_S + 5.0
+    third = desk.ask(ADA, *questions[0])
+    assert third.number == 3
+    third.future.exception(60.0)
+    asker.refuses = False
+    asker.freshness.wrote(None)
+    assert desk.ask(ADA, *questions[1]).answer(60.0) == 1
+
+
+def test_a_fault_is_no_refusal_and_is_asked_anew(asked: tuple[Desk, _Asked]) -> None:
+    desk, asker = asked
+    asker.go.set()
+    for fault in (BusyError("another process writes"), ZeroDivisionError("a fault of the software")):
+        asker.fault = fault
+        ticket = desk.ask(ADA, "compare", {"campaign": "c"})
+        with pytest.raises(type(fault), match=str(fault)):
+            ticket.answer(60.0)
+        asker.fault = None
+        again = desk.ask(ADA, "compare", {"campaign": "c"})
+        assert again is not ticket
+        assert again.answer(60.0)
+        asker.freshness.wrote(None)
 
 
 def test_the_trend_that_somebody_looks_at_does_not_wait_behind_long_questions(

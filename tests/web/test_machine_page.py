@@ -5,12 +5,23 @@ from __future__ import annotations
 import html
 import json
 import re
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
 from typing import Any
 
+import pytest
+
 from monitor.documents import from_document, to_document
+from monitor.store import Database, list_runs
+from monitor.web.charts.trend import trend_chart
 from monitor.web.pages.machine import _ends, _within
+from monitor.workflow.events import EventRequest, event
 from monitor.workflow.history.values import ValuesAnswer
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from tests.web.test_pages import looked_at
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def test_the_table_of_all_parameters_is_computed_for_whoever_scrolls_to_it(local: Any) -> None:
@@ -62,3 +73,53 @@ def values_of_page(local: Any, since: str, until: str) -> Any:
     return json.loads(
         json.dumps(to_document(_within(from_document(ValuesAnswer, whole), **_ends(since, until))))
     )
+
+
+@pytest.fixture(scope="module")
+def crashed(tmp_path_factory: pytest.TempPathFactory, serve: Any) -> tuple[Any, datetime]:
+    """A server of five days, and when something was noted: between two runs of one day by the shop's clock."""
+    path = tmp_path_factory.mktemp("crashed") / "monitor.duckdb"
+    with Database(path, threads=1) as db:
+        import_folders(db, ImportRequest([EXAMPLES / "five-days"]))
+        starts = [run.started_at_local for run in list_runs(db, "five-days") if run.day == 4]
+        at = starts[1] + (starts[2] - starts[1]) / 2
+        shop = timezone(timedelta(hours=-5))
+        event(
+            db,
+            EventRequest(
+                "HU40-T", "hit the vice", (starts[0] - timedelta(hours=1)).replace(tzinfo=shop), "crash"
+            ),
+        )
+        event(db, EventRequest("HU40-T", "looked at it", at.replace(tzinfo=shop), "note"))
+    return serve(path, False), at
+
+
+def test_an_event_is_drawn_between_the_runs_that_it_lay_between(crashed: tuple[Any, datetime]) -> None:
+    """Runs were drawn by the clock of the shop (-05:00) and events by UTC: five hours late, behind the last run."""
+    served, at = crashed
+    text = looked_at(served, "/machine?name=HU40-T&parameter=EB0C")
+    chart = json.loads(html.unescape(re.findall(r'class="figure">(.*?)</script>', text, re.DOTALL)[0]))
+    upright = [shape for shape in chart["layout"]["shapes"] if shape.get("yref") == "paper"]
+    drawn = [datetime.fromisoformat(shape["x0"]) for shape in upright if shape["line"]["dash"] == "dash"]
+    assert [moment.replace(tzinfo=None) for moment in drawn][1:] == [at]
+    runs = sorted(time for trace in chart["data"] if trace["name"] == "five-days" for time in trace["x"])
+    before = sum(datetime.fromisoformat(time).replace(tzinfo=None) < at for time in runs)
+    assert before == 14  # twelve of three days, two of the fourth
+
+
+def test_a_step_at_an_event_is_told_where_changes_are(crashed: tuple[Any, datetime]) -> None:
+    text = looked_at(crashed[0], "/machine?name=HU40-T&parameter=EB0C")
+    changes = re.search(r"<dt>Changes</dt><dd>(.*?)</dd>", text, re.DOTALL)
+    assert changes is not None
+    assert "the crash of 2026-03-05" in changes[1]
+    assert "none found" not in changes[1]
+
+
+def test_colours_that_come_twice_have_no_legend(local: Any) -> None:
+    _, whole = local.ask("values", {"machine": "HU40-T"})
+    values = from_document(ValuesAnswer, whole)
+    days = trend_chart(values, "EXX", None, "day")
+    assert {trace["showlegend"] for trace in days.traces if "error_y" in trace} == {True}
+    many = replace(values, campaign=tuple(f"campaign {row}" for row in range(len(values.run))))
+    shown = trend_chart(many, "EXX", None, "campaign")
+    assert {trace["showlegend"] for trace in shown.traces if "error_y" in trace} == {False}

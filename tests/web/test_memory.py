@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import gc
+import tracemalloc
 import weakref
+from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from monitor.cli import garbage
 from monitor.cli.verbs import serve_
-from monitor.web import server
+from monitor.store import held_bytes, recalling
+from monitor.web import desk as desk_module, freshness as freshness_module, server
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
 from monitor.web.users import Role, User
+from monitor.workflow.fleet.answer import FleetTableRow
 
 ANYBODY = User("somebody", Role.APPROVER)
 
@@ -84,3 +90,81 @@ def test_a_server_looks_for_cycles_as_often_as_python_does(
     finally:
         gc.set_threshold(*usual)
     assert served == [usual]
+
+
+def test_answers_are_held_within_a_number_of_bytes_and_the_latest_always(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(freshness_module, "_MOST_BYTES", 5_000_000)
+    freshness = Freshness()
+    for number in range(20):
+        key, _ = freshness.recall("values", {"machine": f"MILL-{number}"})
+        freshness.remember(key, (np.zeros(250_000),))
+    assert [machine for _, machine in freshness._answers] == [f'{{"machine": "MILL-{n}"}}' for n in (18, 19)]
+    # In place of the same one before, and larger than all that may be held.
+    for _ in range(3):
+        freshness.remember(freshness.recall("values", {"machine": "MILL-19"})[0], (np.zeros(1_000_000),))
+    assert len(freshness._answers) == 1
+    assert freshness.recall("values", {"machine": "MILL-19"})[1] is not None
+    assert freshness._bytes == pytest.approx(8e6, rel=0.01)
+
+
+class AnsweringMuch(Answering):
+    def __call__(self, *_: object) -> Any:
+        return (np.zeros(250_000),)
+
+
+def test_the_answers_of_a_desk_are_held_within_a_number_of_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desk_module, "MOST_BYTES", 7_000_000)
+    desk = Desk(AnsweringMuch())  # type: ignore[arg-type]
+    for number in range(12):
+        desk.ask(ANYBODY, "trend", {"machine": f"MILL-{number}"}).future.result()
+        if number == 5:
+            # Those of before a write go first.
+            desk.asker.freshness.wrote(None)
+    desk.close()
+    kept = {id(ticket): ticket for ticket in (*desk._tickets.values(), *desk._answered_last.values())}
+    assert sorted(ticket.document["machine"] for ticket in kept.values()) == ["MILL-10", "MILL-11", "MILL-9"]
+    assert desk.standing("trend", {"machine": "MILL-11"}) is not None
+    assert desk.answered_last("trend", {"machine": "MILL-11"}) is not None
+
+
+def test_what_is_recalled_of_a_file_is_held_within_a_number_of_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recalling, "MOST_BYTES", 5_000_000)
+    recalled = recalling.Recalled()
+    for number in range(10):
+        recalled.answer(number, lambda: np.zeros(250_000))
+    assert list(recalled._entries) == [8, 9]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: tuple(
+            FleetTableRow(**{entry.name: f"{entry.name} {number}" for entry in fields(FleetTableRow)})
+            for number in range(3000)
+        ),
+        lambda: {f"machine {n}": [f"EXX {n}", float(n), bytes(bytearray(100))] for n in range(20_000)},
+        lambda: [np.arange(float(n)) for n in range(1, 1000)],
+    ],
+)
+def test_the_bytes_of_an_answer_are_those_that_python_takes_for_it(make: Callable[[], Any]) -> None:
+    assert held_bytes(make()) == pytest.approx(allocated(make), rel=0.2)
+
+
+def test_what_parts_of_an_answer_share_is_counted_once() -> None:
+    shared = np.zeros(1000)
+    assert held_bytes((shared, {"again": shared})) == pytest.approx(8000, rel=0.1)
+
+
+def allocated(make: Callable[[], Any]) -> int:
+    """Return how many bytes Python allocates for what is made, by ``tracemalloc``."""
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        made = make()
+        taken = tracemalloc.get_traced_memory()[0] - before
+        assert made
+        return taken
+    finally:
+        tracemalloc.stop()

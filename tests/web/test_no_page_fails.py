@@ -20,8 +20,10 @@ from monitor.workflow.intake.importing import ImportRequest, import_folders
 from tests.benchmarks.test_fleet import generate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-#: Campaigns of several methods; of samba the tests beside this one ask. A tracked robot and pins take minutes.
-BY_METHOD = ("r-test", "four-instruments", "l-shape", "tilting-table-compensated")
+#: Campaigns of every method of machines; of samba the tests beside this one ask.
+BY_METHOD = (
+    "r-test", "four-instruments", "l-shape", "tilting-table-compensated", "tracked-robot", "free-form-pins",
+)  # fmt: skip
 NASTY = ("none", "9" * 30, "\0", "", "9999-12-31", "<b>'\"%")
 #: What an address or a form needs beside campaign and machine to get as far as it can.
 USUAL = {

@@ -16,7 +16,7 @@ import pypdf
 import pytest
 
 from monitor.cli import main
-from monitor.exceptions import InputError, RefusedResultError
+from monitor.exceptions import DataError, InputError, RefusedResultError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import doubts, read_campaign
@@ -30,6 +30,8 @@ from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.results import _lacking
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES, _units
@@ -362,3 +364,47 @@ def test_a_joint_region_that_is_refused_says_how_many_runs_would_do(degrees: dic
     # One more than the parameters is what an ellipsoid needs, as the factor itself says.
     assert np.isinf(ellipsoid_factor(13, 0.95, 12.0))
     assert np.isfinite(ellipsoid_factor(13, 0.95, 14.0))
+
+
+def moved(campaign: Campaign, change) -> Campaign:
+    """The campaign with other positions of its axes."""
+    probings = campaign.probings
+    return replace(campaign, probings=replace(probings, readings=change(dict(probings.readings))))
+
+
+@pytest.mark.parametrize(
+    ("change", "apart"),
+    [
+        # The sphere of the file stands at (80, 0, 60). Read with the other sign it seems to stand on a circle about an
+        # axis that was not turned; with X and Y exchanged a quarter of a turn away.
+        (lambda read: {**read, "X": -read["X"]}, 40.0),
+        (lambda read: {**read, "X": read["Y"], "Y": read["X"]}, 80.0),
+    ],
+)
+def test_a_work_point_that_the_readings_put_elsewhere(change, apart: float) -> None:
+    campaign = read_campaign(EXAMPLES / "r-test")
+    assert grounds(campaign, 1) == ()
+    (ground,) = grounds(moved(campaign, change), 1)
+    assert (ground.kind, ground.subject, ground.limit) == (GroundKind.WORK_POINT, "r-test", 5.0)
+    assert ground.size == pytest.approx(apart, abs=2.0)
+    assert "werkstückseitige Punkt der Aufstellung r-test" in ground_sentence(ground, texts_of("de"))
+    with Database(":memory:") as db:
+        import_campaign(db, moved(campaign, change))
+        (run,) = identify(db, IdentifyRequest("r-test")).runs
+    assert f"the work point of setup r-test comes out {ground.size:.3g} mm from its work_point_mm" in run.note
+    # One that is stated nowhere may stand anywhere.
+    (setup,) = campaign.artefact.setups
+    unstated = replace(
+        campaign, artefact=replace(campaign.artefact, setups=(replace(setup, work_point=(0, 0, 0)),))
+    )
+    assert GroundKind.WORK_POINT not in {ground.kind for ground in grounds(unstated, 1)}
+
+
+@pytest.mark.parametrize(("axes", "said"), [("XYZ", "x_mm, y_mm and z_mm were"), ("Z", "z_mm was")])
+def test_positions_in_inches_are_refused_by_the_work_point(axes: str, said: str) -> None:
+    campaign = read_campaign(EXAMPLES / "r-test")
+    inches = moved(campaign, lambda read: {name: x / 25.4 if name in axes else x for name, x in read.items()})
+    with Database(":memory:") as db:
+        import_campaign(db, inches)
+        with pytest.raises(DataError, match=f"if {said} in inches; positions are in mm$"):
+            identify(db, IdentifyRequest("r-test"))

@@ -15,7 +15,9 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.likeness import Likeness
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
-from monitor.workflow.likeness import Drift, LikeRequest, Step, simulate_like
+from monitor.workflow.likeness import Drift, LikeAnswer, LikeRequest, Step, simulate_like
+from monitor.workflow.sight import effect_sight
+from monitor.workflow.simulation import SimulateRequest, simulate
 from monitor.workflow.true_values import is_truth
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -151,6 +153,48 @@ def test_a_jump_at_reversal_is_hidden_and_estimated_with_its_size(name: str, eff
     standard_uncertainty = np.sqrt(np.diag(fitted.common_covariance))
     assert np.all(np.abs(fitted.common - common) < 4.5 * standard_uncertainty)
     assert np.all(fitted.common > 0.5 * common)
+
+
+@pytest.mark.parametrize(
+    ("name", "effect"),
+    [("tilting-table", "EXX:reversal"), ("r-test", "EXX:reversal"), ("laser", "EBX:reversal")],
+)
+def test_what_a_plan_shows_of_an_effect_is_its_size_over_its_standard_uncertainty(
+    name: str, effect: str
+) -> None:
+    """Two ways: what is left of its column beside all unknowns, and the covariance of the fit that has it."""
+    pattern = read_campaign(EXAMPLES / name)
+    likeness = Likeness(pattern, campaign_method(pattern))
+    hidden, common = likeness.hidden(effect, 8e-3)
+    fitted = solve_problem(hidden)
+    assert fitted.common_covariance.shape == (1, 1)
+    shown = float(common[0] / np.sqrt(fitted.common_covariance[0, 0]))
+    sight = effect_sight(likeness.problem, effect, 8e-3)
+    assert sight.standard_deviations == pytest.approx(shown, rel=2e-3)
+    assert sight.certain_from_um == pytest.approx(8.0 * 5.0 / shown, rel=2e-3)
+
+
+def test_a_hidden_effect_that_the_plan_cannot_see_is_called_so(tmp_path: Path) -> None:
+    like = str(EXAMPLES / "tilting-table")
+
+    def hidden(out: str, effect: str, peak: float) -> LikeAnswer:
+        request = LikeRequest(tmp_path / out, like, ("A",), START, months=1, effect=effect, peak_um=peak)
+        return simulate_like(request)
+
+    blind = hidden("blind", "EZZ:reversal", 8.0)
+    assert blind.sight is not None
+    assert (blind.sight.standard_deviations, blind.sight.certain_from_um) == (0.0, None)
+    assert "; this plan cannot see EZZ:reversal: the errors that it identifies take up all" in blind.message
+    weak = hidden("weak", "EXX:reversal", 0.1)
+    assert weak.message.endswith("from a peak of 0.41 µm on it sees that something is missing")
+    seen = hidden("seen", "EXX:reversal", 8.0)
+    assert seen.message.endswith("; truth.csv has the true values")
+    assert seen.sight is not None
+    assert seen.sight.is_certain
+    demo = simulate(SimulateRequest(tmp_path / "demo", effect="EXX:reversal", peak_um=0.1))
+    assert "; this plan shows EXX:reversal by 1.8 standard deviations of its readings" in demo.message
+    nothing = simulate(SimulateRequest(tmp_path / "nothing"))
+    assert nothing.sight is None
 
 
 def test_a_mount_may_be_off_by_minutes_of_arc() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.store import Database
+from monitor.store import Database, save_analysis
 from monitor.store.events import record_event
 from monitor.workflow.fleet.attention import Attention, Onset
 from monitor.workflow.fleet.fleet import fleet
@@ -80,6 +80,32 @@ def test_a_step_without_an_event_is_dated_by_the_split_that_explains_most(db: Da
     means = np.array(levels)
     explained = [np.ptp([means[:k].mean(), means[k:].mean()]) ** 2 * k * (14 - k) for k in range(1, 14)]
     assert row.onset == began[1 + int(np.argmax(explained))].isoformat() == began[9].isoformat()
+
+
+@pytest.mark.parametrize(
+    ("worst", "is_what", "number"),
+    [
+        ((30.0, 70.0, 40.0, 65.0, 80.0), Onset.MAPPED, 3),
+        ((70.0, 40.0), Onset.LAST_MAP, 1),
+        ((), None, None),
+    ],
+)
+def test_a_volumetric_error_has_the_date_of_the_maps_that_judge_it(
+    db: Database, worst: tuple[float, ...], is_what: Onset | None, number: int | None
+) -> None:
+    """Beyond since the first of the maps that are beyond without a break; runs without a map are passed over."""
+    began = _fill(db, "mapped", [1.0] * 6)
+    db.execute('UPDATE imported_campaign SET machine_description = \'{"tolerances": {"volumetric": 60.0}}\'')
+    for week, error in enumerate(worst):
+        # The run was mapped before, by a model that was wrong: the map that was stored last counts.
+        for um in (500.0 - error, error):
+            document = {"worst": {"error_um": um}}
+            save_analysis(db, "volumetric map", document, method="guf", campaign=f"mapped-{week}", run=1)
+    row = next(row for row in fleet(db, FleetRequest(None, 0)).table if row.parameter == "volumetric error")
+    assert row.onset_is is is_what
+    assert row.onset == (None if number is None else began[number].isoformat())
+    assert row.latest_at == (began[len(worst) - 1].isoformat() if worst else None)
+    assert row.latest == (worst[-1] if worst else None)
 
 
 def test_what_is_as_usual_holds_since_the_last_event_or_the_first_run(db: Database) -> None:

@@ -40,11 +40,12 @@ NONE = Separation((), 0.0, 0.0)
 def test_what_breaks_a_tie(
     effect: str, separation: Separation, rivals: tuple[str, ...], ties: tuple[Tie, ...]
 ) -> None:
-    assert ties_of(SimpleNamespace(effect=effect, separation=separation), rivals, is_touched=True) == ties
+    found = SimpleNamespace(effect=effect, separation=separation, within_runs=False)
+    assert ties_of(found, rivals, is_touched=True) == ties
 
 
 def test_poses_that_something_outside_sees_have_no_plan_of_touches() -> None:
     """`monitor plan` refuses such a campaign: what it would be told for is more poses."""
-    effect = SimpleNamespace(effect="EBJ2:compliance@gravity", separation=NONE)
+    effect = SimpleNamespace(effect="EBJ2:compliance@gravity", separation=NONE, within_runs=False)
     ties = ties_of(effect, ("EBJ1:compliance@gravity",), is_touched=False)
     assert ties == (Tie(("EBJ1:compliance@gravity",), TieBreak.MORE_POSES, (), ("J2", "J1")),)

@@ -130,6 +130,14 @@ class Fit:
     @cached_property
     def noise_design(self) -> NoiseDesign:
         """What the estimate of that correlation needs besides the residuals."""
+        return self._noise_design(shared=len(self.problem.runs) == 1)
+
+    @cached_property
+    def whole_noise_design(self) -> NoiseDesign:
+        """The same where what all runs share is noise too, as of one run."""
+        return self._noise_design(shared=True) if len(self.problem.runs) > 1 else self.noise_design
+
+    def _noise_design(self, shared: bool) -> NoiseDesign:
         rows = neighbours_of(self.problem, self.by_error)
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
@@ -137,7 +145,7 @@ class Fit:
         last = self.solution.last
         several = len(last.residual) > 1
         unknowns = last.local if several else np.concatenate([last.local, last.common], axis=2)
-        return NoiseDesign(rows, cells.astype(np.int64) - 1, eliminate(unknowns).basis)
+        return NoiseDesign(rows, cells.astype(np.int64) - 1, eliminate(unknowns).basis, shared)
 
     def with_correlation(self, correlation: Correlation | None) -> Fit:
         """The fit with the noise of neighbours correlated as said."""

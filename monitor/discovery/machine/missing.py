@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from monitor.discovery.machine.separation.separate import Separation, separating
 from monitor.discovery.machine.shapes.curves import Curve, curve_of
 from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.variants import part_of_period
+from monitor.discovery.machine.shapes.variants import each_run, part_of_period
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -25,7 +25,7 @@ from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
-from monitor.effects.drivers import EachRun
+from monitor.effects.drivers import Always, EachRun
 from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe
 from monitor.records import Array
@@ -46,7 +46,8 @@ class ChainMissing(Missing):
     ``travelled_periods`` of a harmonic are less than one where the axis did not turn through its period (else None);
     ``unit`` is that of ``amplitude`` where it is not that of the coefficients: the weights of many links are one angle,
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
-    shape.
+    shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
+    only what changes within runs shows it.
     """
 
     held_out_days_before: float | None
@@ -60,6 +61,7 @@ class ChainMissing(Missing):
     travelled_periods: float | None = None
     within_its_shape: tuple[str, ...] = ()
     unit: Unit | None = None
+    within_runs: bool = False
 
 
 @dataclass(frozen=True)
@@ -245,6 +247,7 @@ def _missing(
             scene.fit, effect, coefficients, [rival.effect for rival, _ in rivals], surroundings.strokes
         ),
         varies=isinstance(effect.driver, EachRun),
+        within_runs=_shows_within_runs_alone(scene, effect),
         travelled_periods=part_of_period(effect, scene.fit.problem.context),
         unit=unit,
         nearest=candidate.variant.nearest,
@@ -252,6 +255,14 @@ def _missing(
         if candidate.variant.nearest is None and not is_curve(candidate)
         else curve_of(scene.fit.problem.context, effect, coefficients, covariance),
     )
+
+
+def _shows_within_runs_alone(scene: ChainScene, effect: MachineEffect) -> bool:
+    """Whether nothing would be seen of an effect whose driver had one value in every run."""
+    if not isinstance(effect, ChainEffect) or isinstance(effect.driver, Always | EachRun):
+        return False
+    steady = each_run(replace(effect, driver=Always(), driver_text=""))
+    return steady is not None and not scene_of(scene.fit, [steady]).candidates[0].visible
 
 
 def _p_and_q(

@@ -21,6 +21,7 @@ from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEff
 from monitor.discovery.machine.search import search_chain
 from monitor.discovery.machine.shapes.refine import Refined, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.machine.suspects.suspects import (
     MOST_BAD_POINTS,
     SuspectNames,
@@ -29,8 +30,10 @@ from monitor.discovery.machine.suspects.suspects import (
     with_effects,
     with_scatter_of,
 )
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rounds import Turns, in_rounds
 from monitor.discovery.search.scan import MOST_EFFECTS
+from monitor.discovery.search.sign_flips import FEWEST
 from monitor.methods.chain.problem import ChainProblem
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
@@ -80,13 +83,14 @@ class ChainSearch:
         """Search until nothing changes, from a fit that leaves the ``gross`` readings out; beside the curves of joints
         one that leaves out the suspects so far."""
         latest, settled = self._settled(first, beside_curves, None)
-        # Of one run, effects may take up noise that walks, or noise an effect, and either stands under its own noise.
-        correlation = (
-            None if len(self.problem.runs) > 1 or beside_curves is not None else correlation_under(first)
-        )
-        if correlation is not None and latest.refined:
+        # Of few runs effects may take up noise that walks, or noise an effect, and either stands under its own noise.
+        few = beside_curves is None and len(self.problem.runs) <= FEWEST
+        correlation = correlation_under(first, shared=True) if few and latest.refined else None
+        if correlation is not None:
             other, other_settled = self._settled(first, beside_curves, correlation)
-            if self._cost(other) < self._cost(latest):
+            # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good.
+            margin = 2.0 * float(np.log((1.0 - self.rate) / self.rate))
+            if self._cost(first, other) < self._cost(first, latest) + margin:
                 latest, settled = other, other_settled
         reached = {
             Limit.EFFECTS: len(latest.refined)
@@ -99,22 +103,32 @@ class ChainSearch:
     def _settled(
         self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None
     ) -> tuple[ChainRound, bool]:
-        """What stands in the end, from noise of so correlated neighbours on, and whether it settled."""
+        """What stands in the end, and whether it settled: from noise of so correlated neighbours on, to which belongs
+        what runs share as long as no effect explains it, or from white noise and what runs do not share."""
         rounds = _Rounds(self, first, beside_curves, correlation)
         latest, settled = in_rounds(rounds, MOST_ROUNDS)
         if not settled:
             latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
         return latest, settled
 
-    def _cost(self, latest: ChainRound) -> float:
-        """Minus twice the logarithm of the restricted likelihood of what was found, with Schwarz's price of what it has
-        free, that of each choice among all families, and of every reading left out."""
-        under, families = latest.under, len({variant.family for variant in self.variants})
+    def _cost(self, first: Fit, latest: ChainRound) -> float:
+        """Minus twice the logarithm of the likelihood of what was found in what the unknowns of ``first`` leave, with
+        Schwarz's price of what it has free beyond that, and that of each choice among all families, values and parts.
+
+        A reading that is left out is one with an offset of its own.
+        """
+        under, design = latest.under, first.whole_noise_design
         correlation = None if under.whitening is None else under.whitening.correlation
-        left_out = int(under.left_out.sum()) * self.problem.sigma.shape[1]
-        free = under.nuisance.basis.shape[2] + left_out + 2 * (correlation is not None)
-        price = free * np.log(under.readings + left_out) + 2.0 * len(latest.refined) * np.log(families)
-        return under.noise_design.deviance(under.solution.last.residual, correlation) + float(price)
+        rest = without(orthonormal(under.nuisance.shared), under.white.reshape(-1, 1))
+        free = first.degrees_of_freedom - under.degrees_of_freedom + 2 * (correlation is not None)
+        families = len({variant.family for variant in self.variants})
+        candidates = [finding.candidate for finding in latest.refined]
+        tries = [families * each.variant.tries * each.variant.odds for each in candidates]
+        price = free * np.log(design.contrasts) + 2.0 * np.sum(np.log(tries))
+        # Readings of a target that scatters are counted by less: in its own unit each is as likely.
+        units = 2.0 * np.sum(np.log((under.problem.sigma / first.problem.sigma)[under.has_weight]))
+        deviance = design.deviance(float(np.sum(rest**2)), correlation)
+        return deviance + float(price + units) + sum(map(price_of_parts, candidates))
 
 
 NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]
@@ -135,6 +149,7 @@ class _Rounds:
         # A ball that shakes hides effects and makes others; runs that do not share it show it before any is known.
         self.suspects = self.initial if self.beside_curves else self._with_scatter()
         self.correlation = correlation
+        self.shared = correlation is not None
         self.unfitted: dict[str, None] = {}
         self._noises: NoiseTurns = Turns()
         self._earlier: Turns[SuspectNames, ChainRound] = Turns()
@@ -162,7 +177,7 @@ class _Rounds:
             self.unfitted |= dict.fromkeys(current.unable)
             return None
         # What all runs share and what the effects explain is no noise of neighbours.
-        following = correlation_under(current.under)
+        following = correlation_under(current.under, self.shared)
         circle = self._noises.circle(self.correlation, current, following)
         if not circle:
             self.correlation = following
@@ -208,6 +223,10 @@ def most_cautious(
     return max(circle, key=lambda turn: caution(turn[0]))
 
 
-def correlation_under(under: Fit) -> Correlation | None:
-    """The correlation of neighbours under a model; None where readings share their poses and are counted by these."""
-    return under.correlation() if poses_of_rows(under) is None else None
+def correlation_under(under: Fit, shared: bool = False) -> Correlation | None:
+    """The correlation of neighbours under a model, of what runs do not share or of all of it; None where readings share
+    their poses and are counted by these."""
+    if poses_of_rows(under) is not None:
+        return None
+    design = under.whole_noise_design if shared else under.noise_design
+    return design.correlation(under.solution.last.residual)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.methods.chain.gross import GrossReading
+from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.shared_effects import FollowedEffects
 from monitor.records import Array
 from monitor.refusal import Refusal
@@ -20,7 +21,8 @@ class RunIdentification:
 
     ``unknowns`` maps every other unknown of the run (ball coordinates, stylus tip) to its value in mm.
     ``residuals`` (m, 3) mm from target to tip in the frame of the last work axis, one row a probing.
-    ``chi_square`` is the sum of the squared weighted residuals, ``degrees_of_freedom`` its expectation.
+    ``chi_square`` is the sum of the squared weighted residuals, ``degrees_of_freedom`` its expectation. ``displaced``
+    are stated points that the readings put elsewhere.
     """
 
     run: int
@@ -32,6 +34,7 @@ class RunIdentification:
     rms: float
     chi_square: float
     degrees_of_freedom: int
+    displaced: tuple[Displaced, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,14 @@ LARGEST_ANGLE = 1e-3
 
 
 @dataclass(frozen=True)
+class Displaced:
+    """A point of a ``setup`` that the readings put ``distance`` mm from where the file states it."""
+
+    setup: str
+    distance: float
+
+
+@dataclass(frozen=True)
 class MeasuredChain(ABC):
     """Readings on a chain: n rows, R runs, d numbers a row.
 
@@ -207,6 +215,10 @@ class MeasuredChain(ABC):
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""
         return None
+
+    def displaced(self, local: Array) -> tuple[Displaced, ...]:
+        """Stated points that the unknowns (p,) of a run put elsewhere by more than people misstate them."""
+        return ()
 
     @property
     def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:

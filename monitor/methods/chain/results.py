@@ -83,6 +83,7 @@ def identification(
                 rms=float(np.sqrt(np.mean(residuals**2))),
                 chi_square=float(weighted @ weighted),
                 degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[index]),
+                displaced=problem.displaced(solution.local[index]),
             )
         )
     shared = shared_parameters(problem, solution)

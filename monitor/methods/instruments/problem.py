@@ -15,9 +15,10 @@ from monitor.effects.catalogue import of_drives, of_instruments, of_sight
 from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
+from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
-from monitor.methods.instruments.contradiction import wrong_direction, wrong_length
+from monitor.methods.instruments.contradiction import contradiction, displaced_work_points
 from monitor.methods.instruments.first_guess import guess_with_lines, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
@@ -435,10 +436,14 @@ class InstrumentProblem(ChainProblem):
         whole = np.array([np.count_nonzero(self.context.run == number) for number in self.runs])
         return self._separated[copied] if np.array_equal(counts, whole[copied]) else None
 
+    def displaced(self, local: Array) -> tuple[Displaced, ...]:
+        """Work points that the unknowns (p,) of a run put elsewhere than stated."""
+        first = len(self.base_names)
+        unknowns = (local[first + columns] for columns in self.own_columns)
+        return tuple(displaced_work_points(self.parts, unknowns))
+
     def contradiction(self, solution: Solution) -> str | None:
-        """Directions that are off by more than any mount's errors, lengths by more than a part of the travel."""
+        """Positions in another unit, directions and lengths that are off by more than any machine's errors."""
         vectors = self.vectors(solution.local, solution.common)
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        return wrong_length(self.parts, self.sigma, vectors, travel) or wrong_direction(
-            self.parts, self.sigma, vectors
-        )
+        return contradiction(self.parts, self.sigma, vectors, travel)

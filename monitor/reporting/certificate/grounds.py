@@ -23,11 +23,12 @@ class GroundKind(StrEnum):
     SCALE_BAR = "scale-bar"
     TEMPERATURE = "temperature"
     UNITS = "units"
+    WORK_POINT = "work-point"
 
 
 @dataclass(frozen=True)
 class Ground:
-    """One ground: of a ``run`` and a ``subject`` (a parameter, a reading, a bar), a ``size`` beyond its ``limit``.
+    """One ground: of a ``run`` and a ``subject`` (parameter, reading, bar, setup), a ``size`` beyond its ``limit``.
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
     them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and

@@ -12,7 +12,7 @@ import threading
 import unicodedata
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from functools import cache
 from io import BytesIO
@@ -97,12 +97,17 @@ def pdf_of(
             for file in attached
         ]
 
+    font_folders = ExitStack()
+
     def laid_out(text: str) -> Document:
         source = HTML(string=text, url_fetcher=_OwnFonts(extra_fonts), base_url="about:blank")
-        return source.render(font_config=FontConfiguration(), **options)
+        fonts = FontConfiguration()
+        # It removes its folder of temporary files when Python takes it apart, which a verb does not wait for.
+        font_folders.callback(fonts.__del__)
+        return source.render(font_config=fonts, **options)
 
     try:
-        with _reproducible(moment), _uncollected():
+        with _reproducible(moment), _uncollected(), font_folders:
             document = _filled(html, closer, laid_out)
             pages = len(document.pages)
             pdf = bytes(

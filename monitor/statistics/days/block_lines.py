@@ -46,6 +46,9 @@ ENDS_BEFORE = 1.2
 FEWEST_BESIDE_WAVE = 6
 #: A column that the others explain but for this share of its length is no column.
 DEPENDENT = 1e-6
+#: Means that differ by less than this share of their level do not differ: rounding leaves as much of sums of some
+#: hundred doubles. Where a campaign was imported again under other names, all days are equal but for it.
+ROUNDING = 2.0**-44
 #: Series done at a time: their blocks are held at once.
 CHUNK = 20_000
 
@@ -55,7 +58,8 @@ class Blocks:
     """Series cut into blocks, a row each: ``weight`` (c, b) is 0 where a series has nothing in a block.
 
     ``time`` and ``value`` (c, b) are weighted means of the days of a block, ``days`` (c,) the days of each series;
-    ``beside`` (c, b, e) holds columns that are fitted beside the line, such as the temperature.
+    ``beside`` (c, b, e) holds columns that are fitted beside the line, such as the temperature. ``origin`` (c,) is what
+    was taken from the values before; None for nothing.
     """
 
     weight: Array
@@ -63,11 +67,13 @@ class Blocks:
     value: Array
     days: Array
     beside: Array | None = None
+    origin: Array | None = None
 
-    def part(self, rows: slice) -> Blocks:
+    def part(self, rows: slice | Array) -> Blocks:
         """Some of the series."""
         beside = None if self.beside is None else self.beside[rows]
-        return Blocks(self.weight[rows], self.time[rows], self.value[rows], self.days[rows], beside)
+        origin = None if self.origin is None else self.origin[rows]
+        return Blocks(self.weight[rows], self.time[rows], self.value[rows], self.days[rows], beside, origin)
 
 
 class AgainstSeason(NamedTuple):
@@ -313,7 +319,7 @@ def _packed(blocks: Blocks) -> Blocks:
         beside = np.take_along_axis(
             np.where(empty[:, :, np.newaxis], 0.0, beside), order[:, :, np.newaxis], axis=1
         )
-    return Blocks(weight, time, value, blocks.days, beside)
+    return Blocks(weight, time, value, blocks.days, beside, blocks.origin)
 
 
 def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
@@ -356,7 +362,7 @@ def _against_season(
     open_ = ~cyclic & ~is_beside & (span < share * cycle)
     t, dof, bend = np.full(c, np.nan), np.full(c, np.nan), np.zeros(c)
     if open_.any():
-        some = Blocks(blocks.weight[open_], blocks.time[open_], blocks.value[open_], blocks.days[open_])
+        some = replace(blocks.part(open_), beside=None)
         at, away = _middle(some)
         phase = 2.0 * np.pi / cycle * away
         basis, shares = _orthonormal(
@@ -394,7 +400,10 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
     mean = np.einsum("cb,cb->c", blocks.weight, blocks.value) / np.where(
         design.ones > 0.0, design.ones**2, np.nan
     )
-    y = np.sqrt(blocks.weight) * np.where(blocks.weight > 0.0, blocks.value - mean[:, np.newaxis], 0.0)
+    away = np.where(blocks.weight > 0.0, blocks.value - mean[:, np.newaxis], 0.0)
+    level = np.abs(mean) + (0.0 if blocks.origin is None else np.abs(blocks.origin))
+    away[np.abs(away).max(axis=1) <= ROUNDING * level] = 0.0
+    y = np.sqrt(blocks.weight) * away
     along = np.einsum("cbq,cb->cq", basis, y)
     residual = y - np.einsum("cbq,cq->cb", basis, along)
     square = np.einsum("cb,cb->c", residual, residual)

@@ -39,7 +39,9 @@ def beside_season(slope: Array, u: Array, dof: Array, seasonal: AgainstSeason) -
     uncertainty says no more than beside the wave. The slope stays that of the history, season included.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        p_value = np.asarray(2.0 * scipy.special.stdtr(dof, -np.abs(slope / u)))
+        # Values that are all equal moved by nothing.
+        t = np.where((slope == 0.0) & (u == 0.0), 0.0, np.abs(slope / u))
+        p_value = np.asarray(2.0 * scipy.special.stdtr(dof, -t))
         wave_p = 2.0 * scipy.special.stdtr(seasonal.dof, -seasonal.t)
         season_p = np.where(np.isnan(wave_p), np.nan, np.fmax(p_value, wave_p))
         refuted = np.fmax(u, np.abs(slope) / seasonal.t)

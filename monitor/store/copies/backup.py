@@ -1,6 +1,6 @@
 """Full backups: a second file, compared with the first table by table, and a manifest beside it.
 
-A backup can be made while the database is in use by this process; it shows one moment.
+A backup can be made while the database is in use by this process; it shows one moment, copy and manifest alike.
 """
 
 from __future__ import annotations
@@ -35,10 +35,11 @@ def take_backup(db: Database, target: str | Path) -> Backup:
     """
     target = Path(target)
     with finished_copy(target) as partial:
-        with db.attached(partial, "backup_copy"):
+        with db.attached(partial, "backup_copy") as moment:
             begin_copy(db, partial)
             tables = copy_all(db)
-        return write_manifest(partial, target, tables, _span(db, tables))
+            span = _span(db, tables)
+        return write_manifest(partial, target, tables, span, moment)
 
 
 @contextmanager

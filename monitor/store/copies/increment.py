@@ -39,22 +39,23 @@ def take_increment(db: Database, target: str | Path) -> Backup:
     previous = _previous(db, target.absolute().parent)
     before = previous.span
     assert before is not None
-    database, last, last_sha256, schema = audit_ends(db)
     refuse_existing(target)
-    if last == before.last_entry:
-        _compare_counts(db, before.totals, previous.path)
-        return note_current(target.with_name(previous.path), previous)
+    with db.snapshot() as moment:
+        if audit_ends(db)[1] == before.last_entry:
+            _compare_counts(db, before.totals, previous.path)
+            return note_current(target.with_name(previous.path), previous, moment)
     with finished_copy(target) as partial:
-        with db.attached(partial, "increment"):
+        with db.attached(partial, "increment") as moment:
             begin_copy(db, partial)
+            database, last, last_sha256, schema = audit_ends(db)
             _copy_rows(db, before)
             tables = checksums(db, "increment")
-        totals = _totals(before.totals, tables, previous.duckdb_version)
-        _compare_counts(db, totals, previous.path)
+            totals = _totals(before.totals, tables, previous.duckdb_version)
+            _compare_counts(db, totals, previous.path)
         span = Span(
             database, before.last_entry + 1, last, last_sha256, schema, totals, previous.path, previous.sha256
         )
-        return write_manifest(partial, target, tables, span)
+        return write_manifest(partial, target, tables, span, moment)
 
 
 def _copy_rows(db: Database, before: Span) -> None:

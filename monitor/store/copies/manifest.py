@@ -8,13 +8,13 @@ import os
 import stat
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 import duckdb
 
 from monitor import __version__
 from monitor.exceptions import StoreError
-from monitor.store.connection import utc_now
 from monitor.store.kept_blocks import ENDING
 from monitor.store.opening import sync_folder
 
@@ -47,7 +47,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Backup:
-    """A backup: its file and hash, when it was made (UTC), and rows and checksum of every table in the file.
+    """A backup: its file and hash, the moment that it shows (UTC), and rows and checksum of every table in the file.
 
     The checksum is DuckDB's own hash, summed over the rows; it compares tables within ``duckdb_version`` only. ``span``
     is None where version 0.2.0 or an earlier one made it. ``current_at`` is when an incremental backup last had nothing
@@ -69,12 +69,15 @@ class Backup:
         return self.current_at or self.made_at
 
 
-def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -> Backup:
-    """Return the manifest of a file that is to be named ``target``, written beside it and synchronised with it."""
+def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span, moment: datetime) -> Backup:
+    """Return the manifest of a file that is to be named ``target``, written beside it and synchronised with it.
+
+    ``moment`` (UTC) is that of the database which the file shows.
+    """
     backup = Backup(
         target.name,
         file_sha256(partial),
-        utc_now().isoformat(),
+        moment.isoformat(),
         __version__,
         duckdb.__version__,
         tables,
@@ -85,10 +88,10 @@ def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -
     return backup
 
 
-def note_current(path: Path, backup: Backup) -> Backup:
-    """Write into the manifest of a backup that it holds everything until now. Raises StoreError."""
+def note_current(path: Path, backup: Backup, moment: datetime) -> Backup:
+    """Write into the manifest of a backup that it holds everything until a moment (UTC). Raises StoreError."""
     partial = path.with_name(path.name + ".partial")
-    renewed = replace(backup, current_at=utc_now().isoformat())
+    renewed = replace(backup, current_at=moment.isoformat())
     try:
         manifest_of(partial).unlink(missing_ok=True)
         _write(renewed, partial, stat.S_IMODE(os.stat(path).st_mode))

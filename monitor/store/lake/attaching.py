@@ -16,6 +16,7 @@ import duckdb
 
 from monitor.exceptions import InputError, StoreError
 from monitor.store.kept_blocks import has_torn_blocks, settle_blocks
+from monitor.store.opening import show_no_progress
 
 #: Under which name a lake is attached.
 LAKE = "lake"
@@ -63,7 +64,7 @@ def connection_with_extensions(threads: int | None = None) -> duckdb.DuckDBPyCon
         config["threads"] = str(threads)
     paths = [_extension(name, module) for name, module in _EXTENSIONS.items()]
     connection = duckdb.connect(":memory:", config=config)
-    connection.execute("SET enable_progress_bar = false")
+    show_no_progress(connection)
     for path in paths:
         connection.execute(f"LOAD {literal(str(path))}")
     return connection

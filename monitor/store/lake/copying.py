@@ -13,7 +13,7 @@ from monitor.store.entries import rows_recorded
 from monitor.store.lake.attaching import LAKE, literal
 from monitor.store.lake.schema import LARGEST_OWN, OWN_BITS
 from monitor.store.opening import busy
-from monitor.store.turns import Holder, Patience, holder_in, writer_at_work
+from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, writer_at_work
 
 _NUMBERED = frozenset(
     ("analysis_id", "campaign_id", "choice_id", "event_id", "identification_id", "refusal_id", "registration",
@@ -39,17 +39,18 @@ def attach_origin(connection: duckdb.DuckDBPyConnection, path: str, patience: Pa
     def last_holder() -> Holder | None:
         return holder
 
-    for _ in patience.tries(last_holder):
-        holder = writer_at_work(path)
-        if holder is not None:
-            continue
-        try:
-            connection.execute(f"ATTACH {literal(path)} AS origin (READ_ONLY)")
-            return
-        except duckdb.Error as fault:
-            holder = holder_in(str(fault))
+    with ticket_to_read(path) as ticket:
+        for _ in patience.tries(last_holder):
+            holder = writer_at_work(path)
             if holder is None:
-                raise
+                try:
+                    connection.execute(f"ATTACH {literal(path)} AS origin (READ_ONLY)")
+                    return
+                except duckdb.Error as fault:
+                    holder = holder_in(str(fault))
+                    if holder is None:
+                        raise
+            ticket.take()
     raise busy(path, holder, patience)
 
 

@@ -61,6 +61,12 @@ class LakeDatabase(Database):
         return session
 
     @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Show the lake of the moment at which it was opened, as every question does."""
+        with self._lock:
+            yield
+
+    @contextmanager
     def transaction(self) -> Iterator[None]:
         """Raise StoreError: nothing is written to a lake but by publication."""
         raise StoreError(

@@ -132,6 +132,11 @@ def _regions(
     centre, spread = np.array(estimate), np.array(u)
     root = np.array([[u[0], 0.0], [correlation * u[1], math.sqrt(max(1.0 - correlation**2, 0.0)) * u[1]]])
     angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE)
+    # Drawn with room around: a line at the edge of the axes is cut in half.
+    reach = 1.08 * max(max(region.k_p, region.k_q) for region in regions) * spread
+    for trials in (np.array([cloud["x"], cloud["y"]]) for cloud in drawn):
+        reach = np.maximum(reach, 1.02 * np.abs(trials - centre[:, None]).max(axis=1))
+    ends = [[float(middle - far), float(middle + far)] for middle, far in zip(centre, reach, strict=True)]
     traces = list(drawn)
     for number, region in enumerate(regions):
         outline = centre[:, None] + region.k_p * root @ np.array([np.cos(angle), np.sin(angle)])
@@ -163,6 +168,9 @@ def _regions(
         says=f"{names[0]} and {names[1]} {of}: ellipse with k_p = {first.k_p:.2f}, rectangle with k_q = "
         f"{first.k_q:.2f}, which hold {first.holds}",
         traces=traces,
-        layout={"xaxis": axis(f"{names[0]} / {units[0]}"), "yaxis": axis(f"{names[1]} / {units[1]}")},
+        layout={
+            "xaxis": axis(f"{names[0]} / {units[0]}", range=ends[0]),
+            "yaxis": axis(f"{names[1]} / {units[1]}", range=ends[1]),
+        },
         height=480,
     )

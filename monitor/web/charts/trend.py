@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from monitor.web.charts.chart import DASHES, Chart, Trace, axis, look
+from monitor.web.charts.chart import DASHES, SERIES, Chart, Trace, axis, look
 from monitor.web.words import channel, number
 
 if TYPE_CHECKING:
@@ -27,18 +28,20 @@ def trend_chart(
     shapes, notes = _tolerance(series.tolerance, series.unit)
     statement = None if trend is None else trend.parameters.get(parameter)
     if trend is not None:
-        events = [(event.at, f"{event.kind}: {event.description}") for event in trend.events]
+        events = [
+            (_shop_time(values, event.at), f"{event.kind}: {event.description}") for event in trend.events
+        ]
         shapes += [_upright(at, "@violet", "dash") for at, _ in events]
         notes += _flags(values, events, "@violet", 1.0)
     if statement is not None:
-        shapes += [_upright(change.at, "@orange", "solid") for change in statement.changes if change.at]
         changes = [
-            (change.at, f"{change.kind} {number(change.size)} {change.unit}")
+            (_shop_time(values, change.at), f"{change.kind} {number(change.size)} {change.unit}")
             for change in statement.changes
             if change.at
         ]
+        shapes += [_upright(at, "@orange", "solid") for at, _ in changes]
         notes += _flags(values, changes, "@orange", 0.84)
-        traces += _forecast(statement)
+        traces += _forecast(values, statement)
     conditions = _conditions(values)
     return Chart(
         key="trend",
@@ -56,6 +59,13 @@ def trend_chart(
     )
 
 
+def _shop_time(values: ValuesAnswer, at: str) -> str:
+    """A moment by the clock of the run nearest to it: plotly.js draws what the clock shows, whatever its offset."""
+    moment = datetime.fromisoformat(at)
+    nearest = min(values.started_at, key=lambda started: abs(started - moment))
+    return moment.astimezone(nearest.tzinfo).isoformat()
+
+
 def _runs(values: ValuesAnswer, parameter: str, grouping: str) -> list[Trace]:
     series = values.parameters[parameter]
     groups: dict[str, list[int]] = {}
@@ -64,11 +74,13 @@ def _runs(values: ValuesAnswer, parameter: str, grouping: str) -> list[Trace]:
         if value is not None:
             groups.setdefault(labels[index], []).append(index)
     traces = []
+    # More have no colour of their own, and their legend would push the chart aside; the pointer names each.
+    listed = len(groups) <= len(SERIES)
     for position, (label, rows) in enumerate(groups.items()):
         colour, marker = look(position)
         traces.append(
             {
-                "type": "scatter", "mode": "markers", "name": label,
+                "type": "scatter", "mode": "markers", "name": label, "showlegend": listed,
                 "x": [values.started_at[row].isoformat() for row in rows],
                 "y": [series.values[row] for row in rows],
                 "error_y": {
@@ -134,21 +146,24 @@ def _flags(values: ValuesAnswer, flags: Sequence[tuple[str, str]], colour: str, 
     ]  # fmt: skip
 
 
-def _forecast(statement: ParameterTrend) -> list[Trace]:
+def _forecast(values: ValuesAnswer, statement: ParameterTrend) -> list[Trace]:
     """The line from the latest runs to the day on which the limit is reached, with the interval of that day."""
     mean, forecast = statement.mean, statement.forecast
     if forecast.crosses_limit_at is None or forecast.limit is None or mean.latest_at is None:
         return []
+    latest_at, crosses_at = (_shop_time(values, at) for at in (mean.latest_at, forecast.crosses_limit_at))
     level = forecast.limit if (statement.drift.slope_per_year or 0.0) >= 0.0 else -forecast.limit
     lines: list[Trace] = [
         {
-            "type": "scatter", "mode": "lines", "name": "forecast", "x": [mean.latest_at, forecast.crosses_limit_at],
+            "type": "scatter", "mode": "lines", "name": "forecast", "x": [latest_at, crosses_at],
             "y": [mean.latest, level], "line": {"color": "@stop", "dash": "dot", "width": 2},
             "hovertemplate": "limit reached %{x|%Y-%m-%d}<extra></extra>",
         }
     ]  # fmt: skip
     first, last = forecast.crosses_limit_interval or (None, None)
-    ends = [first or mean.latest_at, last] if last is not None else []
+    ends = (
+        [latest_at if first is None else _shop_time(values, first), _shop_time(values, last)] if last else []
+    )
     if ends:
         lines.append(
             {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,10 @@ from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import (
+    DOES_NOT_FIT,
     NOT_IDENTIFIED,
     NOT_MEASURED,
+    UNEXPLAINED,
     URGENCIES,
     WITHOUT_NUMBERS,
     Urgency,
@@ -38,13 +41,23 @@ IDENTIFY = "identify all"
 ASKED: tuple[str, Mapping[str, Any]] = ("fleet", {"top": 0})
 #: Machines of one page.
 PAGE_SIZE = 40
+_USUAL = ATTENTION.index(Attention.AS_USUAL)
+#: The classes of the page, the most urgent first: a machine whose model does not fit, and one without numbers, stand
+#: before what is as usual.
+CLASSES: dict[str, Urgency] = {
+    **{str(label): URGENCIES[label] for label in ATTENTION[:_USUAL]},
+    UNEXPLAINED: DOES_NOT_FIT,
+    WITHOUT_NUMBERS: NOT_IDENTIFIED,
+    **{str(label): URGENCIES[label] for label in ATTENTION[_USUAL:]},
+}
 
 
 @dataclass(frozen=True)
 class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
-    numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it."""
+    numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it: numbers that
+    ask for nothing do not make such a machine usual."""
 
     machine: str
     plant: str
@@ -66,18 +79,23 @@ def machine_rows(
     rows: dict[str, list[FleetTableRow]] = {}
     for row in table:
         rows.setdefault(row.machine, []).append(row)
-    usual = ATTENTION.index(Attention.AS_USUAL)
+    classes = {
+        machine: UNEXPLAINED
+        if machine in unexplained and ATTENTION.index(of_machine[0].attention) >= _USUAL
+        else str(of_machine[0].attention)
+        for machine, of_machine in rows.items()
+    }
     return [
         MachineRow(
             machine=machine,
             plant=plants.get(machine, ""),
-            urgency=URGENCIES[of_machine[0].attention],
-            attention=of_machine[0].attention,
+            urgency=CLASSES[classes[machine]],
+            attention=classes[machine],
             season_not_told=of_machine[0].season_not_told,
             worst=of_machine[0],
             how_far=how_far(of_machine[0]),
             since=since(of_machine[0]),
-            others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < usual),
+            others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < _USUAL),
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
             unexplained=unexplained.get(machine, ""),
         )
@@ -138,7 +156,7 @@ def _summed(request: Request, machines: TableAnswer) -> _Sums:
 
 
 def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
-    """Return the machines, the most urgent first; those without numbers stand before what is as usual.
+    """Return the machines by their class, the most urgent first, each class in the order of the fleet.
 
     While the first sums are made, nothing is known of any.
     """
@@ -149,9 +167,9 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
         refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
         unexplained = {**(answer.models_lacking or {}), **refuted}
         rows = machine_rows(answer.table, plants_of(machines), unexplained)
-    usual = ATTENTION.index(Attention.AS_USUAL)
-    urgent = [row for row in rows if ATTENTION.index(Attention(row.attention)) < usual]
-    return urgent + unnumbered_rows(machines, {row.machine for row in rows}) + rows[len(urgent) :]
+    rows += unnumbered_rows(machines, {row.machine for row in rows})
+    ranks = {label: rank for rank, label in enumerate(CLASSES)}
+    return sorted(rows, key=lambda row: ranks[row.attention])
 
 
 def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
@@ -186,9 +204,7 @@ def routes() -> APIRouter:
         sums = _summed(request, machines)
         answer, waiting = sums.answer, sums.waiting
         rows = _with_unnumbered(sums, machines)
-        classes: dict[str, Urgency] = {str(each): word for each, word in URGENCIES.items()}
-        classes[WITHOUT_NUMBERS] = NOT_IDENTIFIED
-        counts = {label: sum(row.attention == label for row in rows) for label in classes}
+        counts = Counter(row.attention for row in rows)
         shown = [
             row
             for row in rows
@@ -201,7 +217,7 @@ def routes() -> APIRouter:
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
-            states=[(label, urgency, counts[label]) for label, urgency in classes.items() if counts[label]],
+            states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,

@@ -8,17 +8,21 @@ import tempfile
 from pathlib import Path
 
 from fastapi import APIRouter, Request
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from monitor.web.access import address_of, offered, role_needed
+from monitor.web.desk import Desk
 from monitor.web.forms import own_address, read_form, whole_number
 from monitor.web.parcel import packed
 from monitor.web.rendering import page
 from monitor.web.sending import attachment
+from monitor.web.words import so_far
 from monitor.workflow.contract import QUESTIONS
 
 #: Entries of the audit on its page.
 ENTRIES = 200
+#: So long the question whether work is still under way is held; then the page writes how long it took so far.
+HELD_S = 2.0
 
 
 def routes() -> APIRouter:
@@ -39,6 +43,17 @@ def routes() -> APIRouter:
     def work(request: Request) -> Response:
         """List what is being computed."""
         return page(request, "work.html", tickets=request.app.state.desk.under_way())
+
+    @router.get("/work/state")
+    async def state(request: Request, number: int) -> Response:
+        """Say whether work is under way still (202) or not (200): a page that waits asks this and is not made anew."""
+        desk: Desk = request.app.state.desk
+        ticket = next((ticket for ticket in desk.under_way() if ticket.number == number), None)
+        if ticket is not None:
+            await ticket.settled(ticket.seconds + HELD_S)
+        if ticket is None or ticket.future.done():
+            return JSONResponse({}, 200)
+        return JSONResponse({"so_far": so_far(ticket)}, 202)
 
     @router.post("/work/cancel")
     async def cancel(request: Request) -> Response:

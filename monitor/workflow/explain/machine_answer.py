@@ -22,6 +22,7 @@ from monitor.reporting.machine_finding import (
     MistakeFound,
     Move,
     Scattering,
+    fits_too_well,
     machine_sentences,
 )
 from monitor.units import DEGREE, MICROMETRE, Unit
@@ -54,6 +55,9 @@ from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.
 HOPELESS_TIMES = 100.0
+#: Residuals of less than this part of what is stated: few owners state ten times what their probe does, and readings in
+#: inches, of which nothing else says so, fit 25 times too well.
+TOO_WELL = 0.1
 #: A power of the position, without a driver.
 POWER = re.compile(r"(?P<error>\w+):poly\d+")
 #: The numbers of a residual that is a vector.
@@ -231,6 +235,13 @@ def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: s
     return Move(subject, stepped, change.size, change.unit, change.run)
 
 
+def _undecided(explanation: Explanation) -> tuple[str, ...]:
+    """What the campaign cannot decide, in sentences."""
+    scale = explanation.final.scale
+    alone = (ONE_RUN,) if len(explanation.final.problem.runs) == 1 else ()
+    return (*alone, fits_too_well(1.0 / scale)) if 0.0 < scale < TOO_WELL else alone
+
+
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
@@ -266,7 +277,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
             LikelyMistake(mistake.what, um(mistake.rms_as_recorded), um(mistake.rms_undone))
             for mistake in explanation.mistakes
         ),
-        undecided=(ONE_RUN,) if len(problem.runs) == 1 else (),
+        undecided=_undecided(explanation),
         answer=machine_sentences(
             MachineFinding(
                 explained=comparison.verdict is not Verdict.SOMETHING_IS_MISSING,

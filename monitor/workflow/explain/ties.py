@@ -41,12 +41,14 @@ class TieBreak(Enum):
 @dataclass(frozen=True)
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
-    ``axes`` those to index or to move, ``measurement`` the test of an instrument."""
+    ``axes`` those to index or to move, ``measurement`` the test of an instrument. What stays the same through a run
+    shows nothing where ``drivers`` have to vary ``within_runs``."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak
     drivers: tuple[str, ...] = field(default=(), metadata=OMITTED)
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    within_runs: bool = field(default=False, metadata=OMITTED)
     measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
 
 
@@ -61,7 +63,10 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) ->
         if kind is TieBreak.PLAN and not is_touched:
             kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
         actions.setdefault((kind, drivers, axes), []).append(rival)
-    return tuple(Tie(tuple(names), kind, drivers, axes) for (kind, drivers, axes), names in actions.items())
+    return tuple(
+        Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs)
+        for (kind, drivers, axes), names in actions.items()
+    )
 
 
 def is_of_instrument(text: str) -> bool:

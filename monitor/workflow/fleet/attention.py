@@ -26,6 +26,8 @@ class Onset(StrEnum):
     DIFFERS = "where the days before and after differ most"
     EVENT = "the last event"
     FIRST = "the first run"
+    MAPPED = "the first of the mapped runs beyond the limit"
+    LAST_MAP = "the run of its last map"
 
 
 #: The classes by their number.

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.statistics.days.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
+from monitor.statistics.days.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, ROUNDING, Blocks
 from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
 from monitor.statistics.sufficient import (
     CellDrift,
@@ -42,7 +42,9 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
     drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
     beside = warmth_beside(sums)
     degrees = np.where(beside[:, np.newaxis], sums.blocks.degrees, 0.0)[:, :, np.newaxis]
-    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups, degrees)
+    blocks = Blocks(
+        sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups, degrees, origin=sums.origin
+    )
     warmth = sums.temperatures
     slopes = slope_beside(
         sums.groups,
@@ -132,6 +134,7 @@ def ranked(
         fewer = 1.0 / sums.latest_runs - (k - 1.0) / (sums.runs - sums.latest_runs)
         sd = np.sqrt(variance + np.nan_to_num(cells.sd_pooled) ** 2 * np.maximum(fewer, 0.0))
         z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
+        z = np.where(np.abs(sums.latest - others) <= ROUNDING * np.abs(latest), 0.0, z)
         ratio = cells.between / cells.sd_pooled
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
     kind = np.where(sums.groups < 2.0, 6, 5)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
+from typing import Any
+
 from monitor.records import VOLUMETRIC
-from monitor.store import Database, latest_maps, latest_tolerances
+from monitor.store import Database, MappedRun, latest_tolerances, mapped_runs
 from monitor.units import MICROMETRE
 from monitor.workflow.fleet.answer import FleetTableRow
-from monitor.workflow.fleet.attention import Attention
+from monitor.workflow.fleet.attention import Attention, Onset
 
 
 def share_of_limit(row: FleetTableRow) -> float:
@@ -18,17 +21,19 @@ def volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
     """A row for every machine with a limit of the volumetric error: the worst error of its last map against it.
 
     The map is that of the latest run of which one was stored, by ``map`` or by a weekly report; without one the limit
-    is not judged.
+    is not judged. An error beyond its limit holds since the first of the mapped runs that are beyond it without a
+    break, any other since its last map.
     """
     limits = {
         machine: limit
         for (machine, name), limit in latest_tolerances(db).items()
         if name == VOLUMETRIC and machine in machines
     }
-    worst = latest_maps(db) if limits else {}
+    mapped = mapped_runs(db) if limits else {}
     rows = []
     for machine, limit in limits.items():
-        latest = worst.get(machine)
+        runs = mapped.get(machine, [])
+        latest = runs[-1].worst_um if runs else None
         attention = Attention.OUT if latest is not None and latest >= limit else Attention.AS_USUAL
         if latest is None:
             attention = Attention.UNJUDGED
@@ -38,7 +43,20 @@ def volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
                 n=0 if latest is None else 1, days=0 if latest is None else 1, mean=latest, sd_all=None, sd_pooled=None,
                 between_days=None, bartlett=None, bartlett_p=None, bartlett_q=None, anova_f=None, anova_p=None,
                 anova_q=None, slope_per_year=None, u_slope=None, drift_p=None, drift_q=None, latest=latest,
-                slope_widening=None, latest_at=None, since=None, limit=limit, years_to_limit=None,
+                slope_widening=None, latest_at=runs[-1].started_at.isoformat() if runs else None, since=None,
+                limit=limit, years_to_limit=None, **_onset(runs, limit),
             )
         )  # fmt: skip
     return rows
+
+
+def _onset(runs: list[MappedRun], limit: float) -> dict[str, Any]:
+    """Since when an error holds, and what began then; nothing without a map."""
+    if not runs:
+        return {}
+    beyond = list(takewhile(lambda run: run.worst_um >= limit, reversed(runs)))
+    first = beyond[-1] if beyond else runs[-1]
+    return {
+        "onset": first.started_at.isoformat(),
+        "onset_is": Onset.MAPPED if beyond else Onset.LAST_MAP,
+    }

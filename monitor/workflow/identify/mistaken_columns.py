@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, MistakenUnitError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
@@ -18,6 +18,8 @@ def with_mistake(
     Columns that the import saw exchanged are said again. Else the changes are tried that would let the readings fit,
     which takes up to half a minute; where none does, what else the import noticed of the columns is said.
     """
+    if isinstance(refusal, MistakenUnitError):
+        return refusal
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
         return _with_sentences(refusal, exchanged)

@@ -13,7 +13,14 @@ from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.model import chain_of
 from monitor.records import Machine
-from monitor.reporting.run_notes import AngleNoted, AxisAt, GrossReadingNoted, OffsetNoted, ResidualsNoted
+from monitor.reporting.run_notes import (
+    AngleNoted,
+    AxisAt,
+    DisplacedNoted,
+    GrossReadingNoted,
+    OffsetNoted,
+    ResidualsNoted,
+)
 from monitor.units import DEGREE
 
 # Residuals beyond so many stated standard uncertainties: a probe's statement is seldom wrong by a factor of three.
@@ -33,7 +40,10 @@ def note(machine: Machine, identification: Identification, run: RunIdentificatio
         for reading in identification.gross
         if reading.run == run.run
     )
-    return "; ".join(map(str, (*gross, *_residuals(run), *_locations(machine, identification, run))))
+    displaced = (DisplacedNoted(run.run, point.setup, point.distance) for point in run.displaced)
+    return "; ".join(
+        map(str, (*gross, *_residuals(run), *displaced, *_locations(machine, identification, run)))
+    )
 
 
 def gross_noted(reading: GrossReading, target_word: str) -> GrossReadingNoted:

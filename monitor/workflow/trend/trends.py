@@ -19,6 +19,7 @@ from monitor.store import (
     MachineEvent,
     MachineHistory,
     followed_by,
+    latest_text,
     machine_events,
     machine_history,
     parameter_frames,
@@ -56,6 +57,8 @@ from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
 
 #: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
 NEXT_CHECK_D = 30.0
+#: What the stored answer about a whole machine is called.
+METHOD = "all parameters"
 
 
 def trend(db: Database, request: TrendRequest) -> TrendAnswer:
@@ -67,12 +70,16 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     events = machine_events(db, request.machine)
     # Read before anything is computed: the file is let go of when nothing was asked for a moment.
     refers_to = parameter_frames(db, request.machine, history.parameters)
+    is_stored = len(history.run) > 0 and request.is_plain and not db.read_only
+    latest = None
+    if is_stored and db.keeps_answers:
+        latest = latest_text(db, "trend", method=METHOD, machine=request.machine)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
     answer = _answer(db, request, history, events, past, refers_to)
-    if past and request.is_plain and not db.read_only:
+    if past and is_stored:
         save_analysis(
-            db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED,
-            repeated=False,
+            db, "trend", to_document(answer), method=METHOD, machine=request.machine, seed=SEED, repeated=False,
+            latest=latest,
         )  # fmt: skip
     if request.weekly_looks:
         from monitor.workflow.history.weekly_looks import weekly_notices

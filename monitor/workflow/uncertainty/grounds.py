@@ -12,6 +12,7 @@ import numpy as np
 
 from monitor.discovery import RobustFit
 from monitor.effects import ChainEffect
+from monitor.methods.instruments.contradiction import STATED_WITHIN
 from monitor.readers.doubts import (
     AIR_NAMES,
     AIR_RANGE,
@@ -51,6 +52,7 @@ def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground,
         *(ground for ground in _gross_readings(robust) if not is_whole and ground.run not in in_units),
         *_lack_of_fit(robust, run),
         *_implausible(campaign, robust, run),
+        *_work_points(robust, run),
         *_scale_bar(campaign, run),
         *_temperature(campaign, measured),
     )
@@ -112,6 +114,14 @@ def _implausible(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Gr
             unit, name = effect.unit, problem.base_names[columns.start]
             size, most = unit.to_display(value), unit.to_display(limit)
             yield Ground(GroundKind.IMPLAUSIBLE, run, name, size, most, unit.name)
+
+
+def _work_points(robust: RobustFit, run: int) -> Iterator[Ground]:
+    """Points of setups that the readings put elsewhere than the file: the axes moved otherwise than it says."""
+    problem = robust.fit.problem
+    index = int(np.flatnonzero(problem.runs == run)[0])
+    for point in problem.displaced(robust.fit.solution.local[index]):
+        yield Ground(GroundKind.WORK_POINT, run, point.setup, point.distance, STATED_WITHIN, "mm")
 
 
 def _scale_bar(campaign: Campaign, run: int) -> Iterator[Ground]:

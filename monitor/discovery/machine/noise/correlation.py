@@ -216,17 +216,19 @@ class _Whites:
 @dataclass(frozen=True)
 class NoiseDesign:
     """What the estimate of a correlation needs besides residuals: the ``rows`` with the ``cells`` (R, T) of the plan,
-    and an orthonormal ``basis`` (R, N, p) of what is unknown in every run."""
+    and an orthonormal ``basis`` (R, N, p) of what is unknown in every run.
+
+    Of several runs only what they do not share counts, and their means take their part of the degrees of freedom; all
+    counts where ``shared`` is said to be noise too.
+    """
 
     rows: Rows
     cells: npt.NDArray[np.int64]
     basis: Array
+    shared: bool = False
 
     def correlation(self, residual: Array) -> Correlation | None:
-        """The correlation of residuals (R, N); None where they are white.
-
-        Of several runs only what they do not share counts; their means take their part of the degrees of freedom.
-        """
+        """The correlation of residuals (R, N); None where they are white."""
         readings, rest = self._parts_of(residual)
         if self._resemblance(readings) < NOTICED:
             return None
@@ -253,20 +255,34 @@ class NoiseDesign:
         relative = np.exp(-0.5 * (criteria - criteria.min()))
         return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
 
-    def deviance(self, residual: Array, correlation: Correlation | None) -> float:
-        """Minus twice the logarithm of the restricted likelihood of residuals (R, N) under a correlation of the grid,
-        at the variance that makes it largest."""
+    def deviance(self, squares: float, correlation: Correlation | None) -> float:
+        """Minus twice the logarithm, but for a constant, of the likelihood of what the unknowns of this design leave of
+        the readings, under a correlation of the grid and the variance that makes it largest, where generalised least
+        squares under it leave so many ``squares``.
+
+        Models that add other effects to this design compare: the likelihood is restricted by what they have in common
+        alone. Restricted by all that each model has, the likelihoods would be of different numbers, in other units
+        (Harville, J. Am. Stat. Assoc. 72 (1977) 320, section 4.2; Gurka, Am. Stat. 60 (2006) 19).
+        """
         index = GRID.index(GRID[0] if correlation is None else correlation)
         number = float(self._number[index])
-        return float(self._criteria(*self._parts_of(residual))[index]) - number * float(np.log(number))
+        return float(self._share * self._whites.logarithm[index] + number * np.log(squares / number))
+
+    @property
+    def contrasts(self) -> float:
+        """How many independent numbers the unknowns leave of the readings."""
+        return float(self._number[0])
 
     def _parts_of(self, residual: Array) -> tuple[Array, Array]:
         """What of residuals (R, N) says how neighbours resemble each other."""
-        return self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+        noise = residual if self.shared else deviations(residual, self.rows, self.cells)
+        return self._parts(noise[self._runs, :, None])
 
     @cached_property
     def _runs(self) -> npt.NDArray[np.int64]:
         runs = len(self.basis)
+        if self.shared:
+            return np.arange(runs)
         return np.unique(np.linspace(0, runs - 1, min(runs, MOST_RUNS)).astype(np.int64))
 
     @cached_property
@@ -280,7 +296,8 @@ class NoiseDesign:
     @cached_property
     def _share(self) -> float:
         """The part of the degrees of freedom that the means over the runs leave."""
-        return (len(self.basis) - 1) / len(self.basis) if len(self.basis) > 1 else 1.0
+        runs = len(self.basis)
+        return 1.0 if self.shared or runs == 1 else (runs - 1) / runs
 
     def _parts(self, numbers: Array) -> tuple[Array, Array]:
         """Columns (R, N, k) as readings (R, T, d k) in their own directions and after their neighbours, and what is no
@@ -346,8 +363,10 @@ class NoiseDesign:
 
     @cached_property
     def _number(self) -> Array:
-        """The degrees of freedom (C,) under every correlation."""
-        return np.asarray(self._share * (self._numbers - self._whites.able.sum(axis=(1, 2))))
+        """The degrees of freedom (C,) under every correlation: of readings, and of what setups state."""
+        rest = self._own[1]
+        numbers = self._numbers + rest.shape[0] * rest.shape[1]
+        return np.asarray(self._share * (numbers - self._whites.able.sum(axis=(1, 2))))
 
     @cached_property
     def _whites(self) -> _Whites:

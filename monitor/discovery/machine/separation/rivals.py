@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene import (
+    ChainCandidate,
+    ChainScene,
+    ChainVariant,
+    MachineEffect,
+    scene_of,
+)
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import bends_of, part_of_period, with_drivers
+from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect
 from monitor.effects.shapes import Cyclic, Harmonic
+from monitor.effects.shapes.free import Free
+from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
 
 # A time constant between two of the grid may lose so much there; rivals are compared at their best value.
@@ -60,6 +69,7 @@ class RivalSearch:
         variants = with_drivers(candidate.effect, self.drivers)
         if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
             variants += bends_of(candidate.effect)
+        variants += _of_other_errors(candidate.effect)
         driven = scene_of(self.scene.fit, variants).candidates
         return pool + [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
 
@@ -70,6 +80,23 @@ class RivalSearch:
         trial = [*self.selected[:index], evidence.candidate, *self.selected[index + 1 :]]
         best = refine(self.scene, trial, index).candidate
         return weigh_beside(self.scene, [best], except_for(self.selected, index))[0]
+
+
+def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
+    """The free shape of an effect as that of the other errors of its axis: no scan has these, and with one length of
+    the tool a turn of a head and a shift of it move the tip alike."""
+    if (
+        not isinstance(effect, ChainEffect)
+        or not isinstance(effect.shape, Free)
+        or effect.term.stage != MOTION
+    ):
+        return []
+    others = [
+        replace(effect, term=replace(effect.term, symbol=f"E{letter}{effect.joint.name}", component=index))
+        for index, letter in enumerate(COMPONENTS)
+        if index != effect.term.component
+    ]
+    return [Variant(other.text, other) for other in others]
 
 
 def _same_cycle(rival: ChainCandidate, candidate: ChainCandidate) -> bool:

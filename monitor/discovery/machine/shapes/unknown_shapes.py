@@ -178,8 +178,12 @@ def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float)
 
 def _priced(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
     """The score of effects together, free shapes at the price of the choice of their parts."""
-    number = sum(shape.columns.shape[1] for shape in selected if _is_free(shape))
-    return float(score_beside(scene, selected, []) - 2.0 * number * PRICE)
+    return score_beside(scene, selected, []) - sum(map(price_of_parts, selected))
+
+
+def price_of_parts(candidate: ChainCandidate) -> float:
+    """What the choice of its parts takes from the score of a free shape; nothing from other effects."""
+    return 2.0 * candidate.columns.shape[1] * PRICE if _is_free(candidate) else 0.0
 
 
 def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
