@@ -144,12 +144,12 @@ def _draw_panel(
     on.text((left_edge + right_edge) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
 
 
-def _end(ticks: Sequence[float], panel: _Panel, left: float, right: float, sheet: float) -> float:
-    """Where an axis from ``left`` ends, at most at ``right``: its last number stays on the ``sheet``, tiny ones are
+def _end(ticks: Sequence[float], panel: _Panel, start: float, end: float, sheet: float) -> float:
+    """Where an axis from ``start`` ends, at most at ``end``: its last number stays on the ``sheet``, tiny ones are
     wide."""
     low, high = panel.across
-    room = sheet - 2.0 - 0.5 * text_width(tick_words(ticks[-1])) - left
-    return min(right, left + room * (high - low) / (ticks[-1] - low))
+    room = sheet - 2.0 - 0.5 * text_width(tick_words(ticks[-1])) - start
+    return min(end, start + room * (high - low) / (ticks[-1] - low))
 
 
 def residual_drawing(
