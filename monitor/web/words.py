@@ -70,7 +70,7 @@ NOT_IDENTIFIED = Urgency(
     _OPEN.colour,
     _OPEN.shape,
     _OPEN.word,
-    "identify: its readings are here, its errors are not computed from them yet",
+    "identify: its readings are here, its errors are not computed from them by this version of its model yet",
 )
 #: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
 UNEXPLAINED = "the model does not explain the latest readings"

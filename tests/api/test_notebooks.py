@@ -60,7 +60,7 @@ def test_a_notebook_runs(notebook: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_database_opens_in_a_notebook_without_widgets(tmp_path: Path) -> None:
-    """DuckDB refuses every setting of its bar there. It takes a process without a main file and with a kernel for one."""
+    """DuckDB refuses every setting of its bar there. It takes a process without a main file, with a kernel for one."""
     code = (
         "import sys, types\n"
         "shell = types.SimpleNamespace(config={'IPKernelApp': {}})\n"

@@ -1,10 +1,10 @@
 """Ties that `explain` reports, and whether the next campaign, made as it says, breaks them rightly.
 
 ``python tests/benchmarks/trial_ties.py [SEEDS [FIRST]]`` prints the table of docs/trials-discovery.md. An effect is
-hidden by the independent simulator; where `explain` names rivals, the campaign is measured again by a fresh seed,
-with the poses that were offered added (all balls at each), or with the temperature no longer going with the warm-up,
-within the runs where that is asked for. A tie is broken rightly where the hidden effect is then named and none of the
-rivals that the action was for.
+hidden by the independent simulator; where `explain` names rivals, the campaign is measured again by a fresh seed, with
+the poses that were offered added (all balls at each), or with the temperature no longer going with the warm-up, within
+the runs where that is asked for. A tie is broken rightly where the hidden effect is then named and none of the rivals
+that the action was for.
 """
 
 from __future__ import annotations
@@ -57,9 +57,10 @@ def independent(schedule, run, fraction, rng):
 
 
 def within_runs(schedule, run, fraction, rng):
-    """The same range, gone through in every run, up or down by turns: within a run is what the action asks for."""
-    way = np.where(run % 2, fraction, 1.0 - fraction)
-    return 20.0 + 6.0 * way + 0.05 * rng.standard_normal(len(run))
+    """The same range, gone through within the runs: each from one temperature to another, as the hall has them."""
+    begins, ends = rng.uniform(20.0, 26.0, (2, schedule.runs))
+    way = begins[run - 1] * (1.0 - fraction) + ends[run - 1] * fraction
+    return way + 0.05 * rng.standard_normal(len(run))
 
 
 def explained(plan_name: str, hidden: str, seed: int, poses=(), temperature=following) -> Explanation:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,35 @@ def test_story_the_log_in_ends_while_somebody_types(site: Site) -> None:
         )  # the form's own page is complete too while its answer is under way
         visit.settle()
         assert page.locator("li", has_text="note, belt changed").count() == 1
+
+
+def test_story_an_event_is_entered_on_the_chart(site: Site) -> None:
+    """A click between two days takes their time by the shop's clock, with its offset; a drag zooms and takes none."""
+    with Visit(site) as visit:
+        page = visit.page
+        visit.open("/machine?name=HU40-T&parameter=EB0C&campaign=five-days")
+        pad = page.locator("#chart-trend .nsewdrag").first
+        box = pad.bounding_box()
+        assert box is not None
+        at = page.locator('input[name="at"]')
+        page.mouse.move(box["x"] + 200, box["y"] + 60)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 900, box["y"] + 60, steps=4)
+        page.mouse.up()
+        assert at.input_value() == ""
+        pad.scroll_into_view_if_needed()
+        box = pad.bounding_box()
+        assert box is not None
+        ends = page.evaluate("document.getElementById('chart-trend')._fullLayout.xaxis.range")
+        page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_timeout(300)
+        taken = at.input_value()
+        assert taken.endswith("-05:00")
+        first, last = (datetime.fromisoformat(end.replace(" ", "T")[:19]) for end in ends)
+        off = datetime.fromisoformat(taken).replace(tzinfo=None) - (first + (last - first) / 2)
+        assert abs(off) < 0.02 * (last - first)
+        assert page.evaluate("document.activeElement.name") == "text"
+        assert visit.faults() == []
 
 
 def test_story_who_asked_for_less_motion_sees_where_it_moves_and_no_motion(site: Site) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -82,6 +83,18 @@ def faults(figure: Figure) -> list[str]:
     ]
 
 
+def legends_inside(figure: Figure) -> int:
+    """Return how many legends share paper with axes, where what is drawn may run through them."""
+    canvas = FigureCanvasAgg(figure)
+    with style():
+        canvas.draw()
+    renderer = canvas.get_renderer()
+    legends = [part for part in figure.findobj(Legend) if part.get_visible()]
+    assert legends
+    boxes = [legend.get_window_extent(renderer).padded(-figure.dpi / 72.0) for legend in legends]
+    return sum(box.overlaps(axes.get_window_extent(renderer)) for box in boxes for axes in figure.axes)
+
+
 def by_run(runs: int, count: int, size: float) -> Figure:
     rng = np.random.default_rng(1)
     names = [f"EX0C1({index})" for index in range(count)]
@@ -114,6 +127,8 @@ def test_parameter_over_time(runs: int, size: float) -> None:
         line=(days, values, np.full(runs, 0.3 * size)) if runs > 2 else None,
     )  # fmt: skip
     assert faults(figure) == []
+    # Changes and events are upright lines through the whole height.
+    assert legends_inside(figure) == 0
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -126,6 +141,7 @@ def test_selections_side_by_side(count: int, size: float) -> None:
         size * rng.uniform(1.0, 2.0, (3, count)), title=LONG, meaning="expanded uncertainty, k_q = 3.3",
     )  # fmt: skip
     assert faults(figure) == []
+    assert legends_inside(figure) == 0
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -37,3 +38,14 @@ def test_without_a_tick_nothing_is_made_and_it_is_said(own: Any) -> None:
     assert page.status_code == 400
     assert "no effect is ticked" in page.text
     assert len([model for model in own.ask("models")[1]["models"] if model["name"] == "curve"]) == 1
+
+
+def test_after_a_change_of_the_model_the_first_page_can_be_brought_up_to_it(own: Any) -> None:
+    """The fleet has numbers of the newest version alone: whoever adds an effect emptied it and was not told."""
+    text = own.client.get("/model", params={"campaign": "hidden-spindle-growth", "note": "x was added"}).text
+    assert re.search(r'action="/fleet/identify".*?identify every campaign with it', text, re.DOTALL)
+    for address in (
+        {"campaign": "hidden-spindle-growth"},
+        {"campaign": CURVE, "note": "x was added"},
+    ):
+        assert "identify every campaign with it" not in own.client.get("/model", params=address).text

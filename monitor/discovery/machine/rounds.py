@@ -67,6 +67,11 @@ class ChainRound:
         """The effects that were found."""
         return [finding.candidate.effect for finding in self.refined]
 
+    @property
+    def families(self) -> frozenset[str]:
+        """What was found, whatever the searched values."""
+        return frozenset(finding.candidate.family for finding in self.refined)
+
 
 @dataclass(frozen=True)
 class ChainSearch:
@@ -90,7 +95,8 @@ class ChainSearch:
             other, other_settled = self._settled(first, beside_curves, correlation)
             # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good.
             margin = 2.0 * float(np.log((1.0 - self.rate) / self.rate))
-            if self._cost(first, other) < self._cost(first, latest) + margin:
+            disagree = other.families != latest.families
+            if disagree and self._cost(first, other) < self._cost(first, latest) + margin:
                 latest, settled = other, other_settled
         reached = {
             Limit.EFFECTS: len(latest.refined)

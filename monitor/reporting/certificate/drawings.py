@@ -6,6 +6,7 @@ No figure is taller than a page: what 150 parameters need is broken into several
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from monitor.reporting.svg.plot import (
     Drawing,
     nice_ticks,
     shortened,
+    text_width,
     tick_room,
     tick_words,
 )
@@ -105,6 +107,8 @@ def _draw_panel(
     on: Drawing, panel: _Panel, result: ResultSet, limits: Array, top: float, label: float, sign: str
 ) -> None:
     left_edge, right_edge = label + 10.0, on.width_mm * SCALE - 14.0
+    ticks = nice_ticks(*panel.across, max(3, int((right_edge - left_edge) / 130.0)))
+    right_edge = _end(ticks, panel, left_edge, right_edge, on.width_mm * SCALE)
     bottom = top + len(panel.members) * _ROW
     low, high = panel.across
 
@@ -134,10 +138,18 @@ def _draw_panel(
     if brackets:
         on.path("".join(brackets), stroke=INK, width=5.0)
     on.line(left_edge, bottom, right_edge, bottom, MID, 2.0)
-    for value in nice_ticks(low, high, max(3, int((right_edge - left_edge) / 130.0))):
+    for value in ticks:
         on.line(x(value), bottom, x(value), bottom + 8.0, MID, 2.0)
         on.text(x(value), bottom + 12.0 + LETTER, tick_words(value, sign), anchor="middle")
     on.text((left_edge + right_edge) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
+
+
+def _end(ticks: Sequence[float], panel: _Panel, left: float, right: float, sheet: float) -> float:
+    """Where an axis from ``left`` ends, at most at ``right``: its last number stays on the ``sheet``, tiny ones are
+    wide."""
+    low, high = panel.across
+    room = sheet - 2.0 - 0.5 * text_width(tick_words(ticks[-1])) - left
+    return min(right, left + room * (high - low) / (ticks[-1] - low))
 
 
 def residual_drawing(

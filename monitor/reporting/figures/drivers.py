@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -138,6 +139,9 @@ def predicted_against_measured(
         axes.set_xlim(-reach, reach)
         axes.set_ylim(-reach, reach)
         axes.set_aspect("equal")
+        for axis in (axes.xaxis, axes.yaxis):
+            # Of a thousandth of a micrometre nine numbers would stand on each other.
+            axis.set_major_locator(MaxNLocator(5, min_n_ticks=3))
         axes.set_xlabel("predicted by the effect / µm")
         axes.set_ylabel("measured residual without it / µm")
     return figure

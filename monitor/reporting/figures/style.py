@@ -94,6 +94,15 @@ def caption(figure: Figure, text: str) -> None:
     )
 
 
+def legend_above(axes: Axes) -> None:
+    """Name what is drawn in a line above the axes, where no bar and no upright line runs through it.
+
+    At the right end: at the left one stands the power of ten of the numbers.
+    """
+    columns = len(axes.get_legend_handles_labels()[1])
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=6.5, ncols=columns, borderaxespad=0.2)
+
+
 def zero_line(axes: Axes, *, vertical: bool = False) -> None:
     """Draw the line of zero, behind the data."""
     (axes.axvline if vertical else axes.axhline)(0.0, color=MID, linewidth=0.6, zorder=0.5)

@@ -12,7 +12,14 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
-from monitor.reporting.figures.style import caption, new_figure, reference_line, style, zero_line
+from monitor.reporting.figures.style import (
+    caption,
+    legend_above,
+    new_figure,
+    reference_line,
+    style,
+    zero_line,
+)
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
 
 
@@ -62,7 +69,7 @@ def parameter_over_time(
         axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
         axes.set_ylabel(runs.unit, labelpad=2)
         axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
-        axes.legend(loc="best", fontsize=6.5, ncols=2)
+        legend_above(axes)
         legend = ["grey: 95 % band of the drift"] if line is not None else []
         legend += ["dashed across: the limits of the absolute value"] if limit is not None else []
         if legend:
@@ -84,7 +91,8 @@ def _changes_and_events(axes: Axes, changes: Sequence[float], events: Mapping[fl
         axes.axvline(day, color=INK, linewidth=0.8, label="event recorded" if number == 0 else None)
         axes.annotate(
             text, (day, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
-            rotation=90, va="top", fontsize=6, color=INK,
+            rotation=90, va="top", fontsize=6, color=INK, zorder=4,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85},
         )  # fmt: skip
 
 
@@ -129,6 +137,6 @@ def selections_side_by_side(
             axes.set_xticks(np.arange(len(part)), [names[index] for index in part], **upright)
             axes.set_ylabel(kind, labelpad=2)
             axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
-        panels[0].legend(loc="upper left", fontsize=6.5)
+        legend_above(panels[-1])
         caption(figure, meaning)
     return figure
