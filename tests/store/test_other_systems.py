@@ -97,9 +97,19 @@ for word in (*sys.argv[1:], "then"):
     line = []
 sys.exit(status)
 """
-#: What processes here need of the list: Python's own way to start one.
+#: What processes here need of the list: Python's own way to start one, and from 3.14 on to remove a folder.
 NEEDED_HERE = frozenset(
-    {"register_at_fork", "_posixsubprocess", "posix", "_posixshmem", "wait", "fork", "sysconf", "uname"}
+    {
+        "register_at_fork",
+        "_posixsubprocess",
+        "posix",
+        "_posixshmem",
+        "wait",
+        "fork",
+        "sysconf",
+        "uname",
+        "O_NONBLOCK",
+    }
 )
 
 
