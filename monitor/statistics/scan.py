@@ -45,9 +45,9 @@ AT_ONCE = 32_768
 #: values on 4 degrees are too light for those of Student 3, 2 % of 104 are called at 1 %, and 3.5 cost no power;
 #: with fewer 3.5 degrees would hide steps (one of fifteen scatters in sixteen runs of four days) and win nothing.
 TAILED, TAIL_FREEDOM, MANY, FREEDOM_OF_MANY = 1.5, 4.0, 80, 3.5
-#: Amplitude of a yearly wave that is allowed for where a history is too short to show it, in scatters of a run, beside
-#: independent runs: without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and 28 % at 1 %
-#: (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
+#: Amplitude of a yearly wave that is allowed for where a history is too short to show it, in scatters of an innovation
+#: (of a run, where runs are independent): without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and
+#: 28 % at 1 % (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
 SEASON, SEASON_FROM = 1.0, 0.1
 
 

@@ -323,6 +323,10 @@ class Database:
             if self._in_transaction:
                 yield
                 return
+            if self._sees_one_moment:
+                raise StoreError(
+                    "a block that reads the database of one moment stores nothing: store behind it"
+                )
             with self._writing() as connection:
                 connection.begin()
                 self._in_transaction = True

@@ -28,7 +28,7 @@ def _bytes(value: Any, counted: set[int]) -> int:
         return 0
     counted.add(id(value))
     if isinstance(value, np.ndarray):
-        return int(value.nbytes) + sys.getsizeof(value.view(np.ndarray)[:0])
+        return _array_bytes(value, counted)
     size = sys.getsizeof(value)
     if isinstance(value, str | bytes | int | float | type) or value is None:
         return size
@@ -44,6 +44,19 @@ def _bytes(value: Any, counted: set[int]) -> int:
         return (
             size + owned + sum(_bytes(getattr(value, entry.name, None), counted) for entry in fields(value))
         )
+    return size
+
+
+def _array_bytes(value: np.ndarray, counted: set[int]) -> int:
+    """An array with what it is a view of, with its mask, and with the objects in it."""
+    size = int(value.nbytes) + sys.getsizeof(value.view(np.ndarray)[:0])
+    if isinstance(value.base, np.ndarray):
+        size += max(_bytes(value.base, counted) - int(value.nbytes), 0)
+    if isinstance(value, np.ma.MaskedArray):
+        size += int(np.asarray(value.mask).nbytes)
+    if value.dtype == object:
+        members = np.asarray(value).reshape(-1)
+        size += _scaled([_bytes(part, counted) for part in _spread(members, len(members))], len(members))
     return size
 
 

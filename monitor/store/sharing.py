@@ -32,7 +32,8 @@ from monitor.store.turns import Patience, turn_to_write, writer_at_work
 _IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
 _IDLE_ALONE_S = 0.3
 #: Whoever wrote and was not given the processor since, on a busy machine, is not idle: the second transaction of a verb
-#: would wait for another turn. It is once it computed for so long, or after so long by the clock, in s.
+#: would wait for another turn. It is once it computed for so long, or after so long by the clock, in s; whoever waits
+#: for processes of its own keeps the file as long.
 _COMPUTED_S, _IDLE_AT_MOST_S = 0.005, 0.25
 #: How long it is kept without a pause, in s; longer only by the one question or transaction that is under way.
 _LONGEST_S = 0.5

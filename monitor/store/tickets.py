@@ -10,7 +10,8 @@ Asking again and again lets in whoever happens to ask when the file is free: bes
 A ticket is a lock on one byte of the file of turns, behind its content: on the byte behind the last that is locked. It
 belongs to the open file (``F_OFD_SETLK`` of Linux), needs no right but to read, and ends with its process, however that
 ends. Two who take one at the same instant may have the same, and come in either order. A process that is stopped keeps
-others waiting for ``_OVERTAKEN_S``. Where the system has no such locks, nobody has a ticket, and chance decides.
+others waiting for ``_OVERTAKEN_S`` at each turn. Where the system has no such locks, nobody has a ticket, and chance
+decides.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ else:
 _WRITERS, _READERS = 1 << 40, 1 << 41
 #: ``struct flock`` of Linux: kind, whence, start and length in bytes, process (none: the lock is of the open file).
 _FLOCK = struct.Struct("hhqqi4x")
-#: A free file is left to those whose turn it is for so long, in s. They look twenty times a second; twenty readers who
-#: come in one after the other took 1.5 s on two cores at a load of 23.
-_OVERTAKEN_S = 20.0
+#: A free file is left to those whose turn it is for so long, in s, and no longer than one is ready to wait. They look
+#: twenty times a second; twenty readers who come in one after the other took 1.5 s on two cores at a load of 23.
+_OVERTAKEN_S = 3.0
 
 
 class ReadersTicket:
@@ -52,9 +53,10 @@ class ReadersTicket:
 class WritersTicket:
     """The ticket of one who waits to write; ``is_next`` says whether it is that writer's turn."""
 
-    def __init__(self, file: int) -> None:
+    def __init__(self, file: int, patience_s: float) -> None:
         self._file = file
         self._number = _taken(file, _WRITERS)
+        self._overtakes_after_s = min(_OVERTAKEN_S, patience_s)
         #: Behind the last ticket of those who waited to read when this writer was the next; None: it was not yet.
         self._behind_readers: int | None = None
         self._free_since: float | None = None
@@ -64,7 +66,7 @@ class WritersTicket:
         moment = time.monotonic()
         if self._free_since is None:
             self._free_since = moment
-        if self._number is None or moment - self._free_since > _OVERTAKEN_S:
+        if self._number is None or moment - self._free_since >= self._overtakes_after_s:
             return True
         if _locked_byte(self._file, _WRITERS, self._number) is not None:
             return False
@@ -84,9 +86,9 @@ class WritersTicket:
 
 
 @contextmanager
-def writers_ticket(file: int) -> Iterator[WritersTicket]:
-    """Hold a ticket for this block, by the open file of turns."""
-    ticket = WritersTicket(file)
+def writers_ticket(file: int, patience_s: float) -> Iterator[WritersTicket]:
+    """Hold a ticket for this block, by the open file of turns, for whoever waits at most so long."""
+    ticket = WritersTicket(file, patience_s)
     try:
         yield ticket
     finally:

@@ -108,13 +108,18 @@ def turn_to_write(path: str, patience: Patience) -> Iterator[Holder | None]:
                 os.pwrite(file, f"{os.getpid():<{_PID_WIDTH}}\n".encode(), 0)
             yield None
         else:
-            yield _last_writer(file)
+            yield _awaited(file)
+
+
+def _awaited(file: int) -> Holder:
+    """Who has the turn; where nobody has it, those whose turn it is."""
+    return Holder(None, "others who wait for it") if _is_free(file) else _last_writer(file)
 
 
 def _taken_in_order(file: int, patience: Patience) -> bool:
     """Take the turn when it is this process's; False where the patience ended before."""
-    with writers_ticket(file) as ticket:
-        for _ in patience.tries(lambda: _last_writer(file)):
+    with writers_ticket(file, patience.seconds) as ticket:
+        for _ in patience.tries(lambda: _awaited(file)):
             if not _is_free(file):
                 ticket.note_taken()
             elif ticket.is_next() and _locked(file, fcntl.LOCK_EX):

@@ -39,6 +39,8 @@ LONGEST_REST_S = 60.0
 #: A refusal stands so long, as long as nothing is written: a page that asks two questions which are refused after a
 #: second each would compute one while it shows the other, for ever.
 REFUSAL_STANDS_S = 60.0
+#: And a fault, or a database that others hold, so long: shown, and asked anew before anybody has read it twice.
+FAULT_STANDS_S = 10.0
 
 Key = TypeVar("Key")
 
@@ -95,16 +97,22 @@ class Ticket:
 
     @property
     def is_good(self) -> bool:
-        """Whether it is under way, was taken back, has an answer, or a refusal that stands; a fault is asked anew."""
+        """Whether it is under way, was taken back, has an answer, or a refusal or fault that stands."""
         if not self.is_done:
             return True
         if self.future.cancelled():
             return False
-        refusal = self.future.exception()
-        if not isinstance(refusal, MonitorError) or isinstance(refusal, StoreError):
-            return refusal is None
+        error = self.future.exception()
         # Not noted yet: it ended just now.
-        return self.took_s is None or self.seconds < self.took_s + REFUSAL_STANDS_S
+        if error is None or self.took_s is None:
+            return True
+        is_refusal = isinstance(error, MonitorError) and not isinstance(error, StoreError)
+        return self.seconds < self.took_s + (REFUSAL_STANDS_S if is_refusal else FAULT_STANDS_S)
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether it ended without an answer, by a refusal or a fault."""
+        return self.is_done and not self.future.cancelled() and self.future.exception() is not None
 
     def may_be_taken_back_by(self, user: User) -> bool:
         """Whether this user asked it, or is an approver."""
@@ -167,14 +175,18 @@ class Desk:
         """Return the ticket of a question, a new one where nobody asked it since the last change.
 
         What was taken back stays so until ``ask_again``: a page that loads itself again does not start it; ``anew``
-        does.
+        does, and asks what was refused once more.
         ``files`` are paths that the server itself fills in; they are no part of what is asked.
         """
         check_role(user, question)
         key = self._key(question, document)
         with self._lock:
             ticket = self._tickets.get(key)
-            if ticket is not None and ticket.is_good and not (anew and ticket.is_taken_back):
+            if (
+                ticket is not None
+                and ticket.is_good
+                and not (anew and (ticket.is_taken_back or ticket.is_refused))
+            ):
                 return ticket
             self._forget_outdated()
             self._count += 1

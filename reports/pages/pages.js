@@ -34,23 +34,31 @@ function offsetAt(canvas, time) {
   return nearest === "" ? "Z" : nearest.match(/([+-]\d\d:\d\d|Z)$/)[0];
 }
 
-// A click between the runs of a trend puts its time into the form of an event; a drag zooms, and is none.
+// A click between the runs of a trend puts its time into the form of an event; a drag zooms, and is none, and a double
+// click takes the zoom back.
 function takeTimes(canvas) {
   const at = document.querySelector('form[action="/machine/event"] input[name="at"]');
   if (at === null || canvas.dataset.takesTimes) {
     return;
   }
   canvas.dataset.takesTimes = "1";
+  let clicked = 0;
   canvas.addEventListener("click", (event) => {
     const pad = event.target.closest(".nsewdrag");
     if (pad === null) {
       return;
     }
+    clearTimeout(clicked);
+    if (event.detail > 1) {
+      return;
+    }
     const time = String(canvas._fullLayout.xaxis.p2d(event.clientX - pad.getBoundingClientRect().left));
-    at.value = time.replace(" ", "T").padEnd(16, "T00:00").slice(0, 16) + offsetAt(canvas, time);
-    const text = at.form.querySelector('input[name="text"]');
-    text.focus();
-    text.scrollIntoView({ block: "center" });
+    clicked = setTimeout(() => {
+      at.value = time.replace(" ", "T").padEnd(16, "T00:00").slice(0, 16) + offsetAt(canvas, time);
+      const text = at.form.querySelector('input[name="text"]');
+      text.focus({ preventScroll: true });
+      text.scrollIntoView({ block: "nearest" });
+    }, 350);
   });
 }
 
@@ -308,11 +316,14 @@ function loadAgain() {
 
 // A page that waits loads itself again once that is computed: to make and draw it anew takes the time of what it waits for.
 function waitFor(note) {
+  let waited = false;
   const ask = () => fetch("/work/state?number=" + note.dataset.number, { credentials: "same-origin" }).then((answer) => {
     if (answer.status !== 202) {
-      location.reload();
+      // What was there at once is loaded no faster than by a page that does not ask.
+      (waited ? () => location.reload() : loadAgain)();
       return null;
     }
+    waited = true;
     return answer.json().then((work) => {
       note.querySelector(".so-far").textContent = work.so_far;
       return ask();

@@ -197,3 +197,33 @@ def test_noise_doubt_is_the_mean_of_generalised_least_squares_over_the_correlati
             mean += weight[index] * p_value / weight[best].sum()
         assert 1e-12 < mean < 0.5
         assert doubt.p_value(others, every[1]) == pytest.approx(mean, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("white", "walking", "cheaper", "stands"),
+    [
+        # Minus twice the logarithm of a likelihood is smaller by so much for the search in noise that walks; at a rate
+        # of one in a hundred effects have to be likelier by 2 ln 99 = 9.2.
+        ({"EXX"}, set(), -9.0, set()),
+        ({"EXX"}, set(), -9.4, {"EXX"}),
+        ({"EXX"}, {"EXX", "EYY"}, 9.0, {"EXX"}),
+        ({"EXX"}, {"EXX", "EYY"}, 9.4, {"EXX", "EYY"}),
+    ],
+)
+def test_more_effects_have_to_be_likelier_by_the_odds_of_the_rate(
+    monkeypatch, white, walking, cheaper, stands
+):
+    """Whichever of the two searches finds them."""
+    rounds = {
+        None: SimpleNamespace(refined=white, families=frozenset(white), cost=0.0),
+        SLOW: SimpleNamespace(refined=walking, families=frozenset(walking), cost=-cheaper),
+    }
+    module = "monitor.discovery.machine.rounds"
+    monkeypatch.setattr(f"{module}.correlation_under", lambda first, shared: SLOW)
+    monkeypatch.setattr(f"{module}.replace", lambda latest, limits: latest)
+    monkeypatch.setattr(ChainSearch, "_settled", lambda search, first, beside, noise: (rounds[noise], True))
+    monkeypatch.setattr(ChainSearch, "_cost", lambda search, first, latest: latest.cost)
+    for each in rounds.values():
+        each.suspects = SimpleNamespace(bad=())
+    search = ChainSearch(SimpleNamespace(runs=np.arange(2)), (), (), 0.01, None)
+    assert search.under(None).families == stands

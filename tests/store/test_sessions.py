@@ -12,6 +12,7 @@ from typing import Any
 import duckdb
 import pytest
 
+from monitor.exceptions import StoreError
 from monitor.records import Campaign
 from monitor.store import (
     Database,
@@ -76,6 +77,8 @@ def test_a_block_that_reads_sees_one_moment_and_keeps_nobody_from_writing(tmp_pa
             assert db.recall("count", lambda: db.rows(count)) == [(1,)]
         assert reader.rows(count) == [(1,)]
         assert reader.rows("SELECT count(*) FROM remembered") == [(0,)]
+        with pytest.raises(StoreError, match="stores nothing"), reader.reading(), reader.transaction():
+            pass
         with pytest.raises(duckdb.CatalogException, match="no_table"), reader.reading():
             reader.rows("FROM no_table")
         assert reader.rows(count) == [(1,)]

@@ -149,6 +149,29 @@ def test_who_is_killed_or_stopped_while_waiting_keeps_nobody_out(
             ended.kill()
 
 
+def test_nobody_waits_longer_for_one_who_is_stopped_than_he_is_ready_to(path: Path) -> None:
+    """A reader who was stopped keeps a ticket and asks no more; each who follows waits for itself, with no event."""
+    Database(path).close()
+    with turn_to_write(str(path), Patience()):
+        pass
+    with open(str(path) + LOCK_ENDING, "rb") as file:
+        assert tickets._taken(file.fileno(), tickets._READERS) is not None
+        for patience_s in (0.0, 0.2, 0.2):
+            with turn_to_write(str(path), Patience(patience_s)) as holder:
+                assert holder is None
+
+
+def test_who_is_refused_beside_a_free_file_hears_of_those_whose_turn_it_is(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Database(path).close()
+    with turn_to_write(str(path), Patience()):
+        pass
+    monkeypatch.setattr(tickets.WritersTicket, "is_next", lambda ticket: False)
+    with turn_to_write(str(path), Patience()) as holder:
+        assert str(holder) == "others who wait for it"
+
+
 def test_without_such_locks_all_come_in_by_chance(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tickets, "_TICKETS", False)
     Database(path).close()

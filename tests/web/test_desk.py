@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("fastapi", reason="the extra web is not installed")
 
-from monitor.exceptions import BusyError, NotFoundError
+from monitor.exceptions import BusyError, InputError, NotFoundError
 from monitor.web import desk as desk_module
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
@@ -123,7 +123,10 @@ def test_a_refusal_stands_until_something_is_written_or_a_minute_went_by(asked: 
     assert desk.ask(ADA, *questions[1]).answer(60.0) == 1
 
 
-def test_a_fault_is_no_refusal_and_is_asked_anew(asked: tuple[Desk, _Asked]) -> None:
+def test_a_fault_stands_for_a_moment_and_is_asked_anew(
+    asked: tuple[Desk, _Asked], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A page that waits is loaded again when it ends, and has to find it."""
     desk, asker = asked
     asker.go.set()
     for fault in (BusyError("another process writes"), ZeroDivisionError("a fault of the software")):
@@ -132,10 +135,27 @@ def test_a_fault_is_no_refusal_and_is_asked_anew(asked: tuple[Desk, _Asked]) -> 
         with pytest.raises(type(fault), match=str(fault)):
             ticket.answer(60.0)
         asker.fault = None
-        again = desk.ask(ADA, "compare", {"campaign": "c"})
+        assert desk.ask(ADA, "compare", {"campaign": "c"}) is ticket
+        with monkeypatch.context() as later:
+            later.setattr(desk_module, "FAULT_STANDS_S", -60.0)
+            again = desk.ask(ADA, "compare", {"campaign": "c"})
         assert again is not ticket
         assert again.answer(60.0)
         asker.freshness.wrote(None)
+
+
+def test_who_asks_anew_is_not_told_the_refusal_that_stands(asked: tuple[Desk, _Asked]) -> None:
+    desk, asker = asked
+    asker.go.set()
+    asker.fault = InputError("there is nothing to identify")
+    refused = desk.ask(ADA, "identify", {"campaign": "c"})
+    with pytest.raises(InputError, match="nothing to identify"):
+        refused.answer(60.0)
+    asker.fault = None
+    assert desk.ask(ADA, "identify", {"campaign": "c"}) is refused
+    again = desk.ask(ADA, "identify", {"campaign": "c"}, anew=True)
+    assert again is not refused
+    assert again.answer(60.0)
 
 
 def test_the_trend_that_somebody_looks_at_does_not_wait_behind_long_questions(

@@ -168,3 +168,11 @@ def allocated(make: Callable[[], Any]) -> int:
         return taken
     finally:
         tracemalloc.stop()
+
+
+def test_an_array_is_held_with_its_objects_its_mask_and_what_it_is_a_view_of() -> None:
+    texts = np.array([f"{number:02d}" * 1000 for number in range(100)] + [None], dtype=object)
+    assert held_bytes(texts) == pytest.approx(100 * 2049 + texts.nbytes, rel=0.1)
+    numbers = np.zeros(1_000_000)
+    assert held_bytes(np.ma.masked_array(numbers, mask=numbers > 0.0)) == pytest.approx(9e6, rel=0.05)
+    assert held_bytes(numbers[:10]) == pytest.approx(8e6, rel=0.05)

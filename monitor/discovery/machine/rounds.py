@@ -93,8 +93,11 @@ class ChainSearch:
         correlation = correlation_under(first, shared=True) if few and latest.refined else None
         if correlation is not None:
             other, other_settled = self._settled(first, beside_curves, correlation)
-            # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good.
+            # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good, on
+            # whichever side they are.
             margin = 2.0 * float(np.log((1.0 - self.rate) / self.rate))
+            if other.families > latest.families:
+                margin = -margin
             disagree = other.families != latest.families
             if disagree and self._cost(first, other) < self._cost(first, latest) + margin:
                 latest, settled = other, other_settled
