@@ -136,7 +136,8 @@ def test_story_the_log_in_ends_while_somebody_types(site: Site) -> None:
 
 
 def test_story_an_event_is_entered_on_the_chart(site: Site) -> None:
-    """A click between two days takes their time by the shop's clock, with its offset; a drag zooms and takes none."""
+    """A click between two days takes their time by the shop's clock, with its offset; a drag zooms and takes none, and
+    a double click, which takes the zoom back, none either."""
     with Visit(site) as visit:
         page = visit.page
         visit.open("/machine?name=HU40-T&parameter=EB0C&campaign=five-days")
@@ -152,9 +153,16 @@ def test_story_an_event_is_entered_on_the_chart(site: Site) -> None:
         pad.scroll_into_view_if_needed()
         box = pad.bounding_box()
         assert box is not None
-        ends = page.evaluate("document.getElementById('chart-trend')._fullLayout.xaxis.range")
+        shown = "document.getElementById('chart-trend')._fullLayout.xaxis.range"
+        zoomed = page.evaluate(shown)
+        page.mouse.dblclick(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_timeout(1000)
+        assert at.input_value() == ""
+        ends = page.evaluate(shown)
+        assert ends[0] < zoomed[0]
+        assert ends[1] > zoomed[1]
         page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-        page.wait_for_timeout(300)
+        page.wait_for_timeout(1000)
         taken = at.input_value()
         assert taken.endswith("-05:00")
         first, last = (datetime.fromisoformat(end.replace(" ", "T")[:19]) for end in ends)
