@@ -190,6 +190,7 @@ LOOKED_FOR = {
     "store/copies/compaction.py": {"fcntl", "os.chown"},
     "web/note.py": {"fcntl", "os.geteuid"},
     "uncertainty/workers/processes.py": {"signal.pthread_sigmask"},
+    "reporting/pdf/beside.py": {"os.fork", "os.sched_getaffinity", "signal.SIGKILL"},
     "workflow/health/report.py": {"os.sched_getaffinity"},
 }  # fmt: skip
 

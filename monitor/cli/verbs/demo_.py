@@ -112,7 +112,7 @@ def _call(verb: ModuleType, name: str, database: str, arguments: list[str], sile
     parser = Parser(prog=f"monitor {name}")
     verb.options(parser)
     options = parser.parse_args(
-        arguments, Namespace(db=database, wait=PATIENCE_S, server=None, server_token=None)
+        arguments, Namespace(db=database, wait=PATIENCE_S, server=None, server_token=None, alone=False)
     )
     function = getattr(options, "run", None) or verb.run
     with contextlib.redirect_stdout(io.StringIO()) if silent else contextlib.nullcontext():

@@ -135,7 +135,8 @@ class ChainSearch:
         tries = [families * each.variant.tries * each.variant.odds for each in candidates]
         price = free * np.log(design.contrasts) + 2.0 * np.sum(np.log(tries))
         # Readings of a target that scatters are counted by less: in its own unit each is as likely.
-        units = 2.0 * np.sum(np.log((under.problem.sigma / first.problem.sigma)[under.has_weight]))
+        weighted = under.has_weight
+        units = 2.0 * np.sum(np.log(under.problem.sigma[weighted] / first.problem.sigma[weighted]))
         deviance = design.deviance(float(np.sum(rest**2)), correlation)
         return deviance + float(price + units) + sum(map(price_of_parts, candidates))
 
