@@ -10,6 +10,7 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from monitor.documents import from_document, to_document
@@ -105,6 +106,27 @@ def test_an_event_is_drawn_between_the_runs_that_it_lay_between(crashed: tuple[A
     runs = sorted(time for trace in chart["data"] if trace["name"] == "five-days" for time in trace["x"])
     before = sum(datetime.fromisoformat(time).replace(tzinfo=None) < at for time in runs)
     assert before == 14  # twelve of three days, two of the fourth
+
+
+def test_the_words_at_a_line_hide_no_runs_and_no_other_words(crashed: tuple[Any, datetime]) -> None:
+    """The words of the step stood on two of the four runs behind it."""
+    text = looked_at(crashed[0], "/machine?name=HU40-T&parameter=EB0C")
+    chart = json.loads(html.unescape(re.findall(r'class="figure">(.*?)</script>', text, re.DOTALL)[0]))
+    words = [note for note in chart["layout"]["annotations"] if note["yref"] == "paper"]
+    assert len(words) >= 2
+    runs = next(trace for trace in chart["data"] if "error_y" in trace)
+    times = np.array([datetime.fromisoformat(time).timestamp() for time in runs["x"]])
+    ends = np.array(runs["y"]) + np.array([[-1.0], [1.0]]) * np.array(runs["error_y"]["array"])
+    begin, top = chart["layout"]["yaxis"]["domain"]
+    heights = begin + (top - begin) * (ends - ends.min()) / np.ptp(ends)
+    for note in words:
+        # Some letters beside the line: the first or the last ones, whichever side they stand on.
+        side = 1.0 if note["xanchor"] == "left" else -1.0
+        beside = side * (times - datetime.fromisoformat(note["x"]).timestamp()) / np.ptp(times)
+        near = (beside >= 0.0) & (beside < 0.004 * len(note["text"]))
+        covered = (heights[1] > note["y"] - 0.05) & (heights[0] < note["y"])
+        assert not (near & covered).any(), note["text"]
+    assert len({(note["x"], note["y"]) for note in words}) == len(words)
 
 
 def test_a_step_at_an_event_is_told_where_changes_are(crashed: tuple[Any, datetime]) -> None:

@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from monitor.records import Array
 from monitor.web.charts.chart import DASHES, SERIES, Chart, Trace, axis, look
+from monitor.web.charts.line_words import Line, Runs, words_at_lines
 from monitor.web.words import channel, number
 
 if TYPE_CHECKING:
@@ -17,6 +21,8 @@ if TYPE_CHECKING:
 K = 2.0
 #: By what the runs can be coloured.
 GROUPINGS = ("campaign", "method", "day", "warm-up")
+#: Colours of upright lines: events of the machine, changes of the parameter.
+EVENT, CHANGE = "@violet", "@orange"
 
 
 def trend_chart(
@@ -27,29 +33,24 @@ def trend_chart(
     traces = _runs(values, parameter, grouping)
     shapes, notes = _tolerance(series.tolerance, series.unit)
     statement = None if trend is None else trend.parameters.get(parameter)
-    if trend is not None:
-        events = [
-            (_shop_time(values, event.at), f"{event.kind}: {event.description}") for event in trend.events
-        ]
-        shapes += [_upright(at, "@violet", "dash") for at, _ in events]
-        notes += _flags(values, events, "@violet", 1.0)
-    if statement is not None:
-        changes = [
-            (_shop_time(values, change.at), f"{change.kind} {number(change.size)} {change.unit}")
-            for change in statement.changes
-            if change.at
-        ]
-        shapes += [_upright(at, "@orange", "solid") for at, _ in changes]
-        notes += _flags(values, changes, "@orange", 0.84)
-        traces += _forecast(values, statement)
     conditions = _conditions(values)
+    lowest = 0.34 if conditions else 0.0
+    lines = [] if trend is None else _lines(values, trend, statement)
+    if lines:
+        shapes += [_upright(line) for line in lines]
+        runs = Runs.of(
+            values.started_at, _numbers(series.values), K * np.nan_to_num(_numbers(series.u)), lowest
+        )
+        notes += words_at_lines(lines, runs, lowest)
+    if statement is not None:
+        traces += _forecast(values, statement)
     return Chart(
         key="trend",
         says=f"{parameter} of {values.machine} over {len(values.run)} runs in {series.unit}, bars are ± U (k = 2)",
         traces=[*traces, *conditions],
         layout={
             "xaxis": axis("", type="date", anchor="y2" if conditions else "y"),
-            "yaxis": axis(f"{parameter} / {series.unit}", domain=[0.34 if conditions else 0.0, 1.0]),
+            "yaxis": axis(f"{parameter} / {series.unit}", domain=[lowest, 1.0]),
             **({"yaxis2": axis(_shared_title(values), domain=[0.0, 0.26])} if conditions else {}),
             "shapes": shapes,
             "annotations": notes,
@@ -122,28 +123,29 @@ def _tolerance(limit: float | None, unit: str) -> tuple[list[Any], list[Any]]:
     return lines, [note]
 
 
-def _upright(at: str, colour: str, dash: str) -> Any:
+def _lines(values: ValuesAnswer, trend: TrendAnswer, statement: ParameterTrend | None) -> list[Line]:
+    """The upright lines: events of the machine, then changes of the parameter."""
+    events = [
+        Line(_shop_time(values, event.at), f"{event.kind}: {event.description}", EVENT)
+        for event in trend.events
+    ]
+    return events + [
+        Line(_shop_time(values, change.at), f"{change.kind} {number(change.size)} {change.unit}", CHANGE)
+        for change in (() if statement is None else statement.changes)
+        if change.at
+    ]
+
+
+def _numbers(cells: Sequence[float | None]) -> Array:
+    return np.array([np.nan if cell is None else cell for cell in cells])
+
+
+def _upright(line: Line) -> Any:
+    dash = "dash" if line.colour == EVENT else "solid"
     return {
-        "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": at, "x1": at,
-        "line": {"color": colour, "width": 1.5, "dash": dash},
+        "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": line.at, "x1": line.at,
+        "line": {"color": line.colour, "width": 1.5, "dash": dash},
     }  # fmt: skip
-
-
-def _flags(values: ValuesAnswer, flags: Sequence[tuple[str, str]], colour: str, top: float) -> list[Any]:
-    """The words at upright lines, on paper of their own; one below the other in turns, since neighbours may be close.
-
-    Those of the last quarter of the runs stand on the left of their lines, where they have room.
-    """
-    first, last = min(values.started_at), max(values.started_at)
-    late = (first + 0.75 * (last - first)).isoformat()
-    return [
-        {
-            "x": at, "yref": "paper", "y": top - 0.055 * (index % 3), "yanchor": "top", "text": text[:60],
-            "showarrow": False, "xanchor": "right" if at > late else "left", "bgcolor": "@paper",
-            "font": {"color": colour, "size": 11},
-        }
-        for index, (at, text) in enumerate(flags)
-    ]  # fmt: skip
 
 
 def _forecast(values: ValuesAnswer, statement: ParameterTrend) -> list[Trace]:
