@@ -138,6 +138,7 @@ def test_a_step_at_an_event_is_told_where_changes_are(crashed: tuple[Any, dateti
 
 
 def test_colours_that_come_twice_have_no_legend(local: Any) -> None:
+    assert local.ask("identify", {"campaign": "hidden-spindle-growth"})[0] == 200
     _, whole = local.ask("values", {"machine": "HU40-T"})
     values = from_document(ValuesAnswer, whole)
     days = trend_chart(values, "EXX", None, "day")
