@@ -15,7 +15,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, Timeo
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from threading import Event, RLock
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from monitor.exceptions import MonitorError, NotFoundError, StoreError
 from monitor.stopping import StoppedError, stoppable
@@ -43,6 +43,18 @@ REFUSAL_STANDS_S = 60.0
 FAULT_STANDS_S = 10.0
 
 Key = TypeVar("Key")
+
+
+class Outcome(NamedTuple):
+    """What there was of a question when it was looked at: an answer, a refusal, or the ticket that is waited for.
+
+    One look: whoever asked first for the answer and then whether it is done would show a page that lacks what was
+    answered between the two, and is not loaded again.
+    """
+
+    answer: Any
+    refusal: str
+    waiting: Ticket | None
 
 
 @dataclass
@@ -143,12 +155,13 @@ class Ticket:
         waited_for.add_done_callback(lambda future: future.cancelled() or future.exception())
         await asyncio.wait([waited_for], timeout=max(patience - self.seconds, 0.0))
 
-    def outcome(self) -> tuple[Any, str]:
-        """Return the answer and why there is none; None and nothing while it is computed."""
+    def outcome(self) -> Outcome:
+        """Return the answer, or why there is none, or this ticket while it is computed."""
         try:
-            return self.answer(), ""
+            answer = self.answer()
         except MonitorError as error:
-            return None, str(error)
+            return Outcome(None, str(error), None)
+        return Outcome(answer, "", self if answer is None else None)
 
 
 class Desk:

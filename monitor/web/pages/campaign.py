@@ -49,14 +49,14 @@ def routes() -> APIRouter:
         if row.rows is not None:
             return page(request, "curve.html", row=row)
         runs: RunsAnswer = ask(user, "runs", {"campaign": name})
-        tickets = [desk.ask(user, "statistics", {"campaign": name, "by": by})]
-        statistics, why_no_statistics = tickets[0].outcome()
+        asked = {"campaign": name, "by": by}
+        statistics, why_no_statistics, waiting = desk.ask(user, "statistics", asked).outcome()
         trials = bool(request.query_params.get("trials"))
         regions, why_no_regions = None, ""
         if first or second:
             question, document = _regions_asked(name, first, second, run, trials=trials)
-            tickets.append(desk.ask(user, question, document))
-            regions, why_no_regions = tickets[1].outcome()
+            regions, why_no_regions, computed = desk.ask(user, question, document).outcome()
+            waiting = waiting or computed
         return page(
             request, "campaign.html",
             row=row, runs=runs, conditions=_conditions(runs), by=by, run=run,
@@ -64,7 +64,7 @@ def routes() -> APIRouter:
             charts=[] if statistics is None else _charts(statistics),
             regions=regions, why_no_regions=why_no_regions, first=first, second=second,
             region=None if regions is None else _region(regions, first, second),
-            trials=trials, waiting=next((ticket for ticket in tickets if not ticket.is_done), None),
+            trials=trials, waiting=waiting,
         )  # fmt: skip
 
     return router

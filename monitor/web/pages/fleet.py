@@ -148,7 +148,7 @@ def _summed(request: Request, machines: TableAnswer) -> _Sums:
         # Nothing is identified any more, or not yet.
         return _Sums(waiting=identifying)
     shown = ticket if answer is not None else last
-    waiting = identifying or (None if ticket.is_done else ticket)
+    waiting = identifying or (ticket if answer is None else None)
     if shown is None:
         return _Sums(waiting=waiting)
     is_of_now = desk.standing(*ASKED) is shown

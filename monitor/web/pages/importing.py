@@ -64,7 +64,7 @@ def _shown(
 ) -> Response:
     """The form, below what an import led to or how far it is."""
     refusal = outcome if isinstance(outcome, Refusal) else None
-    waiting = None if ticket is None or ticket.is_done else ticket
+    waiting = ticket if outcome is None else None
     return page(
         request, "import.html", status=refusal.status if refusal else 200,
         answer=None if refusal else outcome, refusal=refusal, waiting=waiting,

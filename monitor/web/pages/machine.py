@@ -50,7 +50,8 @@ def routes() -> APIRouter:
         trends = _Trends(request, _asked(name, since, campaign), parameter)
         # The whole history, of which a period is cut: it is read once and held for every period that is looked at.
         values: ValuesAnswer = ask(user, "values", {"machine": name})
-        if not values.parameters and trends.of_all() is not None:
+        is_unidentified = not values.parameters or (campaign and campaign not in values.campaign)
+        if is_unidentified and trends.of_all() is not None:
             # The trend has identified what nobody had identified before.
             values = ask(user, "values", {"machine": name})
         values = _within(values, **_ends(since, until))
@@ -120,6 +121,7 @@ class _Trends:
 
     def __init__(self, request: Request, asked: dict[str, Any], parameter: str) -> None:
         self._user, self._desk, self._asked = request.state.user, request.app.state.desk, asked
+        self.waiting: Ticket | None = None
         self._one: Ticket | None = None
         self._all: Ticket | None = self._desk.standing("trend", asked)
         if parameter and (self._all is None or not self._all.is_done):
@@ -133,15 +135,13 @@ class _Trends:
         """Return the trends of all parameters, None while they are computed."""
         if self._all is None:
             self._all = self._desk.ask(self._user, "trend", self._asked)
-        answer: TrendAnswer | None = self._all.answer()
-        return answer
+        return self._taken(self._all)
 
     def of_all_already(self) -> TrendAnswer | None:
         """Return the trends of all parameters where they need not be computed."""
         if self._all is None or not self._all.is_done:
             return None
-        answer: TrendAnswer | None = self._all.answer()
-        return answer
+        return self._taken(self._all)
 
     def shown(self, parameter: str) -> TrendAnswer | None:
         """Return what there is of a parameter (empty: the machine has none), None while it is computed."""
@@ -149,15 +149,14 @@ class _Trends:
             return self.of_all()
         if self._one is None:
             self._one = self._of_one(parameter)
-        answer: TrendAnswer | None = self._one.answer()
-        return answer
+        return self._taken(self._one)
 
-    @property
-    def waiting(self) -> Ticket | None:
-        """The trend that is not answered yet."""
-        return next(
-            (ticket for ticket in (self._one, self._all) if ticket is not None and not ticket.is_done), None
-        )
+    def _taken(self, ticket: Ticket) -> TrendAnswer | None:
+        """The answer of a ticket; None while it is computed, which is noted."""
+        answer: TrendAnswer | None = ticket.answer()
+        if answer is None:
+            self.waiting = self.waiting or ticket
+        return answer
 
 
 def _two_periods(

@@ -147,6 +147,7 @@ class _Answers:
             tickets["driven"] = desk.ask(user, "residuals by driver", by_driver)
         tickets["compare"] = desk.ask(user, "compare", asked)
         self.refusals = dict.fromkeys(("explain", "residuals", "driven", "compare", "history"), "")
+        self.waiting: Ticket | None = None
         self.compare = self._take("compare", tickets["compare"])
         if self.compare is not None:
             version = {"campaign": campaign, "model": self.compare.comparison.model}
@@ -157,13 +158,13 @@ class _Answers:
         self.driven = self._take("driven", tickets.get("driven"))
         history = self._take("history", tickets.get("history"))
         self.steps = () if history is None else history.steps
-        self.waiting = next((ticket for ticket in tickets.values() if not ticket.is_done), None)
 
     def _take(self, name: str, ticket: Ticket | None) -> Any:
-        """The answer of a ticket; None while it is computed, and where it was refused."""
-        answer, refusal = (None, "") if ticket is None else ticket.outcome()
-        if refusal:
-            self.refusals[name] = refusal
+        """The answer of a ticket; None while it is computed, which is noted, and where it was refused."""
+        if ticket is None:
+            return None
+        answer, self.refusals[name], waiting = ticket.outcome()
+        self.waiting = self.waiting or waiting
         return answer
 
 

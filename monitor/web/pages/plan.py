@@ -38,12 +38,12 @@ def routes() -> APIRouter:
         if separate:
             document["separate"] = PlanRequest.two_effects(separate)
         ticket = request.app.state.desk.ask(request.state.user, "plan", document)
-        answer, refusal = ticket.outcome()
+        answer, refusal, waiting = ticket.outcome()
         return page(
             request, "plan.html",
             campaign=campaign, model=model, answer=answer, refusal=refusal, asked=document, separate=separate,
             is_of_angles=isinstance(answer, AnglePlanAnswer), is_of_tests=isinstance(answer, InstrumentPlanAnswer),
-            waiting=None if ticket.is_done else ticket,
+            waiting=waiting,
             chart=plan_chart(answer) if isinstance(answer, BallPlanAnswer) and answer.proposed else None,
         )  # fmt: skip
 

@@ -31,16 +31,15 @@ def routes() -> APIRouter:
     @router.get("/reports")
     def reports(request: Request, week: str = "", machine: str = "") -> Response:
         """List the weeks with runs; show the report of one."""
-        answer, ticket, refusal = None, None, ""
+        answer, refusal, waiting = None, "", None
         if week:
-            ticket = _asked(request, week, machine)
-            answer, refusal = ticket.outcome()
+            answer, refusal, waiting = _asked(request, week, machine).outcome()
         campaigns = request.app.state.asker(request.state.user, "campaigns").campaigns
         return page(
             request, "reports.html",
             weeks=_weeks(campaigns), machines=sorted({row.machine for row in campaigns if row.rows is None}),
             week=week, machine=machine, answer=answer, refusal=refusal,
-            waiting=None if ticket is None or ticket.is_done else ticket,
+            waiting=waiting,
         )  # fmt: skip
 
     @router.get("/report")

@@ -34,12 +34,12 @@ def routes() -> APIRouter:
         document = {"campaign": campaign, **asked, **({"absolute": True} if absolute else {})}
         runs: RunsAnswer = request.app.state.asker(user, "runs", {"campaign": campaign})
         ticket = desk.ask(user, "map over the stroke", document)
-        answer, refusal = ticket.outcome()
+        answer, refusal, waiting = ticket.outcome()
         return page(
             request, "map.html",
             campaign=campaign, runs=runs.runs, run=run, minus=minus, pose=pose, points=points or "5",
             absolute=absolute, choices=POINTS, answer=answer, refusal=refusal,
-            waiting=None if ticket.is_done else ticket,
+            waiting=waiting,
             vectors=None if answer is None else vectors_chart(answer),
             slices=[] if answer is None else slice_charts(answer),
         )  # fmt: skip
