@@ -16,7 +16,8 @@ Point = tuple[float, float, float]
 class Machine:
     """A machine by its topology, from the workpiece to the tool: ``Machine("w C B X b Z Y (C1) t")``.
 
-    Raises InputError for a topology that cannot be read.
+    ``axes`` are its axes, ``base`` the errors that can be identified, both by name. The chain is that of ISO 230-1 and
+    ISO 10791-6 (docs/mathematics.md, 1). Raises InputError for a topology that cannot be read.
     """
 
     def __init__(self, topology: str) -> None:
