@@ -10,8 +10,8 @@ from sphinx.application import Sphinx
 
 
 def _anchors() -> dict[str, str]:
-    """Return the anchor of every type of answer: that of the first question that gives it."""
-    anchors: dict[str, str] = {}
+    """Return the anchor of every type of answer: that of the first question that gives it; of any answer the page's."""
+    anchors = {"AnyAnswer": "questions-and-documents"}
     for name, question in documents.QUESTIONS.items():
         for answer in documents.members(question.answer):
             anchors.setdefault(answer.__name__, name.replace(" ", "-"))

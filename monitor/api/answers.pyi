@@ -91,6 +91,7 @@ from monitor.workflow.volumetric.answer import MapPoint
 from monitor.workflow.volumetric.answer import MapRegion
 from monitor.workflow.volumetric.answer import PoseError
 from monitor.workflow.volumetric.answer import VolumetricAnswer
+from typing import Any
 
 class TypedCertificateFileAnswer(Answer[CertificateFileAnswer]):
     @property
@@ -605,3 +606,6 @@ class TypedVolumetricAnswer(Answer[VolumetricAnswer]):
     def figures(self) -> tuple[str, ...] | None: ...
     @property
     def tables(self) -> tuple[str, ...] | None: ...
+
+class AnyAnswer(Answer[Any]):
+    def __getattr__(self, name: str) -> Any: ...

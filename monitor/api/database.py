@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from monitor import store
-from monitor.api.answer import Answer
 from monitor.api.asking import Ask, answered, drawn, options_as_arguments, request_of
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from monitor.api.answers import (
+        AnyAnswer,
         TypedFleetAnswer,
         TypedImportAnswer,
         TypedLikeAnswer,
@@ -128,7 +128,7 @@ class Database:
         whose name ends in one. Raises InputError for any other query."""
         return table_of(self._ask("sql", query=query, limit=limit))
 
-    def ask(self, question: str, **options: Any) -> Answer[Any]:
+    def ask(self, question: str, **options: Any) -> AnyAnswer:
         """Ask any question of the contract by its name, such as ``ask("plan", campaign="five-days")``.
 
         Raises InputError for a question that there is not.

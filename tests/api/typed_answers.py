@@ -2,7 +2,8 @@
 
 An ``Answer`` has the fields of its content, and of the records that are inlined in it, as attributes. No annotation can
 say that of a type variable, so the stub names them; type checkers and editors read it, and nothing loads it. Where an
-answer may be of several kinds (a machine's, a curve's), an attribute has the types of all.
+answer may be of several kinds (a machine's, a curve's), an attribute has the types of all. ``AnyAnswer`` is what a
+question by its name gives, which has any attribute.
 
 ``python tests/api/typed_answers.py`` writes it; ``test_typed_answers.py`` holds it against the types.
 """
@@ -145,6 +146,8 @@ def stub() -> str:
         for name, written in attributes(content).items():
             lines += ["    @property", f"    def {name}(self) -> {imports.union(written)}: ..."]
         classes.append("\n".join(lines))
+    imports.names.add(("typing", "Any"))
+    classes.append("class AnyAnswer(Answer[Any]):\n    def __getattr__(self, name: str) -> Any: ...")
     return HEAD + imports.lines() + "\n\n" + "\n\n".join(classes) + "\n"
 
 
