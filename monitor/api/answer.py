@@ -26,7 +26,7 @@ class Answer(Generic[Content]):
         self.content = content
         self._draw = draw
 
-    # Type checkers see the fields of each kind of answer in answers.pyi; by this door every misspelt one would be right.
+    # Type checkers see the fields of each kind of answer in answers.pyi; through this every misspelt one passes.
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:

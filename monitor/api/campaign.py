@@ -124,7 +124,8 @@ class Campaign:
         """Issue a calibration certificate after ISO/IEC 17025:2017, 7.8 as PDF into ``out`` (``CertificateRequest``).
 
         ``laboratory`` is the TOML file of what the laboratory states. The answer has ``number``, ``file`` and the
-        ``sha256`` of the file. Raises InputError with all that is missing and each ground that speaks against it.
+        ``sha256`` of the file. Raises InputError with all that is missing and each ground that speaks against it,
+        DataError where the runs are too few for a joint region.
         """
         return answered(
             self._ask(
