@@ -22,7 +22,7 @@ NAME = "monitor.toml"
 ANGLE_UNITS = ("µrad", "arcsec", "µm/m")
 _TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
-_TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*")
+_TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*|[A-Za-z0-9]+:\S+")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.
 # Paths without a leading / are counted from the folder of this file.
@@ -128,7 +128,7 @@ def _tolerances(value: object) -> str | None:
             if term != "volumetric" and not _TERM.fullmatch(term):
                 return (
                     f'[tolerances."{name}"] {term}: no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, '
-                    "or volumetric"
+                    "as an effect such as EXX:reversal, or volumetric"
                 )
             number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
             if not number or not 0.0 < limit < math.inf:

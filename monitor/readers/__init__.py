@@ -15,7 +15,7 @@ from monitor.readers.mapping.reading import Exports, read_exports
 from monitor.readers.mapping.understood import UnderstoodColumn, UnderstoodFile, understood_tables
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, export_formats, method_rules, read_campaign, readers
-from monitor.readers.sources_file import line_of_source, read_sources_file
+from monitor.readers.sources_file import line_of_source, line_of_tolerance, read_sources_file
 from monitor.readers.writer import write_campaign
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "files_in",
     "is_export_folder",
     "line_of_source",
+    "line_of_tolerance",
     "method_rules",
     "names_in",
     "read_campaign",

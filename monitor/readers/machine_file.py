@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
@@ -14,6 +15,8 @@ from monitor.records import VOLUMETRIC, AxisSettings, ChainAxis, Machine, plain_
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
 TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
+#: Stands between the term and the shape of an effect, in the name of its parameters.
+EFFECT_SIGN = ":"
 #: More turns of a motor for one of its axis than any drive has.
 LARGEST_RATIO = 1e4
 
@@ -152,24 +155,31 @@ def _stroke(table: Table, axis: Axis) -> tuple[float, float] | None:
     return low, high
 
 
+def not_of_effect(effect: str, parameters: Iterable[str]) -> str:
+    """The fault of a limit that names no parameter of its effect."""
+    return f"is no parameter of the effect {effect}; it has {', '.join(parameters)}"
+
+
 def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, float]:
     table = machine.table("tolerances")
     tolerances: dict[str, float] = {}
     if table is None:
         return tolerances
     for name in table.data:
-        match = TERM.fullmatch(name)
+        # A parameter of an effect begins with its term, EXX:reversal; the import asks whether there is such an effect.
+        match = TERM.fullmatch(name.split(EFFECT_SIGN)[0])
+        is_change = match is None and EFFECT_SIGN in name
         if name == VOLUMETRIC:
             limit = table.number(name, positive=True, unit="µm", example="50.0")
             if limit is not None:
                 tolerances[name] = limit
-        elif match is None:
+        elif match is None and not is_change:
             table.fault(
                 name,
-                f"{quoted(name)} is not the name of a term; write it as in ISO 230-1, "
-                f"such as EC0Y (location) or EXX (motion), or {VOLUMETRIC}",
+                f"{quoted(name)} is not the name of a term; write it as in ISO 230-1, such as EC0Y (location) or EXX "
+                f"(motion), as an effect of the machine's model, such as EXX:reversal, or {VOLUMETRIC}",
             )
-        elif axes is not None and match[3] not in {axis.name for axis in axes}:
+        elif axes is not None and match is not None and match[3] not in {axis.name for axis in axes}:
             table.fault(
                 name,
                 f"the topology has no axis {match[3][:20]}; its axes are {one_of(axis.name for axis in axes)}",

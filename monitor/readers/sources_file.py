@@ -67,6 +67,13 @@ def line_of_source(content: bytes, index: int) -> int | None:
     return line_of(("sources", index), lines_of_keys(content.decode("utf-8-sig", errors="replace")))
 
 
+def line_of_tolerance(content: bytes, name: str) -> int | None:
+    """The line of a limit in ``[machine.tolerances]`` in the bytes of a file; None where it has none."""
+    return line_of(
+        ("machine", "tolerances", name), lines_of_keys(content.decode("utf-8-sig", errors="replace"))
+    )
+
+
 def _source(table: Table, axes: tuple[Axis, ...] | None) -> Source | None:
     before = len(table.faults)
     name = table.text("name", required=True, example='"temperature of the bar"')

@@ -156,6 +156,11 @@ def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> 
     assert message in answer.err
 
 
+def test_a_machine_type_may_limit_an_effect(typed: Any) -> None:
+    configured('[tolerances."*"]\n"EXX:reversal" = 5.0\n')
+    assert typed("config", "check").status == 0
+
+
 def test_an_empty_file_is_no_database_for_a_verb_that_reads(typed: Any) -> None:
     Path("full.duckdb").write_bytes(b"")
     answer = typed("--db", "full.duckdb", "campaigns")

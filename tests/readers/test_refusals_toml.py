@@ -44,6 +44,8 @@ ONE_FAULT = [
     ("scale_pitch_mm = 0.02", "scale_pitch_mm = 0", 12, "machine.axes.X.scale_pitch_mm", "0 must be greater than 0"),
     ("EC0Y = 20.0", "EC0Y = -20.0", 18, "machine.tolerances.EC0Y", "-20.0 must be greater than 0"),
     ("EC0Y = 20.0", "squareness = 20.0", 18, "machine.tolerances.squareness", "is not the name of a term; write it as in ISO 230-1"),
+    ("EC0Y = 20.0", '"EAA:reversal" = 20.0', 18, "machine.tolerances.EAA:reversal", "the topology has no axis A"),
+    ("EC0Y = 20.0", '"EXX:reversal" = 0', 18, "machine.tolerances.EXX:reversal", "0 must be greater than 0"),
     ("EC0Y = 20.0", "EC0A = 20.0", 18, "machine.tolerances.EC0A", "the topology has no axis A"),
     # probe and artefact
     ("standard_uncertainty_um = 0.7", 'standard_uncertainty_um = "0,7"', 24, "probe.standard_uncertainty_um", "'0,7' is not a number; write standard_uncertainty_um = 0.7 (in um)"),

@@ -175,6 +175,12 @@ def test_every_state_has_its_answer(health: MachineHealth, kind: str, sentence: 
     assert {answer.kind: answer.sentence for answer in answers(fleet(health)[0])}[kind] == sentence
 
 
+def test_without_machines_nothing_is_said_to_have_been_judged() -> None:
+    """It read *Everything was judged* of an empty database."""
+    sentences = {answer.kind: answer.sentence for answer in answers(fleet()[0])}
+    assert sentences["unjudged"] == "Nothing was there to judge: no machines yet."
+
+
 def test_tolerances_without_uncertainties_are_not_said_to_be_lacking() -> None:
     bare = machine("Bare", "no change seen", next_check=NextCheck(CheckKind.NO_TOLERANCE))
     limited = machine("Limited", "no change seen", next_check=NextCheck(CheckKind.NO_FORECAST))

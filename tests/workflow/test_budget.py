@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
@@ -123,6 +124,9 @@ def test_a_bar_that_is_warm_by_1_K_has_its_line_and_is_said_in_the_answer(db):
     assert len(counted) == 11
     assert [name for name, does in counted.items() if not does] == ["temperature of the bar from run to run"]
     assert answer.length.kind is LengthKind.CORRECTED
+    # The sources state both, so nothing of the bar is said to be outside of u.
+    assert answer.length.not_in_u == ()
+    assert "no part of u" not in length_sentence(answer.length, texts_of())
     # At the time of the run nothing repeats: what changes from run to run counts too.
     run = answered(db, "steel-bar", holds_for="run")
     assert all(source.counted for source in run.sources)
@@ -134,6 +138,12 @@ def sources_file(tmp_path: Path, text: str) -> Path:
     file.write_text(text)
     return file
 
+
+#: What u lacks of a bar, and how the text says it.
+BAR = {
+    "standard_temperature": "How well the temperature of the bar is known is no part of u",
+    "standard_expansion": "How well the expansion coefficient of the bar is known is no part of u",
+}
 
 BENDING = '[[sources]]\nname = "stylus"\nquantity = "stylus_bending"\nstandard_uncertainty_um = 1.0\n'
 
@@ -254,6 +264,28 @@ def test_it_is_said_in_german_too(db):
     expanded = f"{answer.guf.expanded['EB0C']:.1f}".replace(".", ",")
     assert f"EB0C (16,4 µrad, U = {expanded} µrad)" in said
     assert "sie sind nicht auf 20 °C bezogen" in length_sentence(answer.length, texts)
+
+
+def test_what_no_source_states_of_the_bar_is_said_with_its_size(db):
+    """11.5 µm/m a kelvin of steel, and 7 K from 20 °C times 1e-6/K; words alone where nothing was corrected."""
+    said = length_sentence(answered(db, "five-days", run=20).length, texts_of())
+    assert re.search(r"without a correction for its temperature \(ambient_degC: \d+\.\d+ °C\)", said)
+    assert "The temperature of the bar is no part of u, because no source states it" in said
+    steel = replace(
+        answered(db, "steel-bar").length, temperature=27.0, columns=("bar_degC",), not_in_u=tuple(BAR)
+    )
+    both = length_sentence(steel, texts_of())
+    assert "corrected from 20 °C to 27 °C, recorded as bar_degC, with 11.5" in both
+    assert "1 K changes every gain by 11.5 µm/m, 10⁻⁶/K by 7 µm/m" in both
+    for quantity, phrase in BAR.items():
+        assert phrase in length_sentence(replace(steel, not_in_u=(quantity,)), texts_of())
+    cold = replace(steel, temperature=20.0, not_in_u=("standard_expansion",))
+    assert "no part of u" not in length_sentence(cold, texts_of())
+    assert "10⁻⁶/K um 7 µm/m" in length_sentence(steel, texts_of("de"))
+    # Of a certificate of before nothing was recorded, and its sentence stays as it was.
+    before = replace(steel, columns=None, not_in_u=None)
+    assert "corrected from 20 °C to 27 °C with 11.5" in length_sentence(before, texts_of())
+    assert "no part of u" not in length_sentence(before, texts_of())
 
 
 @pytest.mark.slow

@@ -251,6 +251,23 @@ def test_the_grounds_of_a_stored_evaluation_are_read_and_not_determined_again(
     assert {ground.run for ground in determined if ground.kind is GroundKind.SCALE_BAR} == {19, 20}
 
 
+@pytest.mark.parametrize("more_mm", [-0.25, -0.13, 0.13, 0.25])
+def test_gains_that_are_off_together_are_of_a_bar_of_another_length(
+    five_days: Campaign, more_mm: float
+) -> None:
+    """A quarter of a millimetre of 305 is 820 µm/m of every gain: below the limit of one, and of `scale-bar`."""
+    (ground,) = grounds(with_bar(five_days, more_mm))
+    assert (ground.kind, ground.subject) == (GroundKind.IMPLAUSIBLE, "EXX, EYY, EZZ")
+    assert ground.size == pytest.approx(1e6 * more_mm / 305.0, abs=40.0)
+    assert "are off together, by " in ground_sentence(ground, texts_of())
+    assert "weichen gemeinsam ab" in ground_sentence(ground, texts_of("de"))
+
+
+@pytest.mark.parametrize("more_mm", [-0.09, 0.09])
+def test_scales_30_K_warmer_than_the_bar_are_no_ground(five_days: Campaign, more_mm: float) -> None:
+    assert grounds(with_bar(five_days, more_mm)) == ()
+
+
 def test_no_temperature_where_a_bar_gives_the_length(five_days: Campaign) -> None:
     runs = tuple(
         replace(run, conditions={name: x for name, x in run.conditions.items() if not name.endswith("degC")})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -9,13 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from by_path import load, simulator
+from scipy import stats
 
-from monitor.exceptions import EffectError, InputError, NotFoundError
-from monitor.store import Database, import_campaign, verify_audit
+from monitor.exceptions import CampaignError, EffectError, InputError, NotFoundError
+from monitor.reporting.health.records import State
+from monitor.store import Database, import_campaign, load_campaign, machine_runs, verify_audit
+from monitor.store.past.history import latest_tolerances
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
+from monitor.workflow.health.machine import machine_health, named_machines, read_week
+from monitor.workflow.health.request import ReportOptions
+from monitor.workflow.health.task import computed
+from monitor.workflow.health.weeks import week_of
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect, affected
 from monitor.workflow.model.request import AddEffectRequest, UseModelRequest
 from monitor.workflow.model.use import use_model
@@ -27,6 +36,8 @@ MONTHS = 9
 #: µm of backlash in the first month and more in each that follows; half of it is the amplitude of EXX:reversal.
 FIRST_UM, MORE_UM = 2.0, 0.8
 BACKLASH = "EXX:reversal"
+#: Reached in the seventh month.
+LIMIT_UM = 7.0
 WHY = "backlash of X noticed in May"
 
 
@@ -44,7 +55,8 @@ def worn(tmp_path_factory):
         )
         import_campaign(db, replace(campaign, name=f"month-{month + 1}", runs=runs))
     other, _ = virtual.virtual(99, days=1, runs_per_day=3, runs=3)
-    import_campaign(db, replace(other, name="other", machine=replace(other.machine, id="W")))
+    limited = replace(other.machine, id="W", tolerances={BACKLASH: LIMIT_UM})
+    import_campaign(db, replace(other, name="other", machine=limited))
     add_effect(db, AddEffectRequest(BACKLASH, "samba", "with-backlash", campaign="month-1"))
     yield db
     db.close()
@@ -149,3 +161,50 @@ def test_the_weekly_report_follows_the_added_effect(worn, tmp_path, pdf_unread):
     assert backlash.estimate == pytest.approx(FIRST_UM + MORE_UM * (MONTHS - 1), abs=4.0 * backlash.u)
     assert len(backlash.history.values) == 4 * MONTHS
     assert backlash.drift
+
+
+def test_a_limit_of_an_effect_is_read_kept_and_refused_where_there_is_no_such_effect(
+    worn: Database, tmp_path: Path
+) -> None:
+    assert latest_tolerances(worn)["W", BACKLASH] == LIMIT_UM
+    folder = tmp_path / "limited"
+    shutil.copytree(Path(__file__).resolve().parents[2] / "examples" / "five-days", folder)
+    file = folder / "campaign.toml"
+    stated = file.read_text(encoding="utf-8")
+    table = len(stated.splitlines()) + 2
+    file.write_text(
+        f'{stated}\n[machine.tolerances]\n"EXX:reversl" = 5.0\n"EBB:harmonic2" = 5.0\n', encoding="utf-8"
+    )
+    with Database(tmp_path / "new.duckdb") as db:
+        with pytest.raises(CampaignError, match=f"line {table + 1}, .*did you mean 'reversal'") as refused:
+            import_folders(db, ImportRequest([folder]))
+        assert f"line {table + 2}" in str(refused.value)
+        assert "it has EBB:harmonic2.cos, EBB:harmonic2.sin" in str(refused.value)
+        limits = {"EXX:reversal": 5.0, "EBB:harmonic2.cos": 6.0, "EXX:cyclic0.5mm.sin": 7.0, "EC0Y": 8.0}
+        lines = "".join(f'"{name}" = {limit}\n' for name, limit in limits.items())
+        file.write_text(f"{stated}\n[machine.tolerances]\n{lines}", encoding="utf-8")
+        import_folders(db, ImportRequest([folder]))
+        assert dict(load_campaign(db, "five-days").machine.tolerances) == limits
+
+
+def test_an_effect_beyond_its_limit_alarms_in_trend_fleet_and_report(worn: Database) -> None:
+    """The last month has 2.0 + 8 * 0.8 = 8.4 µm of 7; the probability is that of a normal law, by scipy."""
+    use_model(worn, UseModelRequest("with-backlash", "V", WHY))
+    worn.type_tolerances = {"*": {BACKLASH: LIMIT_UM}}
+    try:
+        followed = trend(worn, TrendRequest("V", parameter=BACKLASH))
+        rows = {row.parameter: row for row in fleet(worn, FleetRequest(top=0)).table if row.machine == "V"}
+        (name,) = [machine for machine in named_machines(worn) if machine.machine == "V"]
+        last = machine_runs(worn, "V")[-1]
+        past = read_week(worn, name, week_of(last.local_start.date()), ReportOptions())
+        health = machine_health(worn, past, computed(past.task))
+    finally:
+        worn.type_tolerances = {}
+    assert followed.parameters[BACKLASH].forecast.limit == LIMIT_UM
+    assert rows[BACKLASH].attention == "out of tolerance"
+    (parameter,) = [each for each in health.parameters if each.name == BACKLASH]
+    assert (health.state, parameter.tolerance) == (State.OUT_OF_TOLERANCE, LIMIT_UM)
+    beyond = stats.norm(parameter.estimate, parameter.u)
+    expected = float(beyond.sf(LIMIT_UM) + beyond.cdf(-LIMIT_UM))
+    assert parameter.probability_out == pytest.approx(expected, abs=1e-9)
+    assert health.probability_out == pytest.approx(expected, abs=1e-9)

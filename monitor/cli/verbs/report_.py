@@ -33,7 +33,9 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="default: the working directory"
     )
-    parser.add_argument("--model", metavar="NAME", help="default: the method's own")
+    parser.add_argument(
+        "--model", metavar="NAME", help="default: that of each machine, else its method's own"
+    )
     parser.add_argument(
         "--campaign", action="append", default=[], metavar="NAME", help="only this campaign (may be repeated)"
     )

@@ -13,6 +13,9 @@ from enum import StrEnum
 
 from monitor.reporting.texts import Texts
 
+#: Between the names of a ground that is of several parameters together.
+SEVERAL = ", "
+
 
 class GroundKind(StrEnum):
     """What speaks against a certificate; the value is how it is accepted and stored."""
@@ -57,6 +60,8 @@ def ground_sentence(ground: Ground, texts: Texts) -> str:
     key = ground.kind.value.replace("-", "_")
     if ground.kind is GroundKind.TEMPERATURE and ground.size is not None:
         key = "impossible_temperature"
+    if ground.kind is GroundKind.IMPLAUSIBLE and SEVERAL in ground.subject:
+        key = "common_gain"
     if ground.kind is GroundKind.UNITS and not ground.subject:
         key = "fits_too_well"
     if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:

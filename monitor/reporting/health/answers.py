@@ -320,6 +320,8 @@ def _has_tolerances(row: FleetRow) -> bool:
 
 
 def _unjudged(fleet: Fleet) -> str:
+    if not fleet.rows and not fleet.refused_imports:
+        return "Nothing was there to judge: no machines yet."
     open_rows = [row for row in fleet.rows if row.state in _WITHOUT_LIMIT and not _was_judged(row)]
     parts = [
         f"{phrase}: {_names(rows)}"

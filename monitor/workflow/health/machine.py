@@ -57,6 +57,7 @@ from monitor.workflow.health.verdict import (
     next_check,
     since_when,
     state_of,
+    with_effects,
     with_volumetric,
 )
 from monitor.workflow.health.weeks import Week
@@ -156,9 +157,10 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     limits = _limits(db, last.campaign, remarks)
     limit_um = limits.get(VOLUMETRIC)
     beyond = None if limit_um is None else _beyond(results, limit_um, remarks)
-    judged = with_volumetric(conformity_of(stated, limits), beyond)
+    added = {name: past for name, past in parameter_pasts.items() if name.startswith(model.effects)}
+    of_last = {name: past.series for name, past in added.items() if past.mask[-1]}
+    judged = with_volumetric(with_effects(conformity_of(stated, limits), of_last, limits), beyond)
     parameters, drifts = [], {}
-    added = [name for name in parameter_pasts if name.startswith(model.effects)]
     for name in () if stated is None else (*stated.parameters, *added):
         if stated is None or name not in parameter_pasts:
             continue

@@ -31,6 +31,7 @@ from monitor.store import (
     import_curve,
     record_refusal,
 )
+from monitor.workflow.intake.checked_tolerances import check_tolerances
 from monitor.workflow.intake.copied_runs import check_copies
 from monitor.workflow.intake.curve_base import check_base
 from monitor.workflow.intake.gross_doubts import gross_doubts
@@ -172,6 +173,7 @@ def _read(db: Database, source: _Source) -> _Reading:
         from monitor.workflow.intake.checked_sources import check_sources
 
         check_sources(campaign)
+    check_tolerances(campaign)
     notes = (*notes, *check_copies(db, campaign), *doubts(campaign), *gross_doubts(campaign))
     return _Reading(campaign, notes, understood)
 

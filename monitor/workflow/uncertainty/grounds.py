@@ -22,7 +22,7 @@ from monitor.readers.doubts import (
 )
 from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign, Run
-from monitor.reporting.certificate.grounds import Ground, GroundKind
+from monitor.reporting.certificate.grounds import SEVERAL, Ground, GroundKind
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.notes import TOO_SMALL
 
@@ -33,6 +33,9 @@ MOST_TIMES = 5.0
 #: mm/m. A steel scale 30 K off 20 °C comes to 0.35; what is more is no property of an axis, but a wrong length. Largest
 #: in the examples: 0.07.
 LARGEST_GAIN = 1e-3
+#: mm/m. What all axes have in common and the bar has not: steel scales 30 K warmer than the bar was taken for. Above it
+#: the gains agree to a share of 20 % only where the bar is another length than stated. Largest in the examples: 0.02.
+LARGEST_COMMON_GAIN, COMMON_WITHIN = 3.5e-4, 0.2
 #: rad. Axes of machines given by letters are set up to tenths of a milliradian at worst; 5 mrad are 2.5 mm over 500 mm.
 #: Joints of a chain with lengths are mastered to degrees. Largest in the examples: 0.06 mrad, of the robot 8 mrad.
 LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
@@ -52,6 +55,7 @@ def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground,
         *(ground for ground in _gross_readings(robust) if not is_whole and ground.run not in in_units),
         *_lack_of_fit(robust, run),
         *_implausible(campaign, robust, run),
+        *_common_gain(campaign, robust, run),
         *_work_points(robust, run),
         *_scale_bar(campaign, run),
         *_temperature(campaign, measured),
@@ -114,6 +118,30 @@ def _implausible(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Gr
             unit, name = effect.unit, problem.base_names[columns.start]
             size, most = unit.to_display(value), unit.to_display(limit)
             yield Ground(GroundKind.IMPLAUSIBLE, run, name, size, most, unit.name)
+
+
+def _common_gain(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
+    """Gains of three axes that are off together by far more than they differ: of a bar of another length.
+
+    Gains that are none of a machine one by one are told each.
+    """
+    if campaign.artefact.scale_bar is None:
+        return
+    problem, solution = robust.fit.problem, robust.fit.solution
+    index = int(np.flatnonzero(problem.runs == run)[0])
+    gains = {
+        problem.base_names[columns.start]: (float(solution.local[index, columns.start]), effect.unit)
+        for effect, columns in zip(problem.base, problem.base_columns, strict=True)
+        if isinstance(effect, ChainEffect) and effect.is_gain and solution.local_free[index, columns.start]
+    }
+    values = np.array([value for value, _ in gains.values()])
+    if len(values) < 3 or np.abs(values).max() > LARGEST_GAIN:
+        return
+    common = float(np.mean(values))
+    if abs(common) > LARGEST_COMMON_GAIN and np.ptp(values) < COMMON_WITHIN * abs(common):
+        unit = next(unit for _, unit in gains.values())
+        size, most = unit.to_display(common), unit.to_display(LARGEST_COMMON_GAIN)
+        yield Ground(GroundKind.IMPLAUSIBLE, run, SEVERAL.join(gains), size, most, unit.name)
 
 
 def _work_points(robust: RobustFit, run: int) -> Iterator[Ground]:
