@@ -13,6 +13,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import importlib
+import inspect
 import sys
 import types
 import typing
@@ -69,7 +70,7 @@ def annotations(kind: type) -> dict[str, tuple[str, str]]:
     """Return the public fields and properties of a record: annotation as written, and the module that it stands in."""
     written: dict[str, tuple[str, str]] = {}
     for owner in reversed(kind.__mro__):
-        for name, annotation in vars(owner).get("__annotations__", {}).items():
+        for name, annotation in inspect.get_annotations(owner).items():
             of_class = str(annotation).startswith("ClassVar[")
             written[name] = (
                 str(annotation)[len("ClassVar[") : -1] if of_class else str(annotation),
