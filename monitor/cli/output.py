@@ -248,14 +248,14 @@ def stepping(
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)
-        words = f"{activity}, {{}} done" if behind else f"{activity} {{}}"
+        description = f"{activity}, {{}} done" if behind else f"{activity} {{}}"
 
         def tell(name: str) -> None:
-            done = next(counted)
-            if afterwards and done == total:
+            count = next(counted)
+            if afterwards and count == total:
                 progress.columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
                 progress.update(task, description=afterwards, total=None)
             else:
-                progress.update(task, description=words.format(escape(name)), completed=done)
+                progress.update(task, description=description.format(escape(name)), completed=count)
 
         yield tell

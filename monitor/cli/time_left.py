@@ -26,8 +26,8 @@ class TimeLeft(ProgressColumn):
         completed, at = self._marks.get(task.id, (0.0, 0.0))
         if completed != task.completed:
             completed, at = self._marks[task.id] = task.completed, elapsed
-        left = seconds_left(completed, task.total, at, elapsed)
-        return Text(str(timedelta(seconds=round(left))), style="progress.remaining")
+        seconds = seconds_left(completed, task.total, at, elapsed)
+        return Text(str(timedelta(seconds=round(seconds))), style="progress.remaining")
 
 
 def seconds_left(completed: float, total: float, at: float, elapsed: float) -> float:
