@@ -36,6 +36,11 @@ def copy_pages(out: Path) -> None:
         (out / name).write_text(manual_text(path), encoding="utf-8")
 
 
+def with_links(text: str) -> str:
+    """Return a generated text of ``reference/`` in which a bare ``docs/NAME.md`` is a link."""
+    return _BARE.sub(lambda bare: f"[{bare['name']}](../{bare['name']})", text)
+
+
 def manual_text(path: Path) -> str:
     """Return the text of a page of the repository as the manual has it."""
     parts = _FENCE.split(path.read_text(encoding="utf-8"))
