@@ -20,6 +20,7 @@ import typing
 from collections.abc import Iterator
 from pathlib import Path
 
+import monitor
 from monitor.api.answer import Answer
 from monitor.workflow.certificate.answer import CertificateFileAnswer
 from monitor.workflow.explain.compare_answer import CompareAnswer
@@ -35,7 +36,7 @@ from monitor.workflow.trend.answer import TrendAnswer
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
-STUB = Path(__file__).resolve().parents[2] / "monitor/api/answers.pyi"
+STUB = Path(monitor.__file__).parent / "api/answers.pyi"
 CONTENTS: tuple[type, ...] = (
     CertificateFileAnswer, ChangeModelAnswer, CompareAnswer, ExplainAnswer, FleetAnswer, ImportAnswer, LikeAnswer,
     ModelsAnswer, ReportAnswer, SimulateAnswer, SimulateMachineAnswer, StatisticsAnswer, TrendAnswer, UncertaintyAnswer,
