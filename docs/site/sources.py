@@ -16,7 +16,7 @@ DOCS = CHECKOUT / "docs"
 FROM_OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s#]*)(?P<anchor>#[^)\s]*)?\)")
-_BARE = re.compile(r"(?<![\w/\[(`*-])docs/(?P<name>[a-z-]+\.md)(?!\]|\)\]|`)")
+_BARE = re.compile(r"(?<![\w/\[`*-])(?<!\]\()docs/(?P<name>[a-z-]+\.md)(?!\]|\)\]|`)")
 # A page has one title; where a file has several, all but the first go a level down.
 _TITLE = re.compile(r"^# ", re.MULTILINE)
 _HEADING = re.compile(r"^(?=#{1,5} )", re.MULTILINE)
