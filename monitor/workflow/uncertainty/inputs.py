@@ -82,6 +82,8 @@ def reading_inputs(
         u = max(stated, lack_of_fit(fit)[1] or 0.0)
         inputs = uncorrelated(names, units, run.inputs[:count], run.stated * (u / stated), source=READINGS)
         source = _stated_source(u, stated, several=several, selection=name)
+        if holds_for is HoldsFor.RUN and len(values) > 0 and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
+            source = replace(source, for_the_run=True)
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source
 
