@@ -65,7 +65,7 @@ def routes() -> APIRouter:
         all_trends = trends.of_all() if every else trends.of_all_already()
         return page(
             request, "machine.html",
-            name=name, parameter=shown, parameters=names, values=values, trend=trend,
+            name=name, parameter=shown, parameters=names, topology=values.topology, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
             every=all_trends if shown else None, waiting=trends.waiting,
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
@@ -106,9 +106,11 @@ async def _table_of_all(
     await ticket.settled(FETCH_S)
     if not ticket.is_done:
         return JSONResponse({}, 202)
+    values = await run_in_threadpool(request.app.state.asker, request.state.user, "values", {"machine": name})
     return page(
         request, "parameters.html",
-        name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
+        topology=values.topology, name=name, parameter=parameter, since=since, until="", campaign=campaign,
+        every=ticket.answer(),
     )  # fmt: skip
 
 
@@ -182,7 +184,7 @@ def _two_periods(
     days = [f"{at:%Y-%m-%d}" for at in values.started_at]
     return page(
         request, "periods.html",
-        name=name, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+        name=name, topology=values.topology, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
         first=min(days, default=""), last=max(days, default=""),
     )  # fmt: skip
 

@@ -10,13 +10,13 @@ from datetime import datetime
 import numpy as np
 
 from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database, followed_by, machine_history
+from monitor.store import Database, machine_history, machine_topology, numbered_by
 from monitor.workflow.models import resolve
 
 
 @dataclass(frozen=True)
 class ValuesRequest:
-    """The runs of a machine under a ``model`` (None: those by which it is followed); one ``parameter``, or all.
+    """The runs of a machine under a ``model`` (None: those that its numbers come from); one ``parameter``, or all.
 
     ``since`` and ``until`` have an offset from UTC; the first belongs to the period, the second does not.
     """
@@ -54,9 +54,13 @@ class ParameterValues:
 
 @dataclass(frozen=True)
 class ValuesAnswer:
-    """The n runs of a machine in the order of time, with n values of each parameter and each condition."""
+    """The n runs of a machine in the order of time, with n values of each parameter and each condition.
+
+    ``topology`` is its chain, by which plain names say to what an orientation is an angle.
+    """
 
     machine: str
+    topology: str
     started_at: tuple[datetime, ...]
     campaign: tuple[str, ...]
     method: tuple[str, ...]
@@ -75,7 +79,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
         name, version = stored.name, stored.version
     history = machine_history(
         db, request.machine, model=name, version=version,
-        parameter=request.parameter, since=request.since, followed_by=followed_by(db, request.machine),
+        parameter=request.parameter, since=request.since, followed_by=numbered_by(db, request.machine),
     )  # fmt: skip
     if request.until is not None:
         history = history.part(np.array([at < request.until for at in history.started_at], dtype=np.bool_))
@@ -85,6 +89,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
         )
     return ValuesAnswer(
         machine=request.machine,
+        topology=machine_topology(db, request.machine),
         started_at=history.started_at,
         campaign=tuple(history.campaign.tolist()),
         method=tuple(history.method.tolist()),
