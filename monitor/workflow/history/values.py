@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database, machine_history, machine_topology, numbered_by
+from monitor.store import Database, machine_history, machine_topology, numbered_by, older_numbers
 from monitor.workflow.models import resolve
 
 
@@ -56,7 +57,8 @@ class ParameterValues:
 class ValuesAnswer:
     """The n runs of a machine in the order of time, with n values of each parameter and each condition.
 
-    ``topology`` is its chain, by which plain names say to what an orientation is an angle.
+    ``topology`` is its chain, by which plain names say to what an orientation is an angle. ``newer_versions`` are those
+    (``NAME@VERSION``) by which nobody identified the machine yet: the values are then of the version before.
     """
 
     machine: str
@@ -69,6 +71,7 @@ class ValuesAnswer:
     warm_up: tuple[bool, ...]
     parameters: Mapping[str, ParameterValues]
     conditions: Mapping[str, tuple[float | None, ...]]
+    newer_versions: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
@@ -87,6 +90,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
         raise NotFoundError(
             f"machine {request.machine} has no parameter {request.parameter!r} in any run of this period"
         )
+    older = older_numbers(db, request.machine) if request.model is None else ()
     return ValuesAnswer(
         machine=request.machine,
         topology=machine_topology(db, request.machine),
@@ -106,6 +110,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
             for column, name in enumerate(history.parameters)
         },
         conditions={name: _numbers(values.tolist()) for name, values in history.conditions.items()},
+        newer_versions=tuple(f"{row.model}@{row.newest}" for row in older) or None,
     )
 
 
