@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from monitor.records import Array
 from monitor.reporting.figures.style import new_figure, style, zero_line
@@ -57,10 +58,7 @@ def circle_figure(angle: Array, radial: Array, sense: Array, *, plane: tuple[str
                     angle[mine], 1.0 + unit * radial[mine], line, color=colour, linewidth=1.1, label=name
                 )
         axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
-        step = _step(largest)
-        marks = np.array([-step, 0.0, step])
-        _number_radii(axes, 1.0 + unit * marks, _signed(marks, "µm"))
-        axes.set_rlabel_position(float(np.degrees(_least_moved(angle, radial))))
+        _number_radii(axes, unit, _signed(largest, "µm"), _least_moved(angle, radial))
         axes.set_xticks(
             np.arange(4) * np.pi / 2.0, [f"+{plane[0]}", f"+{plane[1]}", f"-{plane[0]}", f"-{plane[1]}"]
         )
@@ -82,11 +80,7 @@ def rotation_figure(angle: Array, synchronous: Array, *, unit: str, title: str) 
         axes.plot(around, np.ones_like(around), color=MID, linewidth=0.7)
         axes.plot(np.append(angle, angle[:1]), 1.0 + scale * closed, color=BLUE, linewidth=1.1)
         axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
-        step = _step(largest)
-        marks = np.array([-step, 0.0, step])
-        _number_radii(axes, 1.0 + scale * marks, _signed(marks, unit))
-        # Where the curve is far from the numbers.
-        axes.set_rlabel_position(float(np.degrees(_least_moved(angle, synchronous))))
+        _number_radii(axes, scale, _signed(largest, unit), _least_moved(angle, synchronous))
         axes.grid(color=MID, linewidth=0.3)
     return figure
 
@@ -135,16 +129,20 @@ def part_figure(elements: Sequence[tuple[str, Array, Array, Array]], *, title: s
     return figure
 
 
-def _signed(marks: Array, unit: str) -> list[str]:
-    """Write marks with their signs; nothing at zero."""
-    return [f"{mark:+.3g} {unit}".replace("-", "\N{MINUS SIGN}", 1) if mark else "" for mark in marks]
+def _signed(largest: float, unit: str) -> dict[float, str]:
+    """Return the deviations at which a polar plot has rings, and what is written there: nothing at zero."""
+    step = _step(largest)
+    minus = "\N{MINUS SIGN}"
+    return {-step: f"{minus}{step:.3g} {unit}", 0.0: "", step: f"+{step:.3g} {unit}"}
 
 
-def _number_radii(axes: Axes, radii: Array, words: Sequence[str]) -> None:
-    """Write words at radii of a polar plot, on white, so that no line runs through them."""
-    axes.set_yticks(radii, words)
+def _number_radii(axes: Axes, scale: float, labels: Mapping[float, str], angle: float) -> None:
+    """Draw rings at deviations and write their labels at an angle in rad, on white: no line runs through them."""
+    assert isinstance(axes, PolarAxes)
+    axes.set_yticks([1.0 + scale * deviation for deviation in labels], list(labels.values()))
     for label in axes.get_yticklabels():
         label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
+    axes.set_rlabel_position(float(np.degrees(angle)))
 
 
 def _least_moved(angle: Array, deviation: Array) -> float:
@@ -163,15 +161,16 @@ def _name_element(axes: Axes, name: str, places: Array, middle: Array, size: flo
     away = at - middle
     distance = float(np.hypot(*away))
     if distance < 0.05 * size:
-        axes.text(*at, name, fontsize="small", ha="center", va="center")
+        axes.text(float(at[0]), float(at[1]), name, fontsize="small", ha="center", va="center")
         return
     across, up = away / distance
     sides = (
         "right" if across < -0.5 else "left" if across > 0.5 else "center",
         "top" if up < -0.5 else "bottom",
     )
+    x, y = at + 0.13 * size * away / distance
     axes.text(
-        *(at + 0.13 * size * away / distance), name, fontsize="small", ha=sides[0],
+        float(x), float(y), name, fontsize="small", ha=sides[0],
         va="center" if abs(up) <= 0.5 else sides[1],
     )  # fmt: skip
 
