@@ -161,9 +161,9 @@ def _height(square: float, stated: float, twice: float) -> float:
     A swing in the plane of its centre shows 18 um of a centre that is stated 1.9 mm off a plane of 100 mm: the height
     that leaves the smaller constant is the right one. The length itself says it to 2 mm at best near the plane.
     """
-    flat, kept = abs(square), abs(stated**2 - square)
-    if min(flat, kept) < FAR * twice:
-        return 0.0 if flat < kept and abs(stated) > STATED_HEIGHT else stated
+    if_flat, if_stated = abs(square), abs(stated**2 - square)
+    if min(if_flat, if_stated) < FAR * twice:
+        return 0.0 if if_flat < if_stated and abs(stated) > STATED_HEIGHT else stated
     return float(np.sqrt(max(square, 0.0)) * (np.sign(stated) or 1.0))
 
 
