@@ -72,12 +72,12 @@ def test_the_first_table_has_every_verb_and_no_other() -> None:
     assert {verb for cell in cells for verb in re.findall(r"(?:^\[?|, )`([a-z]+)", cell)} == set(VERBS)
 
 
-def test_every_option_has_a_help() -> None:
+def test_every_argument_has_a_help() -> None:
     silent = {
-        f"{path} {action.option_strings[0]}"
+        f"{path} {(*action.option_strings, action.metavar)[0]}"
         for path, parser in parsers().items()
         for action in parser._actions
-        if action.option_strings and not action.help
+        if not action.help
     }
     assert silent == set()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import inspect
 from dataclasses import fields
 
-from markdown import code, of_docstring, table
+from markdown import code, of_docstring
 
 from monitor.cli import configuration
 
@@ -21,6 +21,8 @@ where it comes from. More words: [the command line](../command-line.md#configura
 
 def page() -> str:
     """Return the page."""
-    keys = [(code(field.name),) for field in fields(configuration.Configuration) if field.name != "file"]
+    keys = ", ".join(
+        code(field.name) for field in fields(configuration.Configuration) if field.name != "file"
+    )
     where = of_docstring((inspect.getdoc(configuration) or "").partition("\n\n")[2])
-    return f"{HEAD}{where}\n\n{table(('key',), keys)}\nThe file as it is written:\n\n```toml\n{configuration.TEMPLATE}```\n"
+    return f"{HEAD}{where}\n\nKeys: {keys}. The file as it is written says what each is:\n\n```toml\n{configuration.TEMPLATE}```\n"

@@ -33,7 +33,7 @@ NAMES: Mapping[Any, str] = {
 HEAD = """# Questions and documents
 
 Everything that can be asked is a question with a typed request and a typed answer. The command line prints the answer with `--json`, the
-HTTP interface takes the request and sends the answer as JSON (`POST /api/v1/QUESTION`), Python asks with `db.ask("question", ...)`. This page is made from the
+HTTP interface takes the request and sends the answer as JSON (`POST /api/v1/QUESTION`; a space of the name is a hyphen there: `/api/v1/add-effect`), Python asks with `db.ask("question", ...)`. This page is made from the
 types. Every field is a key of the document under the name in the table; a number that is not finite is `null`; days and moments are ISO 8601; arrays are lists.
 Keys are kept from version to version, new ones may be added.
 

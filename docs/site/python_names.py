@@ -10,7 +10,8 @@ import monitor
 HEAD = """# Python interface
 
 `import monitor as mm`: these names, made from their docstrings. A first look with examples: [in Python](../python.md). What a request takes and
-what an answer holds: [questions and documents](documents.md).
+what an answer holds: [questions and documents](documents.md). `TypedCompareAnswer` and its like are what type checkers and editors see: an `Answer` with the fields of `CompareAnswer`
+as attributes, and of the records that stand in italics there.
 
 """
 

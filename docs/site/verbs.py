@@ -11,14 +11,15 @@ from markdown import cell, code, table
 from monitor.cli.parser import VERBS, verb_parser
 
 #: Options that every verb has; the page says so once.
-COMMON = {"--help", "--db", "--wait", "--json", "--quiet"}
+COMMON = {"--help", "--db", "--wait", "--server", "--server-token", "--json", "--quiet"}
 HEAD = """# Verbs and options
 
 Made from the program's own parsers. `monitor VERB --help` prints the same. What the answers mean, exit statuses and the documents of
 `--json`: [the command line](../command-line.md), [documents](documents.md).
 
 Every verb takes `--db PATH` (the database file), `--wait SECONDS` (how long to wait for another process that has it), `--json` (one document on
-standard output), `--quiet` and `--help`.
+standard output), `--quiet` and `--help`; every verb that a server answers takes `--server URL` and `--server-token FILE` in place of `--db`
+([asking a server](../command-line.md#asking-a-server)).
 """
 
 

@@ -26,16 +26,19 @@ class Answer(Generic[Content]):
         self.content = content
         self._draw = draw
 
-    def __getattr__(self, name: str) -> Any:
-        # Copying and pickling ask for attributes before there is a content.
-        if name.startswith("_") or name == "content":
-            raise AttributeError(name)
-        for part in inlined_parts(self.content):
-            if hasattr(part, name):
-                return getattr(part, name)
-        raise AttributeError(
-            f"{type(self.content).__name__} has no '{name}'; it has {', '.join(self._fields())}"
-        )
+    # Type checkers see the fields of each kind of answer in answers.pyi; through this every misspelt one passes.
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            # Copying and pickling ask for attributes before there is a content.
+            if name.startswith("_") or name == "content":
+                raise AttributeError(name)
+            for part in inlined_parts(self.content):
+                if hasattr(part, name):
+                    return getattr(part, name)
+            raise AttributeError(
+                f"{type(self.content).__name__} has no '{name}'; it has {', '.join(self._fields())}"
+            )
 
     def _fields(self) -> list[str]:
         return [

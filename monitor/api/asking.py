@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from monitor.api.answer import Answer
 from monitor.exceptions import InputError, did_you_mean
 from monitor.store import Database
 from monitor.workflow.contract import QUESTIONS
 
+Typed = TypeVar("Typed")
 #: An option of the command line in a message, such as ``--digits`` or ``-p``.
 _OPTION = re.compile(r"(?<![\w-])--?([a-z][a-z-]*)(?![\w-])")
 
@@ -65,10 +66,16 @@ def request_of(kind: Any, values: dict[str, Any]) -> Any:
     return kind(**values)
 
 
-def drawn(ask: Ask, question: str, **values: Any) -> Answer[Any]:
-    """Return an answer that can draw its pictures: the question is asked again with a folder for them."""
+# Of which answer it is says the annotation of the caller alone (``answers.pyi``), hence a variable in the result only.
+def answered(content: Any) -> Typed:  # type: ignore[type-var]
+    """Return an ``Answer`` of a content."""
+    return Answer(content)  # type: ignore[return-value]
+
+
+def drawn(ask: Ask, question: str, **values: Any) -> Typed:  # type: ignore[type-var]
+    """Return an ``Answer`` that can draw its pictures: the question is asked again with a folder for them."""
 
     def draw(folder: Path) -> Any:
         return ask(question, **values, figures=folder)
 
-    return Answer(ask(question, **values), draw)
+    return Answer(ask(question, **values), draw)  # type: ignore[return-value]

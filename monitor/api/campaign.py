@@ -6,21 +6,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from monitor.api.answer import Answer
-from monitor.api.asking import Ask, drawn
+from monitor.api.asking import Ask, answered, drawn
 from monitor.api.tables import parameter_table, run_table, table_of
 from monitor.exceptions import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from monitor.workflow.certificate.answer import CertificateFileAnswer
-    from monitor.workflow.explain.compare_answer import CompareAnswer
-    from monitor.workflow.explain.explain_answer import ExplainAnswer
-    from monitor.workflow.model.answer import ChangeModelAnswer
-    from monitor.workflow.run_statistics.answer import StatisticsAnswer
-    from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-    from monitor.workflow.volumetric.answer import VolumetricAnswer
+    from monitor.api.answers import (
+        TypedCertificateFileAnswer,
+        TypedChangeModelAnswer,
+        TypedCompareAnswer,
+        TypedExplainAnswer,
+        TypedStatisticsAnswer,
+        TypedUncertaintyAnswer,
+        TypedVolumetricAnswer,
+    )
 
 
 class Campaign:
@@ -51,28 +52,36 @@ class Campaign:
         """
         return parameter_table(self._ask("identify", campaign=self.name, model=model), wide=wide)
 
-    def statistics(self, **options: Any) -> Answer[StatisticsAnswer]:
+    def statistics(self, **options: Any) -> TypedStatisticsAnswer:
         """Compare the runs: scatter by day and pooled, homogeneity, components of variance (``StatisticsRequest``).
 
-        ``parameters`` has the numbers by parameter, each in its ``unit`` (µm, µrad, µm/m). Raises InputError.
+        ``parameters`` has the numbers by parameter, each in its ``unit`` (µm, µrad, µm/m). The tests and their sources:
+        docs/statistics.md. Raises InputError for a grouping that there is not.
         """
         return drawn(self._ask, "statistics", campaign=self.name, **options)
 
-    def compare(self, model: str | None = None) -> Answer[CompareAnswer]:
-        """Compare the model with the measurements: where does it fail? Residuals in µm (of a curve in its own unit)."""
+    def compare(self, model: str | None = None) -> TypedCompareAnswer:
+        """Compare the model with the measurements: where does it fail? Residuals in µm (of a curve in its own unit).
+
+        ``verdict`` says whether the model explains them, ``lack_of_fit`` is the F test of lack of fit over the scatter
+        of repeated readings, ``by`` the RMS by target, axis, run and indexation. Raises NotFoundError for a model that
+        does not exist, DataError where the readings contradict the machine file.
+        """
         return drawn(self._ask, "compare", campaign=self.name, model=model)
 
-    def explain(self, model: str | None = None, **options: Any) -> Answer[ExplainAnswer]:
+    def explain(self, model: str | None = None, **options: Any) -> TypedExplainAnswer:
         """Search for the physical effects that the model lacks (``ExplainRequest``).
 
         ``missing`` has one record an effect: ``amplitude`` with standard uncertainty ``u`` in ``unit``, the largest
-        displacement ``peak_um`` in µm, the RMS before and after in µm.
+        displacement ``peak_um`` in µm, the RMS before and after in µm; cause and remedy stand in its ``description``.
+        How it is searched: docs/effects.md. Raises NotFoundError for a model that does not exist, DataError where the
+        readings contradict the machine file.
         """
         return drawn(self._ask, "explain", campaign=self.name, model=model, **options)
 
     def add(
         self, effect: str | Sequence[str], name: str | None = None, *, to: str | None = None, note: str = ""
-    ) -> Answer[ChangeModelAnswer]:
+    ) -> TypedChangeModelAnswer:
         """Add an effect to the model ``to`` (by default the method's own), or several at once: of two that take each
         other's part neither shows what it is worth alone. The answer has the error before and after in ``history``, RMS
         in µm on the fitted and on held-out runs.
@@ -84,7 +93,7 @@ class Campaign:
         if not first:
             raise InputError("name an effect to add, or several: campaign.add(['EXX:reversal', 'EXX:poly2'])")
         model = self.method if to is None else to
-        return Answer(
+        return answered(
             self._ask(
                 "add effect",
                 effect=first,
@@ -96,27 +105,29 @@ class Campaign:
             )
         )
 
-    def uncertainty(self, run: int | None = None, **options: Any) -> Answer[UncertaintyAnswer]:
+    def uncertainty(self, run: int | None = None, **options: Any) -> TypedUncertaintyAnswer:
         """Evaluate the uncertainty of one run, the last by default, after JCGM 102:2011 (``UncertaintyRequest``).
 
         ``guf`` (and ``mcm``) have estimate, u and expanded uncertainty by parameter in the display unit of ``units``
         (µm, µrad, µm/m); ``covariance`` is (m, m) in products of these units. Raises InputError, DataError.
         """
-        return Answer(self._ask("uncertainty", campaign=self.name, run=run, **options))
+        return answered(self._ask("uncertainty", campaign=self.name, run=run, **options))
 
-    def map(self, run: int | None = None, **options: Any) -> Answer[VolumetricAnswer]:
+    def map(self, run: int | None = None, **options: Any) -> TypedVolumetricAnswer:
         """Evaluate the volumetric error over the strokes with its uncertainty (``VolumetricRequest``): vectors and
         lengths in µm at places in mm and degrees. Raises InputError for a machine that has no strokes to map."""
         return drawn(self._ask, "map", campaign=self.name, run=run, **options)
 
     def certificate(
         self, laboratory: str | Path, run: int | None = None, *, out: str | Path = ".", **options: Any
-    ) -> Answer[CertificateFileAnswer]:
-        """Issue a calibration certificate as PDF into ``out`` (``CertificateRequest``).
+    ) -> TypedCertificateFileAnswer:
+        """Issue a calibration certificate after ISO/IEC 17025:2017, 7.8 as PDF into ``out`` (``CertificateRequest``).
 
-        ``laboratory`` is the TOML file of what the laboratory states. Raises InputError with all that is missing.
+        ``laboratory`` is the TOML file of what the laboratory states. The answer has ``number``, ``file`` and the
+        ``sha256`` of the file. Raises InputError with all that is missing and each ground that speaks against it,
+        DataError where the runs are too few for a joint region.
         """
-        return Answer(
+        return answered(
             self._ask(
                 "issue certificate",
                 campaign=self.name,

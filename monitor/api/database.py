@@ -8,13 +8,12 @@ from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from monitor import store
-from monitor.api.answer import Answer
-from monitor.api.asking import Ask, drawn, options_as_arguments, request_of
+from monitor.api.asking import Ask, answered, drawn, options_as_arguments, request_of
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
@@ -22,13 +21,17 @@ from monitor.exceptions import InputError, NotFoundError, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
-    from monitor.workflow.fleet.answer import FleetAnswer
-    from monitor.workflow.health.request import ReportAnswer
-    from monitor.workflow.intake.importing import ImportAnswer
-    from monitor.workflow.likeness import LikeAnswer
-    from monitor.workflow.model.answer import ModelsAnswer
-    from monitor.workflow.simulation import SimulateAnswer, SimulateMachineAnswer
-    from monitor.workflow.trend.answer import TrendAnswer
+    from monitor.api.answers import (
+        AnyAnswer,
+        TypedFleetAnswer,
+        TypedImportAnswer,
+        TypedLikeAnswer,
+        TypedModelsAnswer,
+        TypedReportAnswer,
+        TypedSimulateAnswer,
+        TypedSimulateMachineAnswer,
+        TypedTrendAnswer,
+    )
 
 
 class Database:
@@ -58,7 +61,7 @@ class Database:
 
     def add(
         self, *folders: str | Path, mapping: str | Path | None = None, **options: Any
-    ) -> Answer[ImportAnswer]:
+    ) -> TypedImportAnswer:
         """Import campaign folders, all or nothing each; with a ``mapping`` files of instruments, as one campaign.
 
         ``campaign="week-12"`` names it; ``dry_run=True`` says what was understood and stores nothing.
@@ -78,7 +81,7 @@ class Database:
             whys = "\n".join(refused.why for refused in answer.refused)
             imported = ", ".join(folder.campaign for folder in answer.imported) or "none"
             raise InputError(f"{whys}\nImported or unchanged: {imported}")
-        return Answer(answer)
+        return answered(answer)
 
     def machines(self) -> pd.DataFrame:
         """Return the machines, a row each: topology, manufacturer, number of campaigns, moment of the latest run."""
@@ -95,35 +98,37 @@ class Database:
             raise NotFoundError(_no_campaign(name, list(rows)))
         return Campaign(self._ask, name, rows[name].machine, rows[name].method)
 
-    def models(self) -> Answer[ModelsAnswer]:
+    def models(self) -> TypedModelsAnswer:
         """List the models and their versions."""
-        return Answer(self._ask("models"))
+        return answered(self._ask("models"))
 
-    def trend(self, machine: str, **options: Any) -> Answer[TrendAnswer]:
+    def trend(self, machine: str, **options: Any) -> TypedTrendAnswer:
         """Follow the parameters of a machine: drift, changes, alarms, forecast (``TrendRequest``).
 
         ``parameters`` has a record a parameter, values in its ``unit`` (µm, µrad, µm/m), slopes in that unit a year.
-        Raises NotFoundError for a machine that does not exist.
+        What each number means, with its source: docs/statistics.md. Raises NotFoundError for an unknown machine.
         """
         return drawn(self._ask, "trend", machine=machine, **options)
 
-    def fleet(self, **options: Any) -> Answer[FleetAnswer]:
+    def fleet(self, **options: Any) -> TypedFleetAnswer:
         """List every machine and parameter, a row each, the most urgent first; values in the ``unit`` of the row
         (``FleetRequest``)."""
-        return Answer(self._ask("fleet", **options))
+        return answered(self._ask("fleet", **options))
 
-    def report(
-        self, week: str | None = None, *, out: str | Path = ".", **options: Any
-    ) -> Answer[ReportAnswer]:
-        """Write the weekly health report as HTML and PDF into ``out`` (``ReportRequest``)."""
-        return Answer(self._ask("report", week=week, out=Path(out), **options))
+    def report(self, week: str | None = None, *, out: str | Path = ".", **options: Any) -> TypedReportAnswer:
+        """Write the weekly health report as HTML and PDF into ``out`` (``ReportRequest``).
+
+        ``week`` is an ISO 8601 week such as ``"2026-W10"``, without it the last one that has ended. Raises InputError
+        for a week to come, NotFoundError for a machine or campaign that does not exist.
+        """
+        return answered(self._ask("report", week=week, out=Path(out), **options))
 
     def sql(self, query: str, limit: int | None = None) -> pd.DataFrame:
         """Return the rows of a query that only reads, ``limit`` at most; ``attrs["units"]`` has the unit of each column
         whose name ends in one. Raises InputError for any other query."""
         return table_of(self._ask("sql", query=query, limit=limit))
 
-    def ask(self, question: str, **options: Any) -> Answer[Any]:
+    def ask(self, question: str, **options: Any) -> AnyAnswer:
         """Ask any question of the contract by its name, such as ``ask("plan", campaign="five-days")``.
 
         Raises InputError for a question that there is not.
@@ -133,7 +138,7 @@ class Database:
         if question not in QUESTIONS:
             hint = did_you_mean(question, QUESTIONS)
             raise InputError(f"there is no question '{question}'; {hint}there are {', '.join(QUESTIONS)}")
-        return Answer(self._ask(question, **options))
+        return answered(self._ask(question, **options))
 
     def __repr__(self) -> str:
         return f"Database('{self.path}')"
@@ -160,6 +165,23 @@ def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s
     return Database(path, read_only=read_only, wait_s=wait_s)
 
 
+@overload
+def simulate(
+    out: str | Path, topology: None = None, *, like: str | Path, **options: Any
+) -> TypedLikeAnswer: ...
+@overload
+def simulate(
+    out: str | Path,
+    topology: str,
+    *,
+    errors: Mapping[str, float | Sequence[float]] | None = None,
+    like: None = None,
+    **options: Any,
+) -> TypedSimulateMachineAnswer: ...
+@overload
+def simulate(
+    out: str | Path, topology: None = None, *, like: None = None, **options: Any
+) -> TypedSimulateAnswer: ...
 def simulate(
     out: str | Path,
     topology: str | None = None,
@@ -167,7 +189,7 @@ def simulate(
     errors: Mapping[str, float | Sequence[float]] | None = None,
     like: str | Path | None = None,
     **options: Any,
-) -> Answer[SimulateAnswer] | Answer[SimulateMachineAnswer] | Answer[LikeAnswer]:
+) -> TypedSimulateAnswer | TypedSimulateMachineAnswer | TypedLikeAnswer:
     """Write a virtual campaign folder: of a machine of a ``topology`` with chosen ``errors``, or of one of ours.
 
     With a ``topology``, such as ``"w C B X b Z Y (C1) t"``: ``errors`` in µm, µrad and µm/m by effect, such as
@@ -191,7 +213,7 @@ def simulate(
         if errors is not None:
             raise InputError("errors needs topology, the machine that has them; without it there is effect")
         with options_as_arguments(simulation.SimulateRequest):
-            return Answer(
+            return answered(
                 simulation.simulate(request_of(simulation.SimulateRequest, {**options, "out": Path(out)}))
             )
     sizes = {
@@ -200,10 +222,10 @@ def simulate(
     }
     wanted = {**options, "out": Path(out), "topology": topology, "errors": sizes}
     with options_as_arguments(simulation.SimulateMachineRequest):
-        return Answer(simulation.simulate_machine(request_of(simulation.SimulateMachineRequest, wanted)))
+        return answered(simulation.simulate_machine(request_of(simulation.SimulateMachineRequest, wanted)))
 
 
-def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) -> Answer[LikeAnswer]:
+def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) -> TypedLikeAnswer:
     """Write campaigns like that of a folder."""
     from monitor.workflow import likeness
 
@@ -223,4 +245,4 @@ def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) 
     with options_as_arguments(likeness.LikeRequest):
         values["drifts"] = tuple(likeness.Drift(*drift) for drift in values.get("drifts", ()))
         values["events"] = tuple(likeness.Step(day(on), *step) for on, *step in values.get("events", ()))
-        return Answer(likeness.simulate_like(request_of(likeness.LikeRequest, values)))
+        return answered(likeness.simulate_like(request_of(likeness.LikeRequest, values)))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from monitor.exceptions import InputError
 from monitor.records import Array, plain_topology
 from monitor.workflow.kinematics import PosesAnswer, PosesRequest, poses
 
@@ -16,7 +17,8 @@ Point = tuple[float, float, float]
 class Machine:
     """A machine by its topology, from the workpiece to the tool: ``Machine("w C B X b Z Y (C1) t")``.
 
-    Raises InputError for a topology that cannot be read.
+    ``axes`` are its axes, ``base`` the errors that can be identified, both by name. The chain is that of ISO 230-1 and
+    ISO 10791-6 (docs/mathematics.md, 1). Raises InputError for a topology that cannot be read.
     """
 
     def __init__(self, topology: str) -> None:
@@ -63,7 +65,7 @@ class Machine:
         target: Point,
         readings: Mapping[str, float | Sequence[float] | Array],
     ) -> PosesAnswer:
-        columns = {axis: np.atleast_1d(np.asarray(values, dtype=float)) for axis, values in readings.items()}
+        columns = {axis: _numbers(axis, values) for axis, values in readings.items()}
         count = max((len(values) for values in columns.values()), default=1)
         columns = {
             axis: np.repeat(values, count) if len(values) == 1 else values for axis, values in columns.items()
@@ -73,7 +75,7 @@ class Machine:
             PosesRequest(
                 self.topology,
                 {axis: tuple(values.tolist()) for axis, values in columns.items()},
-                {text: tuple(np.atleast_1d(values).tolist()) for text, values in errors.items()},
+                {text: tuple(_numbers(text, sizes).tolist()) for text, sizes in errors.items()},
                 tool,
                 target,
             )
@@ -81,6 +83,17 @@ class Machine:
 
     def __repr__(self) -> str:
         return f"Machine('{self.topology}'): axes {', '.join(self.axes)}; errors {', '.join(self.base)}"
+
+
+def _numbers(name: str, values: object) -> Array:
+    """Return one finite number or several (n,). Raises InputError where they are none."""
+    try:
+        numbers = np.atleast_1d(np.asarray(values, dtype=float))
+        if numbers.ndim == 1 and np.isfinite(numbers).all():
+            return numbers
+    except (TypeError, ValueError):
+        pass  # said below, with all else that is no number
+    raise InputError(f"{name} is a number or several, such as 20.0 or [0.0, 100.0]; it is {values!r}")
 
 
 def _first_axis(topology: str) -> str:

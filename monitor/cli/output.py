@@ -197,9 +197,9 @@ def working(activity: str) -> Iterator[None]:
         TaskProgressColumn,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
 
+    from monitor.cli.time_left import TimeLeft
     from monitor.progress import listening
 
     with Progress(
@@ -207,11 +207,12 @@ def working(activity: str) -> Iterator[None]:
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=None)
+        time_left = TimeLeft()
 
         def tell(share: float) -> None:
             progress.columns = (
                 TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
-                TimeRemainingColumn(),
+                time_left,
             )  # fmt: skip
             progress.update(task, total=1.0, completed=share)
 
@@ -220,9 +221,12 @@ def working(activity: str) -> Iterator[None]:
 
 
 @contextmanager
-def stepping(activity: str, total: int, *, behind: bool = False) -> Iterator[Callable[[str], None]]:
+def stepping(
+    activity: str, total: int, *, behind: bool = False, afterwards: str = ""
+) -> Iterator[Callable[[str], None]]:
     """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each, or
-    behind each (``behind``), so that the last call fills the bar."""
+    behind each (``behind``), so that the last call fills the bar. What is done ``afterwards`` is shown as a sign of
+    life: nobody knows how long it takes, and a full bar that stands still looks as if it hung."""
     if not _shows_progress():
         yield lambda name: None
         return
@@ -231,17 +235,27 @@ def stepping(activity: str, total: int, *, behind: bool = False) -> Iterator[Cal
         BarColumn,
         MofNCompleteColumn,
         Progress,
+        SpinnerColumn,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
+
+    from monitor.cli.time_left import TimeLeft
 
     counted = itertools.count(int(behind))
     with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeft(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)
-        yield lambda name: progress.update(
-            task, description=f"{activity} {escape(name)}", completed=next(counted)
-        )
+        description = f"{activity}, {{}} done" if behind else f"{activity} {{}}"
+
+        def tell(name: str) -> None:
+            count = next(counted)
+            if afterwards and count == total:
+                progress.columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+                progress.update(task, description=afterwards, total=None)
+            else:
+                progress.update(task, description=description.format(escape(name)), completed=count)
+
+        yield tell

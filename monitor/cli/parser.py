@@ -73,8 +73,37 @@ AT_HOME = ("demo", "restore", "serve", "watch", "config", "completion")
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 
 
+class _TypedOnce(argparse.Action):
+    """Takes one value; refuses a second one, of which argparse would take the last without a word."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        if option_string is not None and isinstance(parser, Parser):
+            if self.dest in parser.typed:
+                raise argparse.ArgumentError(self, f"one value is taken, '{values}' is a second one")
+            parser.typed.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser whose refusal is one plain message."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        #: Options that were typed, among those of one value.
+        self.typed: set[str] = set()
+        for action in (None, "store"):
+            self.register("action", action, _TypedOnce)
+
+    def parse_known_args(self, *arguments: Any, **keywords: Any) -> Any:
+        """Parse as argparse does; what was typed the time before is forgotten."""
+        self.typed.clear()
+        return super().parse_known_args(*arguments, **keywords)
 
     def error(self, message: str) -> NoReturn:
         print(f"{self.prog}: {message}; {self._hint(message)}`{self.prog} --help` shows how", file=sys.stderr)

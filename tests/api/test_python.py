@@ -311,6 +311,22 @@ def test_the_kinematic_model_alone_agrees_with_a_chain_multiplied_by_hand() -> N
     )
 
 
+@pytest.mark.parametrize(
+    ("size", "x", "name"),
+    [
+        (20.0, "left", "X"),
+        ("twenty", 1.0, "EC0Y"),
+        (20.0, [[1.0, 2.0], [3.0]], "X"),
+        (math.nan, 1.0, "EC0Y"),
+        (20.0, math.inf, "X"),
+        (20.0, [[1.0]], "X"),
+    ],
+)
+def test_what_is_no_number_is_named(size: float, x: float, name: str) -> None:
+    with pytest.raises(InputError, match=f"^{name} is a number or several"):
+        mm.Machine("w C A Y b X Z t").deviation({"EC0Y": size}, X=x)
+
+
 def test_the_kinematic_model_refuses_what_the_chain_does_not_have() -> None:
     machine = mm.Machine("w C B X b Z Y (C1) t")
     assert machine.deviation({"EC0B": 20.0}, X=[0.0, 100.0], B=30.0).shape == (2, 3)

@@ -62,10 +62,23 @@ CLIMATE = (
 )
 
 
-def generate(db: Database, machines: int, weeks: int = WEEKS, conditions: str = "MAP {}") -> None:
-    """Machines with noise by campaign and by run, in the order in which they would be imported."""
+def generate(
+    db: Database,
+    machines: int,
+    weeks: int = WEEKS,
+    conditions: str = "MAP {}",
+    *,
+    first: int = 0,
+    of: int = 0,
+) -> None:
+    """Machines with noise by campaign and by run, in the order in which they would be imported.
+
+    A plant has ``machines`` from the ``first`` on, and of them the values that a file of all ``of`` machines has.
+    """
     n = {"m": machines, "n": machines * weeks}
-    name = "'M' || lpad(CAST(i % $m AS VARCHAR), 5, '0')"
+    name = f"'M' || lpad(CAST({first} + i % $m AS VARCHAR), 5, '0')"
+    campaign = f"((i // 60 // $m) * {of or machines} + {first} + i // 60 % $m)"
+    value = f"({campaign} * 60 + i % 60)"
     db.execute(
         f"INSERT INTO registered_machine SELECT i + 1, {name}, 'w C B X b Z Y (C1) t', TIMESTAMP '2021-01-04' "
         "FROM range($m) AS r(i)",
@@ -89,10 +102,10 @@ def generate(db: Database, machines: int, weeks: int = WEEKS, conditions: str = 
     )
     db.execute(
         f"INSERT INTO parameter_value SELECT CAST(1 + i // 60 AS INTEGER), 1 + (i // 15) % 4, {NAMES}[1 + i % 15], "
-        "1e-3 * (0.01 * (1 + i % 15) + hash(i // 60 * 15 + i % 15) % 1000003 / 1000003.0 "
-        "+ 0.5 * (hash(i + 999) % 1000003 / 1000003.0 + hash(i + 77777777) % 1000003 / 1000003.0)), "
+        f"1e-3 * (0.01 * (1 + i % 15) + hash({campaign} * 15 + i % 15) % 1000003 / 1000003.0 "
+        f"+ 0.5 * (hash({value} + 999) % 1000003 / 1000003.0 + hash({value} + 77777777) % 1000003 / 1000003.0)), "
         "0.5e-3, 'µm', 1e-3 FROM range($n * 60) AS r(i)",
-        {"n": n["n"]},
+        n,
     )
     gather_values(db)
     gather_runs(db)

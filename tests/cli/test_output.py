@@ -214,7 +214,8 @@ def test_a_monte_carlo_on_a_terminal_shows_how_far_it_is(terminal: Any, filled: 
 def test_the_bar_of_what_is_told_behind_each_piece_is_full_at_the_end(terminal: Any, filled: Path) -> None:
     seen = without_codes(terminal("--db", filled, "identify", columns=120))
     counted = [
-        (int(done), int(all_of)) for done, all_of in re.findall(r"identifying \S+ .* (\d+)/(\d+) ", seen)
+        (int(done), int(all_of))
+        for done, all_of in re.findall(r"identifying, \S+ done .* (\d+)/(\d+) ", seen)
     ]
     assert counted
     assert counted[-1][0] == counted[-1][1]

@@ -171,3 +171,26 @@ def test_a_fault_of_the_software_is_no_traceback(
     monkeypatch.setenv("MONITOR_DEBUG", "1")
     with pytest.raises(ZeroDivisionError, match="by zero"):
         typed("campaigns", db=filled)
+
+
+@pytest.mark.parametrize(
+    ("words", "option", "second"),
+    [
+        (["simulate", "OUT", "--effect", "EXX:reversal", "--effect", "EYY:reversal"], "--effect", "EYY:reversal"),
+        (["trend", "MILL-1", "--parameter", "EA0B", "--parameter", "EB0C"], "--parameter", "EB0C"),
+        (["certificate", "issue", "week-10", "--run", "1", "--run", "2"], "--run", "2"),
+        (["--db", "one.duckdb", "--db", "two.duckdb", "campaigns"], "--db", "two.duckdb"),
+    ],
+)  # fmt: skip
+def test_a_second_value_of_an_option_is_refused_and_not_taken_instead(
+    typed: Any, words: list[str], option: str, second: str
+) -> None:
+    answer = typed(*words)
+    assert answer.status == 2
+    assert f"argument {option}: one value is taken, '{second}' is a second one" in answer.err
+
+
+def test_what_was_typed_before_is_forgotten_by_the_same_parser() -> None:
+    parser = Parser(prog="monitor stats")
+    parser.add_argument("--by")
+    assert [parser.parse_args(["--by", by]).by for by in ("day", "run")] == ["day", "run"]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from monitor.effects import Context, drivers, parse_effect, registry, shapes
+from monitor.effects.words import describe
 from monitor.exceptions import EffectError
 from monitor.machine import Joint, parse_topology
 from monitor.records import Array
@@ -377,3 +378,12 @@ def test_plug_ins_are_found_by_entry_point_group(monkeypatch: pytest.MonkeyPatch
         assert asked == ["monitor.shapes"]
     finally:
         registry.plug_ins.cache_clear()
+
+
+def test_play_of_an_axis_that_turns_is_in_its_bearing() -> None:
+    """A table and a head have no carriage that runs in a guide."""
+    causes = {text: describe(parse_effect(text, CHAIN)).cause for text in ("EYX:reversal", "EXC:reversal")}
+    assert causes == {
+        "EYX:reversal": "play in the guide of X lets the carriage shift or tilt when it reverses",
+        "EXC:reversal": "play in the bearing of C lets what it carries shift or tilt when it reverses",
+    }

@@ -51,6 +51,7 @@ NOT_RUN = {
     ("reliability.md", "$ monitor backup backups/2026-03-01.duckdb"),
     ("scale.md", "$ pip install 'machine-health-monitor[lake]'"),
     ("tutorial.md", "$ make demo"),
+    ("tutorial.md", "$ . .venv/bin/activate"),
 }
 
 

@@ -31,13 +31,13 @@ WEEKS_OF_TEN_YEARS = 520
 
 
 def measured(campaign: Campaign, number: int, generator: np.random.Generator) -> Campaign:
-    """A campaign of another week: half a micrometre of noise in each reading, and files of the same size with it."""
+    """A campaign of another week of ten years that ended with the example: half a micrometre of noise in each reading, and files of the same size with it."""
     touches = campaign.probings
     readings = {
         axis: values + (generator.normal(0.0, 5e-4, len(values)) if axis in "XYZ" else 0.0)
         for axis, values in touches.readings.items()
     }
-    week = timedelta(days=7 * number)
+    week = timedelta(days=7 * (number - WEEKS_OF_TEN_YEARS))
     runs = tuple(dataclasses.replace(run, started_at=run.started_at + week) for run in campaign.runs)
     # Digits change in the files as in the readings; nothing else does.
     files = tuple(

@@ -1,9 +1,9 @@
 """The table of the fleet from a lake against that from one file, over a million values and more.
 
-``python tests/soak/lake_sizes.py --values 1e6 1e7``: generated machines with weekly campaigns of four runs and fifteen
-parameters (``tests/benchmarks/test_fleet.py``) are published, in one portion, to a lake with a PostgreSQL of its own;
-the table of the fleet is asked of both, each in a process of its own that opens it, twice in turn. Answers are
-compared; seconds, processor time and the largest memory of each are printed.
+``python tests/soak/lake_sizes.py --values 1e6 1e7 --plants 1``: generated machines with weekly campaigns of four runs
+and fifteen parameters (``tests/benchmarks/test_fleet.py``) are published, in one portion a plant, to a lake with a
+PostgreSQL of its own; the table of the fleet is asked of both, each in a process of its own that opens it, twice in
+turn. Answers are compared; seconds, processor time and the largest memory of each are printed.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ class Answer:
     gigabytes: float
 
 
-def make(path: Path, values: float) -> None:
-    """Write a file of so many values, with the entries that its publication follows."""
+def make(path: Path, machines: int, first: int, of: int) -> None:
+    """Write a file of so many machines, from the first on of all, with the entries that its publication follows."""
     with Database(path) as db:
-        generate(db, max(round(values / VALUES / WEEKS), 1), WEEKS)
+        generate(db, machines, WEEKS, first=first, of=of)
         db.execute(_ENTRIES)
         assert audit.last_anchor(db).entry
 
@@ -104,23 +104,32 @@ def apart(function: object, *arguments: object) -> None:
     assert process.exitcode == 0
 
 
-def trial(values: float, folder: Path) -> list[str]:
-    """Compare the two for a number of values; what differs, in sentences."""
+def trial(values: float, plants: int, folder: Path) -> list[str]:
+    """Compare the two for a number of values of so many plants; what differs, in sentences."""
     path, files = folder / "one.duckdb", folder / "files"
+    each = max(round(values / VALUES / WEEKS / plants), 1)
+    machines = each * plants
     begin = time.perf_counter()
-    apart(make, path, values)
+    apart(make, path, machines, 0, machines)
     made = time.perf_counter() - begin
+    published = 0.0
     (folder / "pg").mkdir()
     folder.chmod(0o755)
     with postgres(folder / "pg") as address:
-        begin = time.perf_counter()
-        apart(publish, path, address, files)
-        published = time.perf_counter() - begin
+        for plant in range(plants):
+            own = path if plants == 1 else folder / f"plant{plant}.duckdb"
+            if own != path:
+                apart(make, own, each, plant * each, machines)
+            begin = time.perf_counter()
+            apart(publish, own, address, files)
+            published += time.perf_counter() - begin
+            if own != path:
+                own.unlink()
         answers = [(asked(address), asked(str(path))) for _ in range(2)]
     size = sum(file.stat().st_size for file in files.rglob("*.parquet"))
     print(
         f"{values:.0e} values: one file {path.stat().st_size / 1e6:.0f} MB, made in {made:.0f} s; "
-        f"lake {size / 1e6:.0f} MB of Parquet, published in {published:.0f} s"
+        f"lake of {plants}: {size / 1e6:.0f} MB of Parquet, published in {published:.0f} s"
     )
     wrong = []
     for lake, one in answers:
@@ -140,10 +149,12 @@ def trial(values: float, folder: Path) -> list[str]:
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--values", type=float, nargs="+", default=[1e6, 1e7])
+    options.add_argument("--plants", type=int, default=1, help="plants that publish, each its machines")
+    chosen = options.parse_args()
     wrong = []
-    for values in options.parse_args().values:
+    for values in chosen.values:
         with tempfile.TemporaryDirectory() as folder:
-            wrong += trial(values, Path(folder))
+            wrong += trial(values, chosen.plants, Path(folder))
     for fault in wrong:
         print(f"  {fault}")
     return 1 if wrong else 0

@@ -20,7 +20,9 @@ EXAMPLE = "monitor archive /mnt/archive --before 2024-01-01"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="where the files go, or where those that went are checked"
+    )
     parser.add_argument(
         "--before",
         metavar="TIME",

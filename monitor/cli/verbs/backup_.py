@@ -19,7 +19,9 @@ EXAMPLE = "monitor backup monitor-2026-03-09.duckdb"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("target", type=Path, metavar="FILE")
+    parser.add_argument(
+        "target", type=Path, metavar="FILE", help="the file of the copy; it must not be there yet"
+    )
     parser.add_argument(
         "--incremental",
         action="store_true",

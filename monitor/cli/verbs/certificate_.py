@@ -48,7 +48,7 @@ def options(parser: ArgumentParser) -> None:
 
 
 def _issue_options(issued: ArgumentParser) -> None:
-    issued.add_argument("campaign", metavar="CAMPAIGN")
+    issued.add_argument("campaign", metavar="CAMPAIGN", help="the campaign whose run is certified")
     issued.add_argument(
         "--run", type=int, metavar="N", dest="number_of_run",
         help="the machine as found; needed where the campaign has several runs",
@@ -63,7 +63,9 @@ def _issue_options(issued: ArgumentParser) -> None:
 
 
 def _show_options(shown: ArgumentParser) -> None:
-    shown.add_argument("number", nargs="?", metavar="NUMBER")
+    shown.add_argument(
+        "number", nargs="?", metavar="NUMBER", help="the number of a certificate (default: a list of all)"
+    )
     shown.add_argument(
         "--remake", type=Path, metavar="PATH",
         help="make it again from its stored record (a folder, or a file ending in .pdf); exit status 1 unless the "
@@ -86,7 +88,7 @@ def _show_options(shown: ArgumentParser) -> None:
 
 
 def _verify_options(verified: ArgumentParser) -> None:
-    verified.add_argument("file", type=Path, metavar="FILE")
+    verified.add_argument("file", type=Path, metavar="FILE", help="the certificate as it was issued, a PDF")
     verified.add_argument(
         "--trust", type=Path, metavar="FILE",
         help="trusted signers: certificates that the signer's has to lead to (PEM or DER), or a SHA-256 fingerprint a "
@@ -99,7 +101,7 @@ def _verify_options(verified: ArgumentParser) -> None:
 
 
 def _amend_options(amended: ArgumentParser) -> None:
-    amended.add_argument("replaces", metavar="NUMBER")
+    amended.add_argument("replaces", metavar="NUMBER", help="the number of the certificate that is replaced")
     amended.add_argument("--reason", required=True, help="why it is replaced, as printed")
     amended.add_argument("--campaign", metavar="CAMPAIGN", help="default: that of the old certificate")
     amended.add_argument(
@@ -110,7 +112,7 @@ def _amend_options(amended: ArgumentParser) -> None:
 
 
 def _withdraw_options(withdrawn: ArgumentParser) -> None:
-    withdrawn.add_argument("number", metavar="NUMBER")
+    withdrawn.add_argument("number", metavar="NUMBER", help="the number of the certificate")
     withdrawn.add_argument("--reason", required=True, help="why it is withdrawn")
     withdrawn.set_defaults(run=_withdraw)
 

@@ -32,7 +32,9 @@ EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     add_model(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw where the model fails")
 

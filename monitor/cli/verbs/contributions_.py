@@ -18,7 +18,9 @@ EXAMPLE = "monitor contributions four-instruments"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="the run (default: the last)")
     add_model(parser)
 

@@ -20,7 +20,7 @@ EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B 
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("machine", metavar="MACHINE")
+    parser.add_argument("machine", metavar="MACHINE", help="a machine of the database, by its id")
     parser.add_argument(
         "text", nargs="?", metavar="TEXT", help="what happened; without it the events are listed"
     )

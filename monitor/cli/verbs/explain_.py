@@ -17,7 +17,9 @@ EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     add_model(parser)
     parser.add_argument(
         "--rate", type=float, default=RATE, metavar="Q", help=f"false discovery rate (default {RATE:g})"

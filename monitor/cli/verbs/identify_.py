@@ -21,7 +21,9 @@ EXAMPLE = "monitor identify five-days"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", nargs="?", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", nargs="?", metavar="CAMPAIGN", help="a campaign of the database (default: all)"
+    )
     add_model(parser)
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="this run alone")
     parser.add_argument(

@@ -30,10 +30,10 @@ def options(parser: ArgumentParser) -> None:
     listed = verbs.add_parser("list", **described("all models and versions", "monitor model list"))
     listed.set_defaults(run=_list)
     shown = verbs.add_parser("show", **described("what a model contains", "monitor model show with-reversal"))
-    shown.add_argument("name", metavar="NAME")
+    shown.add_argument("name", metavar="NAME", help="a model, or a version of it: NAME@2")
     shown.set_defaults(run=_show)
     added = verbs.add_parser("add", **described("a new version with further effects", EXAMPLE))
-    added.add_argument("effect", nargs="+", metavar="EFFECT")
+    added.add_argument("effect", nargs="+", metavar="EFFECT", help="an effect such as EXX:reversal")
     added.add_argument("--to", required=True, metavar="NAME", help="the model, or a version of it: NAME@2")
     added.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
     added.add_argument("--note", default="", help="why")
@@ -48,7 +48,7 @@ def options(parser: ArgumentParser) -> None:
             "a new version without one effect", "monitor model remove EXX:reversal --from with-reversal"
         ),
     )
-    removed.add_argument("effect", metavar="EFFECT")
+    removed.add_argument("effect", metavar="EFFECT", help="an effect such as EXX:reversal")
     removed.add_argument(
         "--from", dest="from_", required=True, metavar="NAME", help="the model, or a version of it: NAME@2"
     )
@@ -71,7 +71,7 @@ def options(parser: ArgumentParser) -> None:
             "the error falling, step by step", "monitor model history with-reversal --figures figures"
         ),
     )
-    past.add_argument("name", metavar="NAME")
+    past.add_argument("name", metavar="NAME", help="a model, or a version of it: NAME@2")
     past.add_argument("--campaign", metavar="CAMPAIGN", help="default: where it was last compared")
     past.add_argument("--figures", type=Path, metavar="DIR", help="draw how the error falls")
     past.set_defaults(run=_history)

@@ -15,7 +15,9 @@ EXAMPLE = "monitor predict tracked-robot --model tracker"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     add_model(parser)
     parser.add_argument(
         "--of",

@@ -87,7 +87,7 @@ def run(options: Namespace) -> int:
     )
     with opened(options, threads=1, judging=True) as db:
         total = 1 if options.machine else len(ask(db, machines).rows)
-        with output.stepping("reporting", total, behind=True) as progress:
+        with output.stepping("reporting", total, behind=True, afterwards="writing the pages") as progress:
             answer = replace(ask(db, report, request, progress=progress), mailed_to=())
     unsent = None
     try:

@@ -16,7 +16,9 @@ COLUMNS = ("campaign", "machine", "run", "started_at_local", "day", "warm_up", "
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
 
 
 def run(options: Namespace) -> int:

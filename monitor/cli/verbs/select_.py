@@ -39,7 +39,12 @@ EXAMPLE = (
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN", nargs="?")
+    parser.add_argument(
+        "campaign",
+        metavar="CAMPAIGN",
+        nargs="?",
+        help="the campaign whose runs are named; not needed with --compare",
+    )
     parser.add_argument("--name", metavar="NAME", help="what the selection is to be called")
     parser.add_argument("--where", metavar="CONDITION", help="the runs for which it holds")
     parser.add_argument("--compare", metavar="NAME,NAME", help="selections or campaigns, side by side")

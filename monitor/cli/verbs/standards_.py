@@ -19,7 +19,9 @@ EXAMPLE = "monitor standards laser --figures figures"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     parser.add_argument("--setup", metavar="ID", help="this setup alone (default: all)")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the plot of every test")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write one line a figure")

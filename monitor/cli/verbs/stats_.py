@@ -23,7 +23,9 @@ EXAMPLE = "monitor stats five-days --by day --figures figures"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     parser.add_argument(
         "--by", default="day", metavar="COLUMN", help="what the runs are grouped by (default day)"
     )

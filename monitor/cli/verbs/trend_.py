@@ -25,7 +25,7 @@ EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("machine", metavar="MACHINE")
+    parser.add_argument("machine", metavar="MACHINE", help="a machine of the database, by its id")
     parser.add_argument("--parameter", metavar="P", help="one parameter only")
     parser.add_argument("--since", metavar="DATE", help="only runs from then on")
     parser.add_argument("--next-check", metavar="DATE", help="when the machine is to be checked again")

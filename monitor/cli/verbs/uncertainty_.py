@@ -27,7 +27,9 @@ EXAMPLE = "monitor uncertainty five-days --run 20 --method guf"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="the run (default: the last)")
     parser.add_argument(
         "--method", default="both", help="guf, mcm or both (default both, with the validation)"

@@ -14,7 +14,9 @@ EXAMPLE = 'monitor withdraw five-days --reason "balls 3 and 5 were exchanged in 
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", help="a campaign of the database (monitor campaigns lists them)"
+    )
     parser.add_argument("--reason", required=True, metavar="TEXT", help="why, in words; it is kept")
 
 

@@ -42,8 +42,14 @@ class Reversal(DescribedShape):
                 "to the reversal value, which is twice the amplitude",
                 POSITIONING,
             )
+        if error.joint.turns:
+            return Explanation(
+                f"play in the bearing of {name} lets what it carries shift or tilt when it reverses",
+                f"check preload and wear of the bearing of {name}; it cannot be compensated well",
+                POSITIONING,
+            )
         return Explanation(
-            f"play in the guide of {name} lets the carriage tip over when it reverses",
+            f"play in the guide of {name} lets the carriage shift or tilt when it reverses",
             f"check preload, gibs and wear of the guide of {name}; it cannot be compensated well",
             POSITIONING,
         )
