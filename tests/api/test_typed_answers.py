@@ -36,7 +36,8 @@ with mm.open("shop.duckdb") as db:
 
 
 def test_the_stub_is_that_of_the_contract() -> None:
-    assert typed_answers.STUB.read_text(encoding="utf-8") == typed_answers.stub()
+    same = typed_answers.STUB.read_text(encoding="utf-8") == typed_answers.stub()
+    assert same, "a type of answer has changed: python tests/api/typed_answers.py writes the stub anew"
 
 
 def test_every_answer_of_the_interface_is_typed() -> None:
