@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: dcc-reader newest-duckdb growth soak supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: object-store dcc-reader newest-duckdb growth soak supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -95,6 +95,10 @@ kills: setup  ## eighteen verbs killed 500 times at random moments (docs/reliabi
 
 soak: setup  ## a shop for an hour: imports, reports, pages, publishing and kills together (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/soak.py $(ARGS)
+
+object-store: setup  ## a lake whose files lie in an object store, that of moto on loopback (docs/scale.md)
+	@$(RUN) -c 'import moto.server, flask' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt 'moto[server,s3]>=5'
+	@OMP_NUM_THREADS=1 $(RUN) -m pytest -n 0 -q tests/store/test_object_store.py $(ARGS)
 
 growth: setup  ## bytes a campaign over simulated years, backups, archive, compaction (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/growth.py $(ARGS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.store import Database
@@ -13,13 +12,14 @@ from monitor.store.lake.publication import publish as publish_to
 
 @dataclass(frozen=True)
 class PublishRequest:
-    """The address of a lake; ``files`` is the folder of the Parquet files of a new one, ``plant`` names this database.
+    """The address of a lake; ``files`` is the folder of the Parquet files of a new one, or ``s3://BUCKET/FOLDER``
+    in an object store; ``plant`` names this database.
 
     Raises InputError for what is no address, holds a password, or a name without a letter.
     """
 
     to: str
-    files: Path | None = None
+    files: str | None = None
     plant: str | None = None
 
     def __post_init__(self) -> None:

@@ -64,6 +64,7 @@ def test_an_answer_has_what_the_stub_says_and_no_more(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_mypy_names_the_types_and_the_mistakes_of_a_script(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
     script = tmp_path / "script.py"
     script.write_text(SCRIPT, encoding="utf-8")
     said = subprocess.run(

@@ -7,7 +7,6 @@ this one ended, and nothing is added twice.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
@@ -24,9 +23,8 @@ def options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--files",
-        type=Path,
         metavar="FOLDER",
-        help="where a new lake keeps its Parquet files; makes the lake",
+        help="where a new lake keeps its Parquet files: a folder, or s3://BUCKET/FOLDER; makes the lake",
     )
     parser.add_argument(
         "--plant", metavar="NAME",

@@ -2,20 +2,20 @@
 
 An address is ``ducklake:postgres:dbname=lake host=...`` (catalogue in PostgreSQL, for many plants at once) or
 ``ducklake:FILE`` (catalogue in a DuckDB file, for one process at a time). The catalogue holds where the Parquet files
-lie. Passwords do not belong into an address, which everybody sees in the list of processes: PostgreSQL's own client
-library reads ``~/.pgpass`` and ``$PGPASSWORD``.
+lie, in a folder or an object store. Passwords do not belong into an address, which everybody sees in the list of
+processes: PostgreSQL's own client library reads ``~/.pgpass`` and ``$PGPASSWORD``.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 
 import duckdb
 
 from monitor.exceptions import InputError, StoreError
 from monitor.store.kept_blocks import has_torn_blocks, settle_blocks
+from monitor.store.lake.extensions import literal, load
+from monitor.store.lake.object_store import enter
 from monitor.store.opening import show_no_progress
 
 #: Under which name a lake is attached.
@@ -23,10 +23,9 @@ LAKE = "lake"
 _SCHEME = "ducklake:"
 #: What stands before the name of a catalogue that is no DuckDB file.
 _SERVERS = ("postgres:", "postgresql:", "mysql:", "sqlite:")
-_EXTENSIONS = {
-    "ducklake": "duckdb_extension_ducklake",
-    "postgres_scanner": "duckdb_extension_postgres_scanner",
-}
+_EXTENSIONS = ("ducklake", "postgres_scanner")
+#: What DuckDB says where the files of a lake lie in an object store.
+_NOT_ENTERED = "requires the extension httpfs"
 
 
 def is_lake(address: str) -> bool:
@@ -62,25 +61,11 @@ def connection_with_extensions(threads: int | None = None) -> duckdb.DuckDBPyCon
     }
     if threads is not None:
         config["threads"] = str(threads)
-    paths = [_extension(name, module) for name, module in _EXTENSIONS.items()]
     connection = duckdb.connect(":memory:", config=config)
     show_no_progress(connection)
-    for path in paths:
-        connection.execute(f"LOAD {literal(str(path))}")
+    for name in _EXTENSIONS:
+        load(connection, name)
     return connection
-
-
-def _extension(name: str, module: str) -> Path:
-    spec = importlib.util.find_spec(module)
-    if spec is None or spec.origin is None:
-        raise InputError("a lake needs extensions of DuckDB: pip install 'machine-health-monitor[lake]'")
-    path = Path(spec.origin).parent / "extensions" / f"v{duckdb.__version__}" / f"{name}.duckdb_extension"
-    if not path.is_file():
-        raise InputError(
-            f"the extension {name} that is installed is not for DuckDB {duckdb.__version__}: "
-            "pip install 'machine-health-monitor[lake]'"
-        )
-    return path
 
 
 def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -> None:
@@ -98,8 +83,15 @@ def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -
                 "and is put back by whoever opens the lake next and may write the file"
             )
     bracketed = f" ({', '.join(options)})" if options else ""
+    statement = f"ATTACH {literal(address)} AS {LAKE}{bracketed}"
     try:
-        connection.execute(f"ATTACH {literal(address)} AS {LAKE}{bracketed}")
+        try:
+            connection.execute(statement)
+        except duckdb.Error as fault:
+            if _NOT_ENTERED not in str(fault):
+                raise
+            enter(connection)
+            connection.execute(statement)
     except duckdb.Error as fault:
         raise StoreError(_in_words(address, str(fault))) from fault
 
@@ -108,8 +100,3 @@ def _in_words(address: str, message: str) -> str:
     if "does not exist" in message:
         return f"there is no lake at {address}; `monitor publish --to {address!r} --files FOLDER` makes one"
     return f"the lake {address} cannot be opened: {' '.join(message.split())}"
-
-
-def literal(text: str) -> str:
-    """Return a text as SQL writes it, where it cannot be bound."""
-    return "'" + text.replace("'", "''") + "'"

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import duckdb
 
 from monitor.store.entries import rows_recorded
-from monitor.store.lake.attaching import LAKE, literal
+from monitor.store.lake.attaching import LAKE
+from monitor.store.lake.extensions import literal
 from monitor.store.lake.schema import LARGEST_OWN, OWN_BITS
 from monitor.store.opening import busy
 from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, writer_at_work

@@ -30,9 +30,9 @@ from monitor.store.lake.attaching import (
     catalogue_file,
     connection_with_extensions,
     is_lake,
-    literal,
 )
 from monitor.store.lake.copying import attach_origin, statements
+from monitor.store.lake.extensions import literal
 from monitor.store.lake.names import (
     register_names,
     register_plant,
@@ -40,6 +40,7 @@ from monitor.store.lake.names import (
     turn_of,
     unregistered_names,
 )
+from monitor.store.lake.object_store import is_object_store
 from monitor.store.lake.schema import LARGEST_OWN, check_schema, has_schema, make_schema
 from monitor.store.turns import Patience
 
@@ -71,11 +72,12 @@ def publish(
     db: Database,
     address: str,
     *,
-    files: Path | None = None,
+    files: str | Path | None = None,
     plant: str | None = None,
     progress: Callable[[int, int], None] = lambda last, end: None,
 ) -> Published:
-    """Publish everything that a database stored since it last published; ``files`` is the folder of a new lake.
+    """Publish everything that a database stored since it last published; ``files`` is the folder or the
+    address in an object store (``s3://bucket/folder``) of a new lake.
 
     ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
     the last entry that was published and the last that is there. The database is closed. Raises StoreError, InputError.
@@ -93,7 +95,7 @@ def publish(
 class _Publisher:
     """A connection that has the lake, and the file of the plant for as long as it is read."""
 
-    def __init__(self, path: str, patience: Patience, address: str, files: Path | None) -> None:
+    def __init__(self, path: str, patience: Patience, address: str, files: str | Path | None) -> None:
         self._path, self._patience, self._address, self._files = path, patience, address, files
         self._catalogue = catalogue_file(address)
         self._connection = connection_with_extensions()
@@ -166,7 +168,9 @@ class _Publisher:
     def _attach(self) -> None:
         options = ["CREATE_IF_NOT_EXISTS false"]
         if self._files is not None:
-            options = [f"DATA_PATH {literal(str(self._files.resolve()))}", "OVERRIDE_DATA_PATH false"]
+            stated = str(self._files)
+            lie_in = stated if is_object_store(stated) else str(Path(stated).resolve())
+            options = [f"DATA_PATH {literal(lie_in)}", "OVERRIDE_DATA_PATH false"]
         attach(self._connection, self._address, *options, _NOTHING_INLINED)
         self._attached = True
         # What its log still holds of a process that died is written into the file without a commit of ours.

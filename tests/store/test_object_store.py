@@ -1,0 +1,156 @@
+"""A lake whose Parquet files lie in an object store: the same answers, the same words when it is away.
+
+What needs a store that answers (moto's, on loopback) runs by ``make object-store``, which installs it.
+"""
+
+from __future__ import annotations
+
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("duckdb_extension_httpfs", reason="the extra [lake] is not installed")
+import duckdb
+
+from monitor.exceptions import InputError, StoreError
+from monitor.records import Campaign
+from monitor.store import Database, StoredIdentification, import_campaign, save_identification
+from monitor.store.lake import object_store, publication
+from monitor.store.lake.publication import publish
+from monitor.store.lake.reading import LakeDatabase
+
+Make = Callable[..., Campaign]
+Identify = Callable[..., StoredIdentification]
+FILES = "s3://lake/shops"
+KEYS = {"AWS_ACCESS_KEY_ID": "plant", "AWS_SECRET_ACCESS_KEY": 'it\'s "secret"'}
+
+
+@pytest.fixture(autouse=True)
+def no_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (*KEYS, "AWS_SESSION_TOKEN", "AWS_REGION", "AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def _set(monkeypatch: pytest.MonkeyPatch, **variables: str) -> None:
+    for name, value in (KEYS | variables).items():
+        monkeypatch.setenv(name, value)
+
+
+def _fill(path: Path, campaigns: list[Campaign], identified: Identify) -> None:
+    with Database(path) as db:
+        for campaign in campaigns:
+            import_campaign(db, campaign)
+            save_identification(db, identified(campaign))
+
+
+def test_who_may_enter_is_asked_for_by_name(
+    tmp_path: Path, make_campaign: Make, make_identification: Identify, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _fill(tmp_path / "Ulm.duckdb", [make_campaign("week 1")], make_identification)
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "plant")
+    with (
+        Database(tmp_path / "Ulm.duckdb") as db,
+        pytest.raises(InputError, match="object store; set AWS_SECRET_ACCESS_KEY in the environment"),
+    ):
+        publish(db, f"ducklake:{tmp_path}/shops.ducklake", files=FILES)
+
+
+@pytest.mark.parametrize(
+    ("variables", "options"),
+    [
+        ({}, {"region": "us-east-1"}),
+        ({"AWS_REGION": "eu-central-1"}, {"region": "eu-central-1"}),
+        (
+            {"AWS_ENDPOINT_URL_S3": "http://127.0.0.1:9000/"},
+            {"endpoint": "127.0.0.1:9000", "url_style": "path", "use_ssl": "false"},
+        ),
+        (
+            {"AWS_ENDPOINT_URL": "https://store.example.org"},
+            {"endpoint": "store.example.org", "use_ssl": "true"},
+        ),
+    ],
+)
+def test_the_environment_says_which_store(
+    monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], options: dict[str, str]
+) -> None:
+    _set(monkeypatch, **variables)
+    with duckdb.connect(":memory:", config={"autoload_known_extensions": "false"}) as connection:
+        object_store.enter(connection)
+        (stated,) = connection.execute("SELECT secret_string FROM duckdb_secrets()").fetchone() or ("",)
+    fields = dict(field.split("=", 1) for field in stated.split(";"))
+    assert {name: fields.get(name) for name in options} == options
+    assert "secret=redacted" in stated
+
+
+def test_an_endpoint_without_a_scheme_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    _set(monkeypatch, AWS_ENDPOINT_URL_S3="store.example.org:9000")
+    with pytest.raises(InputError, match=r"write the address of the store, such as https://"):
+        object_store.enter(duckdb.connect())
+
+
+@pytest.fixture
+def store(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """An object store on loopback with an empty bucket ``lake``."""
+    server = pytest.importorskip("moto.server", reason="make object-store installs it").ThreadedMotoServer(
+        port=0
+    )
+    server.start()
+    _, port = server.get_host_and_port()
+    address = f"http://127.0.0.1:{port}"
+    urllib.request.urlopen(urllib.request.Request(f"{address}/moto-api/reset", method="POST"))
+    urllib.request.urlopen(urllib.request.Request(f"{address}/lake", method="PUT"))
+    _set(monkeypatch, AWS_ENDPOINT_URL_S3=address)
+    yield server
+    server.stop()
+
+
+def test_a_lake_in_an_object_store_answers_as_one_file(
+    tmp_path: Path, make_campaign: Make, make_identification: Identify, store: Any
+) -> None:
+    lake = f"ducklake:{tmp_path}/shops.ducklake"
+    shops = {
+        shop: [make_campaign(f"{shop} {n}", f"MILL-{shop}") for n in range(3)] for shop in ("Ulm", "Aalen")
+    }
+    _fill(tmp_path / "one.duckdb", [*shops["Ulm"], *shops["Aalen"]], make_identification)
+    for shop, campaigns in shops.items():
+        _fill(tmp_path / f"{shop}.duckdb", campaigns, make_identification)
+        with Database(tmp_path / f"{shop}.duckdb") as db:
+            assert publish(db, lake, files=FILES).entries > 0
+        with Database(tmp_path / f"{shop}.duckdb") as db:
+            # The catalogue says where the files lie; nothing is published twice.
+            assert publish(db, lake).entries == 0
+    assert {path.suffix for path in tmp_path.iterdir()} <= {".duckdb", ".ducklake", ".lock", ".blocks"}
+    values = "SELECT campaign, run, parameter, value, u FROM v_parameters ORDER BY ALL"
+    with Database(tmp_path / "one.duckdb", read_only=True) as one, LakeDatabase(lake) as many:
+        assert many.rows(values) == one.rows(values) != []
+
+
+def test_a_store_that_is_away_is_said_and_waited_for_by_the_next_call(
+    tmp_path: Path,
+    make_campaign: Make,
+    make_identification: Identify,
+    store: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lake, path = f"ducklake:{tmp_path}/shops.ducklake", tmp_path / "Ulm.duckdb"
+    _fill(path, [make_campaign("week 1")], make_identification)
+    with Database(path) as db:
+        publish(db, lake, files=FILES)
+    _fill(path, [make_campaign("week 2")], make_identification)
+    _set(monkeypatch, AWS_ENDPOINT_URL_S3="http://127.0.0.1:9")
+    monkeypatch.setattr(publication, "_TRIES", 1)
+    with (
+        Database(path) as db,
+        pytest.raises(StoreError, match=r"published to ducklake:.* stays, and the next"),
+    ):
+        publish(db, lake)
+    _, port = store.get_host_and_port()
+    _set(monkeypatch, AWS_ENDPOINT_URL_S3=f"http://127.0.0.1:{port}")
+    with Database(path) as db:
+        assert publish(db, lake).entries > 0
+    with LakeDatabase(lake) as many:
+        assert many.rows("SELECT campaign FROM v_campaigns ORDER BY 1") == [("week 1",), ("week 2",)]
