@@ -54,7 +54,7 @@ def field_drawing(name: str, moment: datetime) -> bytes:
     room = _WIDTH - 4.0 * _EDGE
     widest = max(_width(font, line) for line in lines)
     size = max(_SMALLEST_PT, min(_LETTERS_PT, room / widest if widest else _LETTERS_PT))
-    parts = [f"0.5 w 0.4 G 0.25 0.25 {_WIDTH - 0.5:.2f} {_HEIGHT - 1.5:.2f} re S", "0 g"]
+    parts = [f"0.5 w 0.4 G 0.5 0.5 {_WIDTH - 2.0:.2f} {_HEIGHT - 2.5:.2f} re S", "0 g"]
     for line, base in zip(lines, (0.55 * _HEIGHT, 0.16 * _HEIGHT), strict=True):
         parts.extend(_outlines(font, line, size, (2.0 * _EDGE, base)))
     return " ".join(parts).encode("ascii")
