@@ -13,9 +13,9 @@ import numpy as np
 from monitor.discovery import RobustFit
 from monitor.effects import ChainEffect
 from monitor.methods import campaign_method
+from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.instruments.contradiction import STATED_WITHIN
 from monitor.readers.doubts import (
-    AIR_NAMES,
     AIR_RANGE,
     LARGEST_BAR_DIFFERENCE,
     bar_difference,
@@ -156,12 +156,5 @@ def _temperature(campaign: Campaign, run: Run) -> Iterator[Ground]:
     bar = campaign.artefact.scale_bar
     if bar is None:
         return
-    recorded = [name for name, value in run.conditions.items() if np.isfinite(value)]
-    rows = campaign.probings.run == run.run
-    recorded += [
-        name for name, values in campaign.probings.channels.items() if np.isfinite(values[rows]).any()
-    ]
-    if not any(
-        name.endswith("_degC") and any(word in name.lower() for word in AIR_NAMES) for name in recorded
-    ):
+    if bar_temperature(campaign, run) is None:
         yield Ground(GroundKind.TEMPERATURE, run.run, "-".join(bar.balls))
