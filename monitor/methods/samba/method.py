@@ -42,7 +42,7 @@ def bar_length(campaign: Campaign) -> Array:
     if bar.expansion_coefficient is not None and bar.reference_temperature is not None:
         temperatures = [bar_temperature(campaign, run) for run in runs]
         warmer = [
-            0.0 if bar_is is None else bar_is.degrees - bar.reference_temperature for bar_is in temperatures
+            0.0 if warmth is None else warmth.degrees - bar.reference_temperature for warmth in temperatures
         ]
         length *= 1.0 + bar.expansion_coefficient * np.array(warmer)
     return length

@@ -21,7 +21,6 @@ from monitor.reporting.health.records import (
 from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
 from monitor.reporting.messages import DRIFT_OR_SEASON
-from monitor.reporting.plain_names import plain_name
 
 #: States in which a machine wants something done; in the others nothing is wrong, or nothing is known.
 URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index(State.SUSPECT_DATA) + 1])
@@ -164,7 +163,7 @@ def _changed(health: MachineHealth) -> str:
     parameter = concern(health)
     name = ""
     if parameter is not None and any(change.at in parameter.changed_at for change in changes):
-        name = f" ({plain_name(parameter.name)})"
+        name = f" ({parameter.in_words})"
     return "; ".join(str(change.what) for change in changes) + name
 
 
@@ -204,7 +203,7 @@ def _beyond(parameter: ParameterHealth) -> str:
 def _stands(parameter: ParameterHealth) -> str:
     value, expanded = in_words(parameter.estimate, parameter.expanded, sign=True)
     limit = "" if parameter.tolerance is None else f", tolerance ± {plain(parameter.tolerance)}"
-    name = plain_name(parameter.name)
+    name = parameter.in_words
     return f"{name} ({parameter.name}) is {value} {parameter.unit} (U = {expanded}{limit})"
 
 
@@ -244,7 +243,7 @@ def _since(health: MachineHealth) -> str:
 def to_do(health: MachineHealth) -> str:
     """Return what to do on a machine, and by when to measure it again."""
     parameter = concern(health)
-    name = "its errors" if parameter is None else f"{plain_name(parameter.name)} ({parameter.name})"
+    name = "its errors" if parameter is None else f"{parameter.in_words} ({parameter.name})"
     action = {
         State.OUT_OF_TOLERANCE: f"adjust or compensate {name} and measure again",
         State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {name} is too near its limit to be judged",

@@ -19,6 +19,7 @@ from monitor.reporting.health.sentences import (
     RunNamed,
     TolerancesOfType,
 )
+from monitor.reporting.plain_names import plain_name
 from monitor.store import (
     Database,
     MachineEvent,
@@ -157,18 +158,21 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     limits = _limits(db, last.campaign, remarks)
     limit_um = limits.get(VOLUMETRIC)
     beyond = None if limit_um is None else _beyond(results, limit_um, remarks)
-    added = {name: past for name, past in parameter_pasts.items() if name.startswith(model.effects)}
-    of_last = {name: past.series for name, past in added.items() if past.mask[-1]}
-    judged = with_volumetric(with_effects(conformity_of(stated, limits), of_last, limits), beyond)
+    added = [name for name in parameter_pasts if name.startswith(model.effects)]
+    judged = with_effects(conformity_of(stated, limits), parameter_pasts, added, limits)
+    judged = with_volumetric(judged, beyond)
     parameters, drifts = [], {}
-    for name in () if stated is None else (*stated.parameters, *added):
+    names = () if stated is None else (*stated.parameters, *added)
+    topology = past.name.description.topology if isinstance(past.name.description, MachineNamed) else ""
+    for name in names:
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]
         drifts[name] = drift_forecast(parameter.drift, limits.get(name))
         starts = [at.replace(tzinfo=None) for at in compress(history.started_at, parameter.mask)]
         judgement = Judgement(limits.get(name), judged.single.get(name), drifts[name])
-        parameters.append(parameter_health(parameter, starts, stated, judgement, week))
+        in_words = plain_name(name, topology, names)
+        parameters.append(parameter_health(parameter, starts, stated, judgement, week, in_words))
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
     unchanged = _unchanged(parameter_pasts, past.events, of_campaign)
     noted = changes_noted(

@@ -36,7 +36,7 @@ from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.forecast import DriftForecast
-from monitor.workflow.history.series import Series
+from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 #: So many sentences of a week are named one by one.
@@ -70,18 +70,21 @@ def conformity_of(stated: UncertaintyAnswer | None, limits: Mapping[str, float])
     return Conformity(single, float(1.0 - result.joint), all(name in limits for name in names))
 
 
-def with_effects(judged: Conformity, shown: Mapping[str, Series], limits: Mapping[str, float]) -> Conformity:
+def with_effects(
+    judged: Conformity, pasts: Mapping[str, ParameterPast], added: Sequence[str], limits: Mapping[str, float]
+) -> Conformity:
     """The judgement with that of the effects of the model that the last run has a value of; as it was without limits.
 
     An effect is no output of the run's evaluation: its value and u are those of the history. The probability of any to
     be out is at most the sum, which is taken, as for the volumetric error.
     """
-    names = [name for name in shown if name in limits]
+    names = [name for name in added if name in limits and pasts[name].mask[-1]]
     if not names:
         return judged
     limit = np.array([limits[name] for name in names])
-    u = np.array([shown[name].u[-1] for name in names])
-    inside = conformity([shown[name].values[-1] for name in names], np.diag(u**2), -limit, limit).single
+    series = [pasts[name].series for name in names]
+    u = np.array([each.u[-1] for each in series])
+    inside = conformity([each.values[-1] for each in series], np.diag(u**2), -limit, limit).single
     out = {name: float(1.0 - p) for name, p in zip(names, inside, strict=True)}
     any_out = min(1.0, (judged.any or 0.0) + sum(out.values()))
     return Conformity({**judged.single, **out}, any_out, judged.every_has_one)
