@@ -85,7 +85,7 @@ class _TypedOnce(argparse.Action):
     ) -> None:
         if option_string is not None and isinstance(parser, Parser):
             if self.dest in parser.typed:
-                raise argparse.ArgumentError(self, f"one value is taken, '{values}' is a second one")
+                raise argparse.ArgumentError(self, "one value is taken, a second one was typed")
             parser.typed.add(self.dest)
         setattr(namespace, self.dest, values)
 

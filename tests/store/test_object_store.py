@@ -88,7 +88,9 @@ def test_the_environment_says_which_store(
 
 def test_an_endpoint_without_a_scheme_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     _set(monkeypatch, AWS_ENDPOINT_URL_S3="store.example.org:9000")
-    with pytest.raises(InputError, match=r"write the address of the store, such as https://"):
+    with pytest.raises(
+        InputError, match=r"address of a store without a name and a password, such as https://"
+    ):
         object_store.enter(duckdb.connect())
 
 
@@ -148,9 +150,33 @@ def test_a_store_that_is_away_is_said_and_waited_for_by_the_next_call(
         pytest.raises(StoreError, match=r"published to ducklake:.* stays, and the next"),
     ):
         publish(db, lake)
+    with pytest.raises(StoreError, match="cannot be read"), LakeDatabase(lake) as many:
+        many.rows("SELECT campaign FROM v_campaigns")
     _, port = store.get_host_and_port()
     _set(monkeypatch, AWS_ENDPOINT_URL_S3=f"http://127.0.0.1:{port}")
     with Database(path) as db:
         assert publish(db, lake).entries > 0
     with LakeDatabase(lake) as many:
         assert many.rows("SELECT campaign FROM v_campaigns ORDER BY 1") == [("week 1",), ("week 2",)]
+
+
+def test_a_bucket_that_is_not_there_is_said_at_once(
+    tmp_path: Path,
+    make_campaign: Make,
+    make_identification: Identify,
+    store: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _fill(tmp_path / "Ulm.duckdb", [make_campaign("week 1")], make_identification)
+    tries: list[float] = []
+    monkeypatch.setattr(publication.time, "sleep", tries.append)
+    with Database(tmp_path / "Ulm.duckdb") as db, pytest.raises(StoreError, match="404"):
+        publish(db, f"ducklake:{tmp_path}/shops.ducklake", files="s3://lakes/shops")
+    assert tries == []
+
+
+@pytest.mark.parametrize("files", ["gs://lake/shops", "s3a://lake/shops", "https://store.example.org/lake"])
+def test_an_address_of_another_store_makes_no_folder_of_that_name(files: str) -> None:
+    with pytest.raises(InputError, match=r"lie in a folder, or at s3://BUCKET/FOLDER"):
+        object_store.address_of_files(files)
+    assert object_store.address_of_files("S3://lake/shops") == "s3://lake/shops"

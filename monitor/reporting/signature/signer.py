@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
-#: What pyHanko writes before the name of a certificate's subject.
-_COMMON = "Common Name: "
+#: The name among the attributes of a subject as asn1crypto writes them: after ", ", or "; " where a value has a comma.
+_COMMON = re.compile(r"(?:^|, |; )Common Name: (.*?)(?=(?:, |; )[A-Z][A-Za-z ]*: |$)")
 
 
 @dataclass(frozen=True)
@@ -18,5 +19,5 @@ class Signer:
     @property
     def common_name(self) -> str:
         """The name alone, without what it is called in the certificate and the organisation, country and so on."""
-        named = [part.removeprefix(_COMMON) for part in self.name.split(", ") if part.startswith(_COMMON)]
-        return named[0] if named else self.name
+        named = _COMMON.search(self.name)
+        return self.name if named is None else named[1]

@@ -8,6 +8,8 @@ and ``AWS_ENDPOINT_URL_S3`` (else ``AWS_ENDPOINT_URL``), the address of a store 
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import duckdb
@@ -18,9 +20,19 @@ from monitor.store.lake.extensions import literal, load
 SCHEME = "s3://"
 
 
-def is_object_store(files: str) -> bool:
-    """Whether files are said to lie in an object store."""
-    return files.startswith(SCHEME)
+def address_of_files(files: str) -> str:
+    """Return where files are said to lie: ``s3://BUCKET/FOLDER``, or the absolute path of a folder.
+
+    Raises InputError for the address of something else, of which DuckDB would make a folder of that name.
+    """
+    scheme = re.match(r"[A-Za-z][\w+.-]*://", files)
+    if scheme is None:
+        return str(Path(files).resolve())
+    if scheme[0].lower() != SCHEME:
+        raise InputError(
+            f"{files}: the files of a lake lie in a folder, or at s3://BUCKET/FOLDER of an object store"
+        )
+    return SCHEME + files.removeprefix(scheme[0])
 
 
 def enter(connection: duckdb.DuckDBPyConnection) -> None:
@@ -50,9 +62,10 @@ def _of_endpoint(address: str) -> dict[str, str]:
     if not address:
         return {}
     parts = urlsplit(address)
-    if parts.scheme not in ("http", "https") or not parts.netloc:
+    if parts.scheme not in ("http", "https") or not parts.netloc or "@" in parts.netloc:
         raise InputError(
-            f"AWS_ENDPOINT_URL_S3 is '{address}'; write the address of the store, such as https://store.example.org:9000"
+            "AWS_ENDPOINT_URL_S3 (or AWS_ENDPOINT_URL) has to be the address of a store without a name and a password, "
+            "such as https://store.example.org:9000"
         )
     # Names of buckets are no hosts there.
     return {

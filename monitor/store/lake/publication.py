@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import random
+import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,7 +41,7 @@ from monitor.store.lake.names import (
     turn_of,
     unregistered_names,
 )
-from monitor.store.lake.object_store import is_object_store
+from monitor.store.lake.object_store import address_of_files
 from monitor.store.lake.schema import LARGEST_OWN, check_schema, has_schema, make_schema
 from monitor.store.turns import Patience
 
@@ -168,9 +169,7 @@ class _Publisher:
     def _attach(self) -> None:
         options = ["CREATE_IF_NOT_EXISTS false"]
         if self._files is not None:
-            stated = str(self._files)
-            lie_in = stated if is_object_store(stated) else str(Path(stated).resolve())
-            options = [f"DATA_PATH {literal(lie_in)}", "OVERRIDE_DATA_PATH false"]
+            options = [f"DATA_PATH {literal(address_of_files(str(self._files)))}", "OVERRIDE_DATA_PATH false"]
         attach(self._connection, self._address, *options, _NOTHING_INLINED)
         self._attached = True
         # What its log still holds of a process that died is written into the file without a commit of ours.
@@ -284,7 +283,12 @@ class _Publisher:
 
 
 def _may_pass(message: str) -> bool:
-    """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away."""
+    """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away.
+
+    A bucket that is not there, or that one may not enter, stays so.
+    """
+    if re.search(r"nosuchbucket|accessdenied|\bhttp\b.*\b40[134]\b|\b40[134] \(", message.lower()):
+        return False
     return any(
         phrase in message.lower()
         for phrase in (

@@ -11,6 +11,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import duckdb
+
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database
 from monitor.store.lake.attaching import LAKE, attach, check_lake_address, connection_with_extensions
@@ -47,8 +49,12 @@ class LakeDatabase(Database):
             connection.execute(f"DETACH {LAKE}")
             attach(connection, self.path, "READ_ONLY", f"SNAPSHOT_VERSION {int(row[0])}")
             connection.execute(f"USE {LAKE}")
-        except BaseException:
+        except BaseException as fault:
             self.close()
+            if isinstance(fault, duckdb.Error):
+                raise StoreError(
+                    f"the lake {self.path} cannot be read: {' '.join(str(fault).split())}"
+                ) from fault
             raise
 
     def session(self, actor: str) -> Database:

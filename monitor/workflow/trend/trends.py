@@ -113,7 +113,8 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
             db, machine, model=model, version=version, parameter=request.parameter, since=request.since, followed_by=by,
         )  # fmt: skip
 
-    history = read(followed_by(db, machine))
+    by = followed_by(db, machine)
+    history, is_new = read(by), False
     if not db.read_only and history.unidentified:
         # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
         from monitor.workflow.identify.identify import identify
@@ -122,10 +123,13 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
         for campaign in history.unidentified:
             try:
                 identify(db, IdentifyRequest(campaign, request.model))
+                is_new = True
             except DataError:
                 # A campaign that cannot be identified does not keep the others from being followed.
                 continue
-    history = read(numbered_by(db, machine))
+    numbered = numbered_by(db, machine)
+    if is_new or numbered != by:
+        history = read(numbered)
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
         every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters

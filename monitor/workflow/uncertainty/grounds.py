@@ -36,7 +36,8 @@ MOST_TIMES = 5.0
 #: in the examples: 0.07.
 LARGEST_GAIN = 1e-3
 #: mm/m. What all axes have in common and the bar has not: steel scales 30 K warmer than the bar was taken for. Above it
-#: the gains agree to a share of 20 % only where the bar is another length than stated. Largest in the examples: 0.02.
+#: the gains agree to a share of 20 % only where the bar is another length than stated. Largest in the
+#: examples: 0.028.
 LARGEST_COMMON_GAIN, COMMON_WITHIN = 3.5e-4, 0.2
 #: rad. Axes of machines given by letters are set up to tenths of a milliradian at worst; 5 mrad are 2.5 mm over 500 mm.
 #: Joints of a chain with lengths are mastered to degrees. Largest in the examples: 0.06 mrad, of the robot 8 mrad.
@@ -44,7 +45,8 @@ LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
 #: mm. An axis of a machine given by letters lies where the machine file's coordinates put it, to some tenths. Largest
 #: in the examples: 0.11. Of a chain with lengths `identify` compares each with its own.
 LARGEST_OFFSET = 5.0
-#: Chance makes the largest E_n between instruments in at most so many right campaigns; as for a model that is refuted.
+#: Chance makes the largest E_n between instruments in at most so many right campaigns, of readings that scatter as they
+#: are stated; three times as much is refused more often (3 of 8). As for a model that is refuted.
 DISAGREE = 1e-3
 
 
