@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] = ()) -> int:
 
 
 def _write(name: str, text: str) -> None:
-    (PREPARED / name).write_text(text, encoding="utf-8")
+    (PREPARED / name).write_text(sources.with_links(text), encoding="utf-8")
 
 
 def _offline() -> int:

@@ -29,6 +29,8 @@ nitpick_ignore_regex = [
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 suppress_warnings: list[str] = []
+# What is typed is shown: two hyphens of an option would become a dash.
+smartquotes = False
 
 autodoc_class_signature = "separated"
 autodoc_member_order = "bysource"

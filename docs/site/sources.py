@@ -16,7 +16,7 @@ DOCS = CHECKOUT / "docs"
 FROM_OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s#]*)(?P<anchor>#[^)\s]*)?\)")
-_BARE = re.compile(r"(?<![\w/\[(`*-])docs/(?P<name>[a-z-]+\.md)(?!\]|\)\]|`)")
+_BARE = re.compile(r"(?<![\w/\[`*-])(?<!\]\()docs/(?P<name>[a-z-]+\.md)(?!\]|\)\]|`)")
 # A page has one title; where a file has several, all but the first go a level down.
 _TITLE = re.compile(r"^# ", re.MULTILINE)
 _HEADING = re.compile(r"^(?=#{1,5} )", re.MULTILINE)
@@ -34,6 +34,11 @@ def copy_pages(out: Path) -> None:
     pages |= {CHECKOUT / path: name for path, name in FROM_OUTSIDE.items()}
     for path, name in pages.items():
         (out / name).write_text(manual_text(path), encoding="utf-8")
+
+
+def with_links(text: str) -> str:
+    """Return a generated text of ``reference/`` in which a bare ``docs/NAME.md`` is a link."""
+    return _BARE.sub(lambda bare: f"[{bare['name']}](../{bare['name']})", text)
 
 
 def manual_text(path: Path) -> str:

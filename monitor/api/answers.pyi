@@ -48,6 +48,7 @@ from monitor.workflow.explain.explain_answer import ScatteringTarget
 from monitor.workflow.explain.version_answer import CurveVersion
 from monitor.workflow.explain.version_answer import MachineVersion
 from monitor.workflow.fleet.answer import FleetAnswer
+from monitor.workflow.fleet.answer import OlderVersion
 from monitor.workflow.health.request import ReportAnswer
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.refuted import ModelRefuted
@@ -336,6 +337,8 @@ class TypedFleetAnswer(Answer[FleetAnswer]):
     def models_lacking(self) -> Mapping[str, str] | None: ...
     @property
     def without_numbers(self) -> tuple[str, ...] | None: ...
+    @property
+    def older_versions(self) -> Mapping[str, tuple[OlderVersion, ...]] | None: ...
 
 class TypedImportAnswer(Answer[ImportAnswer]):
     @property

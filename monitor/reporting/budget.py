@@ -74,13 +74,19 @@ class LengthKind(StrEnum):
 
 @dataclass(frozen=True)
 class LengthReference:
-    """At which temperature gains hold. ``reference`` and ``temperature`` in °C, ``expansion`` in 1/K of the bar."""
+    """At which temperature gains hold. ``reference`` and ``temperature`` in °C, ``expansion`` in 1/K of the bar.
+
+    ``columns`` are the recorded ones that the temperature of a bar was taken from. ``not_in_u`` are the quantities of
+    the bar that no source states.
+    """
 
     kind: LengthKind
     gains: tuple[str, ...]
     temperature: float | None = field(default=None, metadata=OMITTED)
     reference: float | None = field(default=None, metadata=OMITTED)
     expansion: float | None = field(default=None, metadata=OMITTED)
+    columns: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    not_in_u: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, eq=False)

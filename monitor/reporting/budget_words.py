@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource, larger_than_u
+from monitor.reporting.budget import (
+    DayToDay,
+    HoldsFor,
+    LengthKind,
+    LengthReference,
+    StatedSource,
+    larger_than_u,
+)
 from monitor.reporting.numbers import decimal_of, round_result, round_to_place, round_uncertainty
 from monitor.reporting.texts import Texts
-from monitor.sources import HALF_WIDTHS, Law
+from monitor.sources import HALF_WIDTHS, Law, Quantity
 
 #: More parameters are counted, not named.
 _NAMED = 3
+#: K from the reference temperature: less is printed as 0, and an expansion coefficient does nothing.
+_LEAST_KELVIN = 0.005
 
 
 def days_sentences(
@@ -45,14 +54,34 @@ def negative_sentence(days: DayToDay, texts: Texts) -> str:
 
 
 def length_sentence(length: LengthReference, texts: Texts) -> str:
-    """To what gains refer, and whether that is 20 °C."""
+    """To what gains refer, whether that is 20 °C, and what of the bar's temperature is no part of u."""
     values = {
         "temperature": None if length.temperature is None else _plain(length.temperature, 0.01, texts),
         "reference": None if length.reference is None else _plain(length.reference, 0.01, texts),
         "expansion": None if length.expansion is None else _plain(1e6 * length.expansion, 0.01, texts),
     }
     key = length.kind.value if length.temperature is not None else f"{length.kind.value}_unknown"
-    return texts(f"length.{key}", gains=", ".join(length.gains), **values)
+    if length.columns:
+        key = f"{key}_by"
+    sentence = texts(
+        f"length.{key}", gains=", ".join(length.gains), columns=", ".join(length.columns or ()), **values
+    )
+    return " ".join(part for part in (sentence, _not_in_u(length, texts)) if part)
+
+
+def _not_in_u(length: LengthReference, texts: Texts) -> str:
+    """What no source states of a bar, and what a kelvin and a millionth of its expansion come to; empty for nothing."""
+    lacking = set(length.not_in_u or ())
+    if length.kind is not LengthKind.CORRECTED or length.temperature is None:
+        return texts("length.not_in_u_uncorrected") if str(Quantity.STANDARD_TEMPERATURE) in lacking else ""
+    kelvin = abs(length.temperature - (length.reference or 0.0))
+    if kelvin < _LEAST_KELVIN:
+        lacking.discard(str(Quantity.STANDARD_EXPANSION))
+    if not lacking:
+        return ""
+    key = "not_in_u_bar" if len(lacking) > 1 else f"not_in_u_{lacking.pop()}"
+    per_kelvin = _plain(1e6 * (length.expansion or 0.0), 0.01, texts)
+    return texts(f"length.{key}", per_kelvin=per_kelvin, per_millionth=_plain(kelvin, 0.01, texts))
 
 
 def source_words(source: StatedSource, texts: Texts) -> str:

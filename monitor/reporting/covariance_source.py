@@ -35,8 +35,9 @@ class CovarianceSource:
     ``runs`` and ``dof``, the degrees of freedom, belong to a covariance that was estimated from repeated runs, ``u_um``
     to one that was stated or is the repeatability, in µm, ``times`` to a repeatability as a multiple of what each
     setup of an instrument states. ``selection`` names the stored selection (or campaign) whose
-    runs were taken. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known`` whose
-    errors are no part of u.
+    runs were taken. ``for_the_run`` is true where repeated runs would have sufficed and an uncertainty of the run
+    itself was asked for. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known``
+    whose errors are no part of u.
     """
 
     kind: CovarianceKind
@@ -47,6 +48,7 @@ class CovarianceSource:
     linear_axes: bool = False
     taken_as_known: tuple[TakenAsKnown, ...] = ()
     times: float | None = field(default=None, metadata=OMITTED)
+    for_the_run: bool | None = field(default=None, metadata=OMITTED)
 
 
 def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) -> str:
@@ -56,7 +58,8 @@ def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) ->
     digits = ".2g" if source.kind is CovarianceKind.REPEATABILITY else "g"
     u = "" if source.u_um is None else f"{source.u_um:{digits}}".replace(".", say.decimal_sign)
     times = "" if source.times is None else f"{source.times:.2g}".replace(".", say.decimal_sign)
-    sentence = say(f"covariance.{source.kind.value}", runs=source.runs, dof=source.dof, u=u, times=times)
+    key = f"covariance.{source.kind.value}" + "_for_the_run" * bool(source.for_the_run)
+    sentence = say(key, runs=source.runs, dof=source.dof, u=u, times=times)
     if source.selection is not None:
         sentence = say("covariance.selection", name=source.selection, sentence=sentence)
     if source.linear_axes:

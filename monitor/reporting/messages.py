@@ -65,6 +65,14 @@ def machines_lacking(machines: Mapping[str, str], most: int) -> str:
     )
 
 
+def numbers_of_older_version(machine: str, version: str, newest: str) -> str:
+    """Return which ``version`` of a model the numbers of a machine are of, while the ``newest`` has none."""
+    return (
+        f"the numbers of {machine} are of {version}, the newest version that it was identified by; {newest} is newer: "
+        "type `monitor identify`"
+    )
+
+
 def attention_words(attention: str, season_not_told: bool | None) -> str:
     """Return the class of a parameter of the fleet; of a slope that may be a season not that it drifts."""
     return _MOVES.get(attention, attention) if season_not_told else attention

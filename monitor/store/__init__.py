@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING
 from monitor.on_demand import on_demand
 from monitor.store.machine_models import (
     MachineModel as MachineModel,
+    OlderNumbers as OlderNumbers,
     followed_by as followed_by,
     machine_model as machine_model,
     machine_models as machine_models,
     machines_of_method as machines_of_method,
     machines_with_runs as machines_with_runs,
     not_identified as not_identified,
+    numbered_by as numbered_by,
+    older_numbers as older_numbers,
     save_machine_model as save_machine_model,
+    without_part as without_part,
 )
 from monitor.store.refusals import (
     StoredRefusal as StoredRefusal,
@@ -158,6 +162,7 @@ if TYPE_CHECKING:
         latest_frames as latest_frames,
         machine_descriptions as machine_descriptions,
         machine_runs as machine_runs,
+        machine_topology as machine_topology,
         parameter_frames as parameter_frames,
         probing_counts as probing_counts,
     )
@@ -232,7 +237,7 @@ else:
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
-            "identified_runs latest_frames machine_descriptions machine_runs parameter_frames "
+            "identified_runs latest_frames machine_descriptions machine_runs machine_topology parameter_frames "
             "probing_counts",
             "held_sizes": "held_bytes",
             "recalling": "Recalled",

@@ -77,17 +77,76 @@ def followed_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
     return every | {choice.method: (choice.model, choice.version) for choice in machine_models(db, machine)}
 
 
+# Machines that nobody identified by the latest version of a method's own model, by the newest one that somebody did:
+# none while each method has one version. Of ``which`` machines stands where the identifications are looked through.
+_OLDER = """
+SELECT i.machine, i.method, i.method AS model, max(i.model_version) AS model_version, newest.version AS newest
+FROM (
+    SELECT model AS method, max(version) AS version FROM model
+    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL)
+    GROUP BY model HAVING max(version) > 1
+) AS newest
+JOIN (
+    SELECT c.machine, i.method, i.model_version
+    FROM identification AS i JOIN campaign AS c USING (campaign_id) WHERE i.model = i.method {which}
+) AS i USING (method)
+ANTI JOIN v_machine_models AS chosen ON chosen.machine = i.machine AND chosen.method = i.method
+GROUP BY i.machine, i.method, newest.version HAVING max(i.model_version) < newest.version
+"""
+
+_CHOSEN = "SELECT machine, method, model, model_version FROM v_machine_models"
+
+#: The model that the numbers of a machine and method come from, where that is not the latest of the method's own.
+NUMBERED = f"""
+{_CHOSEN}
+UNION ALL SELECT machine, method, model, model_version FROM ({_OLDER.format(which="")})
+"""
+
+
+@dataclass(frozen=True)
+class OlderNumbers:
+    """A machine whose numbers are of an older ``version`` of a method's own ``model``, as nobody identified it by the
+    ``newest``."""
+
+    machine: str
+    model: str
+    version: int
+    newest: int
+
+
+def older_numbers(db: Database, machine: str | None = None) -> tuple[OlderNumbers, ...]:
+    """Return the machines whose numbers are of an older version, by name and method; all, or one."""
+    older = _OLDER.format(which="" if machine is None else "AND c.machine = ?")
+    rows = db.rows(
+        f"SELECT machine, model, model_version, newest FROM ({older}) ORDER BY machine, method",
+        [] if machine is None else [machine],
+    )
+    return tuple(OlderNumbers(*row) for row in rows)
+
+
+def numbered_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
+    """Name and version of the model of each method that the numbers of a machine come from.
+
+    That which it is followed by; where nobody identified it by the latest version of a method's own model, the newest
+    version that somebody did. One version a method: the values of two are never mixed.
+    """
+    older = {row.model: (row.model, row.version) for row in older_numbers(db, machine)}
+    return followed_by(db, machine) | older
+
+
 # By the model of the machine, else by the latest version of the method's own; a curve has no runs.
 _NOT_IDENTIFIED = """
 WITH own AS (
     SELECT model AS method, max(version) AS version FROM model
     WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+), of_machine AS (
+    {models}
 ), followed AS (
     SELECT c.campaign_id, c.campaign, m.model, m.model_version
-    FROM campaign AS c JOIN v_machine_models AS m USING (machine, method)
+    FROM campaign AS c JOIN of_machine AS m USING (machine, method)
     UNION ALL
     SELECT c.campaign_id, c.campaign, c.method, coalesce(own.version, 1)
-    FROM campaign AS c LEFT JOIN own USING (method) ANTI JOIN v_machine_models USING (machine, method)
+    FROM campaign AS c LEFT JOIN own USING (method) ANTI JOIN of_machine USING (machine, method)
 )
 SELECT campaign FROM followed SEMI JOIN run USING (campaign_id)
 ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY campaign
@@ -96,7 +155,17 @@ ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY camp
 
 def not_identified(db: Database) -> tuple[str, ...]:
     """The campaigns of machines that were not identified by the model which their machine is followed by."""
-    return tuple(str(campaign) for (campaign,) in db.rows(_NOT_IDENTIFIED))
+    return _campaigns_beside(db, _CHOSEN)
+
+
+def without_part(db: Database) -> tuple[str, ...]:
+    """The campaigns of machines that were not identified by the model which the numbers of their machine come from."""
+    return _campaigns_beside(db, NUMBERED)
+
+
+def _campaigns_beside(db: Database, models: str) -> tuple[str, ...]:
+    """The campaigns that were not identified by the ``models`` (a query) of their machines."""
+    return tuple(str(campaign) for (campaign,) in db.rows(_NOT_IDENTIFIED.format(models=models)))
 
 
 def machines_with_runs(db: Database) -> tuple[str, ...]:

@@ -135,8 +135,13 @@ class SharedDatabase(Database):
         if not self._writes or self._is_overdue():
             self._let_go()
             self._open_to_write()
-        with super()._writing() as connection:
-            yield connection
+        # Kept from here on: a process that stood still meanwhile would find itself overdue, and open it to read.
+        self._blocks += 1
+        try:
+            with super()._writing() as connection:
+                yield connection
+        finally:
+            self._blocks -= 1
 
     def _is_overdue(self) -> bool:
         """Whether the file was kept for long enough and somebody else may want it."""

@@ -17,6 +17,7 @@ decides.
 from __future__ import annotations
 
 import struct
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +27,8 @@ try:
 except ImportError:  # Windows
     _TICKETS = False
 else:
-    _TICKETS = hasattr(fcntl, "F_OFD_SETLK")
+    # The name may be there on other systems too, whose record of a lock is laid out otherwise.
+    _TICKETS = sys.platform == "linux" and hasattr(fcntl, "F_OFD_SETLK")
 
 #: First bytes of the tickets of writers and of readers; a range ends at twice its first byte.
 _WRITERS, _READERS = 1 << 40, 1 << 41

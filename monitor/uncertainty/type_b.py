@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import InputError
 from monitor.machine import MOTION
+from monitor.methods.bar_temperature import bar_temperature
 from monitor.records import Array, Campaign
 from monitor.sources import HALF_WIDTHS, Law, Quantity, Sharing, Source
 from monitor.uncertainty.marginals import Arcsine, Marginal, Normal, Rectangular, StudentT, Triangular
@@ -165,11 +166,11 @@ def _strain(campaign: Campaign, number: int, source: Source) -> float:
         return alpha
     if source.temperature_offset is not None:
         return source.temperature_offset
-    ambient = next(run.conditions.get("ambient_degC") for run in campaign.runs if run.run == number)
-    if bar is None or bar.reference_temperature is None or ambient is None or not math.isfinite(ambient):
+    temperature = bar_temperature(campaign, next(run for run in campaign.runs if run.run == number))
+    if bar is None or bar.reference_temperature is None or temperature is None:
         raise InputError(
             f"source '{source.name}': how much an expansion coefficient does needs the distance from the reference "
-            "temperature; write reference_temperature_degC in [artefact.scale_bar] and ambient_degC in runs.csv, or "
-            "temperature_offset_K beside the source"
+            "temperature; write reference_temperature_degC in [artefact.scale_bar] and bar_degC or ambient_degC in "
+            "runs.csv, or temperature_offset_K beside the source"
         )
-    return ambient - bar.reference_temperature
+    return temperature.degrees - bar.reference_temperature

@@ -18,6 +18,7 @@ from threading import Event, RLock
 from typing import Any, NamedTuple, TypeVar
 
 from monitor.exceptions import MonitorError, NotFoundError, StoreError
+from monitor.progress import listening
 from monitor.stopping import StoppedError, stoppable
 from monitor.store import held_bytes
 from monitor.web.asking import Asker, ForbiddenError, check_role
@@ -79,6 +80,8 @@ class Ticket:
     taken_back_by: str = ""
     #: What it said of how far it is, the latest last.
     said: list[str] = field(default_factory=list)
+    #: The share of the work that is done as it told last; empty where nothing is told of it.
+    shares: list[float] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -203,11 +206,11 @@ class Desk:
                 return ticket
             self._forget_outdated()
             self._count += 1
-            stop = Event()
+            stop, shares = Event(), list[float]()
             pool = self._quick if question == "trend" and document.get("parameter") else self._pool
-            future = pool.submit(self._answered, stop, user, question, document, files)
+            future = pool.submit(self._answered, stop, shares, user, question, document, files)
             self._tickets[key] = ticket = Ticket(
-                self._count, question, document, user, future, stop, stamp=key[2]
+                self._count, question, document, user, future, stop, stamp=key[2], shares=shares
             )
             # Handed over once: a ticket that its own future names for ever would wait for the garbage collector, which
             # rarely looks at what is old, with an answer of megabytes.
@@ -327,12 +330,17 @@ class Desk:
     def _answered(
         self,
         stop: Event,
+        shares: list[float],
         user: User,
         question: str,
         document: Mapping[str, Any],
         files: Mapping[str, Any] | None,
     ) -> Any:
-        with stoppable(stop):
+
+        def tell(share: float) -> None:
+            shares[:] = [share]
+
+        with stoppable(stop), listening(tell):
             return self.asker(user, question, document, files)
 
     def under_way(self) -> list[Ticket]:

@@ -14,6 +14,7 @@ from typing import Any
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory import MAY_NOT_APPLY
 from monitor.reporting.certificate.laboratory_keys import REPEATED, SECTIONS
+from monitor.reporting.texts import ENGLISH, Texts, languages, texts_of
 
 #: Entries that the form has boxes for: persons who authorise, measurement standards.
 ENTRIES = {"authorised_by": 2, "standards": 3}
@@ -30,22 +31,19 @@ OPTIONAL = frozenset(
         *(f"{section}.{key}" for section in ("accreditation", "standards", "temperature") for key in SECTIONS[section]),
     }
 )  # fmt: skip
-_WORDS = {
-    "laboratory": "The laboratory", "accreditation": "Its accreditation", "customer": "The customer",
-    "item": "The machine", "method": "The method", "traceability": "Traceability", "standards": "Standards used",
-    "temperature": "Temperatures (U with k = 2)", "statements": "Statements", "authorised_by": "Authorised by",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Box:
-    """A box of the form: its ``name``, its label, how it is filled in (line, lines, day, number), and what it holds.
+    """A box of the form: its ``name``, its label, its ``key`` in the laboratory's file, how it is filled in (line,
+    lines, day, number), and what it holds.
 
     ``not_applicable`` is the name of the box beside it where the item may not apply. ``fault`` is what is wrong.
     """
 
     name: str
     label: str
+    key: str
     kind: str
     value: str
     not_applicable: str
@@ -69,20 +67,29 @@ class Group:
 
 
 def groups(texts: Mapping[str, str], faults: Mapping[str, str]) -> list[Group]:
-    """Return the form with what is filled in and what is wrong, by the names of its boxes."""
+    """Return the form in the certificate's language: what is filled in, and what is wrong by the names of its boxes."""
     shown = []
+    say = form_words(texts)
     for section, keys in SECTIONS.items():
         prefixes = _prefixes(section)
         for number, prefix in enumerate(prefixes, 1):
             boxes = tuple(
-                _box(section, prefix, key, texts, faults)
+                _box(section, prefix, key, say, texts, faults)
                 for key in keys
                 if f"{section}.{key}" not in _NOT_IN_FORM
             )
             optional = prefix.endswith((".1", ".2")) or all(box.optional for box in boxes)
-            title = _WORDS[section] + (f" ({number} of {len(prefixes)})" if len(prefixes) > 1 else "")
+            title = say(f"sections.{section}")
+            if len(prefixes) > 1:
+                title = say("sections.several", title=title, number=number, count=len(prefixes))
             shown.append(Group(title, boxes, optional))
     return shown
+
+
+def form_words(texts: Mapping[str, str]) -> Texts:
+    """Return the words of the certificate's language as the form states it, English where it states none of ours."""
+    language = texts.get("laboratory.language", ENGLISH)
+    return texts_of(language if language in languages() else ENGLISH)
 
 
 def _prefixes(section: str) -> list[str]:
@@ -90,7 +97,7 @@ def _prefixes(section: str) -> list[str]:
 
 
 def _box(
-    section: str, prefix: str, key: str, texts: Mapping[str, str], faults: Mapping[str, str]
+    section: str, prefix: str, key: str, say: Texts, texts: Mapping[str, str], faults: Mapping[str, str]
 ) -> Box:  # fmt: skip
     key_of_file, name = f"{section}.{key}", f"{prefix}.{key}"
     kind = (
@@ -100,10 +107,13 @@ def _box(
         else "language" if key_of_file == "laboratory.language"
         else "line"
     )  # fmt: skip
+    optional = key_of_file in OPTIONAL or prefix.endswith((".1", ".2"))
+    label = say(f"boxes.{section}_{key}")
     return Box(
-        name, key.replace("_degC", " / °C").replace("_", " "), kind, texts.get(name, ""),
+        name, say("boxes.if_any", label=label) if optional else label,
+        f"[[{section}]] {key}" if section in REPEATED else f"[{section}] {key}", kind, texts.get(name, ""),
         f"na:{name}" if key_of_file in MAY_NOT_APPLY else "", texts.get(f"na:{name}", ""),
-        key_of_file in OPTIONAL or prefix.endswith((".1", ".2")), faults.get(name, ""),
+        optional, faults.get(name, ""),
     )  # fmt: skip
 
 

@@ -165,8 +165,10 @@ def counted(count: int, word: str, plural: str | None = None) -> str:
 
 
 def so_far(ticket: Ticket) -> str:
-    """Say how long something has been computed, and whether it waits or is being stopped."""
+    """Say how long something has been computed, what share of it is done, and whether it waits or is being stopped."""
     seconds = f"{counted(int(ticket.seconds), 'second')} so far"
+    if ticket.shares and 0.01 <= ticket.shares[-1] < 1.0:
+        seconds += f", about {100.0 * ticket.shares[-1]:.0f} % done"
     if ticket.is_stopping:
         return f"{seconds}, {ticket.taken_back_by} is stopping it"
     return seconds if ticket.is_running else f"{seconds}, waiting for others"

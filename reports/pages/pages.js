@@ -251,6 +251,21 @@ function drawAll() {
   }
 }
 
+// A chart is as wide as the window it was drawn in: on paper its right side would be cut off.
+const PAPER_PX = 680;
+
+function drawForPaper() {
+  document.querySelectorAll(".js-plotly-plot").forEach((canvas) => {
+    if (canvas.clientWidth > PAPER_PX) {
+      Plotly.relayout(canvas, { width: PAPER_PX });
+    }
+  });
+}
+
+function drawForWindow() {
+  document.querySelectorAll(".js-plotly-plot").forEach((canvas) => Plotly.relayout(canvas, { width: null, autosize: true }));
+}
+
 function prepareScene() {
   scene.vectors = read("scene-vectors");
   if (scene.vectors === null) {
@@ -337,4 +352,6 @@ document.querySelectorAll("p.waiting").forEach((note) => (note.dataset.number ? 
 document.querySelectorAll("[data-later]").forEach(watchLater);
 prepareScene();
 drawAll();
+window.addEventListener("beforeprint", drawForPaper);
+window.addEventListener("afterprint", drawForWindow);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);

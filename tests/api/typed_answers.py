@@ -13,12 +13,14 @@ from __future__ import annotations
 import ast
 import dataclasses
 import importlib
+import inspect
 import sys
 import types
 import typing
 from collections.abc import Iterator
 from pathlib import Path
 
+import monitor
 from monitor.api.answer import Answer
 from monitor.workflow.certificate.answer import CertificateFileAnswer
 from monitor.workflow.explain.compare_answer import CompareAnswer
@@ -34,7 +36,7 @@ from monitor.workflow.trend.answer import TrendAnswer
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
-STUB = Path(__file__).resolve().parents[2] / "monitor/api/answers.pyi"
+STUB = Path(monitor.__file__).parent / "api/answers.pyi"
 CONTENTS: tuple[type, ...] = (
     CertificateFileAnswer, ChangeModelAnswer, CompareAnswer, ExplainAnswer, FleetAnswer, ImportAnswer, LikeAnswer,
     ModelsAnswer, ReportAnswer, SimulateAnswer, SimulateMachineAnswer, StatisticsAnswer, TrendAnswer, UncertaintyAnswer,
@@ -69,7 +71,7 @@ def annotations(kind: type) -> dict[str, tuple[str, str]]:
     """Return the public fields and properties of a record: annotation as written, and the module that it stands in."""
     written: dict[str, tuple[str, str]] = {}
     for owner in reversed(kind.__mro__):
-        for name, annotation in vars(owner).get("__annotations__", {}).items():
+        for name, annotation in inspect.get_annotations(owner).items():
             of_class = str(annotation).startswith("ClassVar[")
             written[name] = (
                 str(annotation)[len("ClassVar[") : -1] if of_class else str(annotation),

@@ -31,6 +31,12 @@ SOURCES = [
         "Messplans",
     ),
     (
+        CovarianceSource(CovarianceKind.STATED_BY_PROBE, u_um=1.0, for_the_run=True),
+        "the probe's stated standard uncertainty of 1 µm: an uncertainty of the run itself was asked for",
+        "angegebene Standardmessunsicherheit des Messtasters von 1 µm: gefragt war nach der Unsicherheit des Laufs "
+        "selbst",
+    ),
+    (
         CovarianceSource(CovarianceKind.REPEATABILITY, u_um=1.834),
         "the repeatability of 1.8 µm, which exceeds the probe's statement; too few runs for more",
         "Wiederholbarkeit von 1,8 µm, die die Angabe für den Messtaster überschreitet; zu wenige Läufe für mehr",

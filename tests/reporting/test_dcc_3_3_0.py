@@ -17,7 +17,9 @@ from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_page import dcc_context
 from monitor.reporting.certificate.dsi import unit_of, written_unit
 from monitor.reporting.certificate.record import CertificateRecord, Condition, MeasuredCondition
+from monitor.reporting.certificate.tables import result_rows
 from monitor.reporting.pdf.render import pieces_of
+from monitor.reporting.texts import texts_of
 
 etree = pytest.importorskip("lxml.etree", reason="lxml reads the file by XPath")
 
@@ -139,9 +141,11 @@ def test_the_page_says_what_either_release_says(make_record: Make, language: str
     assert [row.label for row in rectangle.rows] == list(result.names)
     assert [row.unit for row in rectangle.rows] == list(result.units)
     assert (ellipsoid.symbol, rectangle.symbol) == ("u", "U")
-    for row, expanded in zip(rectangle.rows, result.k_q * np.sqrt(np.diag(result.covariance)), strict=True):
-        # Two digits, rounded up: never less, and by less than a tenth more.
-        assert expanded * (1 - 1e-12) <= float(row.uncertainty.replace(",", ".")) <= 1.1 * expanded
+    # What the certificate prints, to the digit: the page said 1.4 where the PDF says 1.3.
+    printed = result_rows(result, texts_of(language))
+    for row, u_row, on_paper in zip(rectangle.rows, ellipsoid.rows, printed, strict=True):
+        estimate, u, expanded = (number.text for number in on_paper.numbers)
+        assert (row.value, row.uncertainty, u_row.uncertainty) == (estimate, expanded, u)
     html = "".join(pieces_of("dcc.html", context))
     assert f"(PTB DCC {release})" in html
     assert str(made.relates_only) in html

@@ -6,7 +6,7 @@ import importlib
 import inspect
 import pkgutil
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from html import unescape
 from itertools import combinations
@@ -69,6 +69,35 @@ def boxes_of(svg: str) -> list[Box]:
     return [box for box in boxes if box[0].strip()]
 
 
+def corners_of(d: str) -> Iterator[tuple[float, float]]:
+    """Return the corners of a path of lines, and the ends of its arcs."""
+    x = y = 0.0
+    for command, written in re.findall(r"([A-Za-z])([^A-Za-z]*)", d):
+        numbers = [float(number) for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", written)]
+        # Of an arc the last two of seven numbers are its end; of other curves none are drawn.
+        width = {"h": 1, "v": 1, "a": 7, "z": 1}.get(command.lower(), 2)
+        assert command.lower() in "mlhvaz", command
+        for first in range(0, len(numbers), width):
+            *_, before, last = [0.0, *numbers[first : first + width]]
+            across = {"h": last, "v": 0.0}.get(command.lower(), before)
+            up = 0.0 if command.lower() == "h" else last
+            if command.islower():
+                x, y = x + across, y + up
+            else:
+                x, y = (x if command == "V" else across), (y if command == "H" else up)
+            yield x, y
+
+
+def strokes_off_the_sheet(svg: str, wide: float, high: float) -> list[str]:
+    """Return the lines, areas and dots that leave a sheet by more than a tenth of a millimetre."""
+    return [
+        f"a stroke leaves the sheet at {x:.0f}, {y:.0f} of {wide:.0f}, {high:.0f}"
+        for d in re.findall(r'<path d="([^"]*)"', svg)
+        for x, y in corners_of(d)
+        if not (-1.0 < x < wide + 1.0 and -1.0 < y < high + 1.0)
+    ][:3]
+
+
 def faults(svg: str) -> list[str]:
     """Return what covers what, or leaves the sheet, by more than a tenth of a millimetre."""
     boxes = boxes_of(svg)
@@ -76,7 +105,7 @@ def faults(svg: str) -> list[str]:
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg)
     assert size is not None
     wide, high = map(float, size.groups())
-    outside = [
+    outside = strokes_off_the_sheet(svg, wide, high) + [
         f"{text!r} leaves the sheet"
         for text, left, top, right, bottom in boxes
         if left < -1.0 or top < -1.0 or right > wide + 1.0 or bottom > high + 1.0
@@ -275,3 +304,14 @@ def test_the_check_sees_a_text_on_a_text_and_off_the_sheet() -> None:
         svg = f'<svg viewBox="0 0 {50 * SCALE:g} 100">{text.format(20)}{text.format(left)}</svg>'
         assert [fault] == [one.split(" ", 1)[1].removesuffix(" 'word'") for one in faults(svg)] or not fault
         assert bool(faults(svg)) == bool(fault)
+
+
+def test_the_check_sees_a_stroke_off_the_sheet() -> None:
+    for d, fault in (
+        ("M10 10L90 90", False),
+        ("M10 10L190 90", True),
+        ("M10 10h90v-30z", True),
+        ("M9 9h9v9z", False),
+    ):
+        svg = f'<svg viewBox="0 0 100 100"><path d="{d}" fill="x"/></svg>'
+        assert bool(strokes_off_the_sheet(svg, 100.0, 100.0)) == fault, d

@@ -9,8 +9,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -72,15 +74,47 @@ def faults(figure: Figure) -> list[str]:
         or box.x1 > sheet.x1 + point
         or box.y1 > sheet.y1 + point
     ]
-    return outside + [
-        f"{one!r} covers {other!r}"
-        for (one, box), (other, beside) in combinations(boxes, 2)
-        if box.width > 0
-        and box.height > 0
-        and beside.width > 0
-        and beside.height > 0
-        and box.overlaps(beside)
-    ]
+    return (
+        cut_off(figure)
+        + outside
+        + [
+            f"{one!r} covers {other!r}"
+            for (one, box), (other, beside) in combinations(boxes, 2)
+            if box.width > 0
+            and box.height > 0
+            and beside.width > 0
+            and beside.height > 0
+            and box.overlaps(beside)
+        ]
+    )
+
+
+def cut_off(figure: Figure) -> list[str]:
+    """Return the lines, bars and arrows that axes cut off, by more than a point beyond their edges."""
+    canvas = FigureCanvasAgg(figure)
+    with style():
+        canvas.draw()
+    point = figure.dpi / 72.0
+    cut = []
+    for axes in figure.axes:
+        room = axes.get_window_extent().padded(point)
+        drawn = [
+            (type(line).__name__, line.get_transform().transform(line.get_xydata())) for line in axes.lines
+        ]
+        for collection in axes.collections:
+            if isinstance(collection, Quiver):
+                at = np.asarray(collection.get_offsets())
+                tips = at + np.column_stack([collection.U, collection.V]) / (collection.scale or 1.0)
+                drawn.append(("arrow", axes.transData.transform(np.concatenate([at, tips]))))
+            elif isinstance(collection, LineCollection):
+                ends = np.concatenate([np.empty((0, 2)), *collection.get_segments()])
+                drawn.append(("bar", collection.get_transform().transform(ends)))
+        for kind, ends in drawn:
+            ends = ends[np.isfinite(ends).all(axis=1)]
+            inside = (ends >= room.min) & (ends <= room.max)
+            if axes.name != "polar" and not inside.all():
+                cut.append(f"{kind} of {axes.get_title() or axes.get_ylabel()!r} is cut off")
+    return cut
 
 
 def legends_inside(figure: Figure) -> int:
@@ -229,3 +263,24 @@ def test_no_text_covers_another_of_motions_and_parts(size: float) -> None:
         part_figure(sides, title=LONG),
     ]
     assert [faults(figure) for figure in drawn] == [[]] * len(drawn)
+    # The names of sides stand beside them and within the axes, whose lines and numbers are not theirs.
+    axes = drawn[-1].axes[0]
+    room = axes.get_window_extent()
+    boxes = [name.get_window_extent() for name in axes.texts]
+    assert len(boxes) == 4
+    assert all(
+        room.x0 < box.x0 and box.x1 < room.x1 and room.y0 < box.y0 and box.y1 < room.y1 for box in boxes
+    )
+    lines = [line.get_window_extent() for line in axes.lines]
+    assert not any(box.overlaps(line) for box in boxes for line in lines)
+
+
+@pytest.mark.parametrize("reach", [1.0, 3.0])
+def test_the_check_sees_what_axes_cut_off(reach: float) -> None:
+    figure = Figure(figsize=(3.0, 2.0))
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [0.0, reach])
+    axes.quiver([0.5], [0.5], [0.2], [reach - 1.0], angles="xy", scale_units="xy", scale=1.0)
+    axes.axvline(0.3)
+    axes.set_ylim(0.0, 1.5)
+    assert len(cut_off(figure)) == (0 if reach == 1.0 else 2)

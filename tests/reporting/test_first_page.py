@@ -33,6 +33,7 @@ from monitor.reporting.health.records import (
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.trend_picture import trend_picture
+from monitor.reporting.plain_names import plain_name
 
 LAST = datetime(2026, 3, 6, 9)
 
@@ -61,7 +62,7 @@ def parameter(
     return ParameterHealth(
         name, name, "µrad", value, 1.2, 4.0, tolerance, out, since,
         History(tuple(times), tuple(values), (1.2,) * runs, tuple(time > LAST - timedelta(days=5) for time in times)),
-        (), drift,
+        (), drift, plain_name(name, "w C B X b Z Y (C1) t", (name,)),
     )  # fmt: skip
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import shutil
+import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -23,6 +26,7 @@ from cryptography.hazmat.primitives.serialization import BestAvailableEncryption
 from cryptography.x509.oid import NameOID
 
 from monitor.reporting.signature.signature import check_signature
+from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.signing import FileKey, sign
 
 
@@ -91,7 +95,8 @@ def test_signing_keeps_pdf_a_and_attachments(plain: bytes, signed: bytes) -> Non
 def test_iso_19005_3_6_3_the_field_of_the_signature_is_one_that_pdf_a_allows(
     signed: bytes, tmp_path: Path
 ) -> None:
-    """Printed, not hidden, of no size: such a widget needs no appearance (6.3.3), which part 1 asked for (5.3.1)."""
+    """A page that names no signer has no place for it: of no size, printed, not hidden, such a widget needs no
+    appearance (6.3.3), which part 1 asked for (5.3.1)."""
     looked = load("pdf_a", Path(__file__).with_name("test_pdf_a.py"))
     (widget,) = (one.get_object() for one in pypdf.PdfReader(io.BytesIO(signed)).pages[0]["/Annots"])
     assert list(widget["/Rect"]) == [0, 0, 0, 0]
@@ -103,6 +108,52 @@ def test_iso_19005_3_6_3_the_field_of_the_signature_is_one_that_pdf_a_allows(
     file = tmp_path / "signed.pdf"
     file.write_bytes(signed)
     assert set(looked.preflight(file)) - set(looked.LIFTED) == {"5.3.1"}
+
+
+def test_the_field_of_a_signature_is_seen_above_the_name_of_who_signs(
+    make_record: Callable[..., CertificateRecord], keys: dict[str, Path], tmp_path: Path
+) -> None:
+    """Its frame stands above the line of the signer, over nothing printed there; no font comes into the file."""
+    signer = Signer("Common Name: Made-up Laboratory lab, Country: DE", "ab" * 32)
+    plain = certificate_pdf(replace(make_record(), signer=signer))
+    signed = sign(plain, FileKey(keys["lab"], "words"))
+    assert check_signature(signed, keys["lab.pem"]).good is True
+    reader = pypdf.PdfReader(io.BytesIO(signed))
+    (page,) = (page for page in reader.pages if "/Annots" in page)
+    (widget,) = (annotation.get_object() for annotation in page["/Annots"])
+    left, bottom, right, top = map(float, widget["/Rect"])
+    assert (right - left, top - bottom) == pytest.approx((198.0, 20.0), abs=2.0)
+    drawing = widget["/AP"]["/N"].get_object()
+    assert "/Font" not in drawing.get("/Resources", {})
+    assert drawing.get_data().count(b" f") > 30
+    written: list[tuple[str, float, float]] = []
+    page.extract_text(visitor_text=lambda text, cm, tm, *_: written.append((text, *_at(cm, tm))))
+    covered = [text for text, x, y in written if text.strip() and left < x < right and bottom < y < top]
+    assert covered == []
+    below = [text for text, x, y in written if left - 2 < x < right and bottom - 14 < y < bottom]
+    assert "Made-up Laboratory lab" in "".join(below)
+    assert "Electronic signature" in page.extract_text()
+    if shutil.which("pdftoppm") is None:
+        return
+    file = tmp_path / "signed.pdf"
+    file.write_bytes(signed)
+    (tmp_path / "plain.pdf").write_bytes(plain)
+    number = str(reader.pages.index(page) + 1)
+    dark = [_dark_dots(tmp_path / part, number) for part in ("plain.pdf", "signed.pdf")]
+    # A frame of 198 by 20 points and some fifty letters, at 72 dots an inch.
+    assert dark[1] - dark[0] > 300
+
+
+def _at(cm: list[float], tm: list[float]) -> tuple[float, float]:
+    """Where a text begins on the page, in points."""
+    return cm[0] * tm[4] + cm[2] * tm[5] + cm[4], cm[1] * tm[4] + cm[3] * tm[5] + cm[5]
+
+
+def _dark_dots(file: Path, page: str) -> int:
+    """How many dots of a page are not white."""
+    run = ["pdftoppm", "-r", "72", "-gray", "-f", page, "-l", page, str(file)]
+    picture = subprocess.run(run, capture_output=True, check=True).stdout
+    return sum(value < 200 for value in picture[15:])
 
 
 def test_an_altered_attachment_is_seen_and_named_as_altered(plain: bytes, signed: bytes) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from uuid import NAMESPACE_URL, uuid5
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -142,15 +143,16 @@ def _places(chain: object, rows: np.ndarray, rng: np.random.Generator, u: float)
 
 
 def qif(names: Sequence[str], nominal: np.ndarray, measured: np.ndarray) -> str:
-    """Measured points of a plate as QIF 3."""
+    """Measured points of a plate as QIF 3, valid by the schema of the standard."""
+    count, up = len(names), "<Normal>0 0 1</Normal>"
+    nominals = "".join(
+        f'<PointFeatureNominal id="{100 + i}"><FeatureDefinitionId>9</FeatureDefinitionId><Location>'
+        f"{x} {y} {z}</Location>{up}</PointFeatureNominal>" for i, (x, y, z) in enumerate(nominal)
+    )  # fmt: skip
     items = "".join(
         f'<PointFeatureItem id="{200 + i}"><FeatureNominalId>{100 + i}</FeatureNominalId><FeatureName>{name}'
-        "</FeatureName></PointFeatureItem>" for i, name in enumerate(names)
-    )  # fmt: skip
-    nominals = "".join(
-        f'<PointFeatureNominal id="{100 + i}"><FeatureDefinitionId>9</FeatureDefinitionId><Name>{name}</Name><Location>'
-        f"{x} {y} {z}</Location></PointFeatureNominal>" for i, (name, (x, y, z))
-        in enumerate(zip(names, nominal, strict=True))
+        "</FeatureName><DeterminationMode><Checked><CheckDetails><Measured/></CheckDetails></Checked>"
+        "</DeterminationMode></PointFeatureItem>" for i, name in enumerate(names)
     )  # fmt: skip
     results = "\n".join(
         f'<PointFeatureMeasurement id="{300 + i}"><FeatureItemId>{200 + i}</FeatureItemId><Location>'
@@ -158,12 +160,17 @@ def qif(names: Sequence[str], nominal: np.ndarray, measured: np.ndarray) -> str:
     )  # fmt: skip
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>\n<QIFDocument xmlns="{QIF}" idMax="999" versionQIF="3.0.0">\n'
+        f"<QPId>{uuid5(NAMESPACE_URL, 'plate')}</QPId>\n"
         "<FileUnits><PrimaryUnits><LinearUnit><SIUnitName>meter</SIUnitName><UnitName>mm</UnitName><UnitConversion>"
         "<Factor>0.001</Factor></UnitConversion></LinearUnit></PrimaryUnits></FileUnits>\n"
-        f"<Features><FeatureNominals>{nominals}</FeatureNominals>\n<FeatureItems>{items}</FeatureItems></Features>\n"
-        '<Results><MeasurementResultsSet><MeasurementResults id="299"><InspectionStart>2026-03-04T09:30:00+01:00'
-        f"</InspectionStart>\n<MeasuredFeatures>\n{results}\n</MeasuredFeatures></MeasurementResults>"
-        "</MeasurementResultsSet></Results>\n</QIFDocument>\n"
+        '<Features><FeatureDefinitions n="1"><PointFeatureDefinition id="9"/></FeatureDefinitions>\n'
+        f'<FeatureNominals n="{count}">{nominals}</FeatureNominals>\n<FeatureItems n="{count}">{items}</FeatureItems>'
+        '</Features>\n<Results><MeasurementResultsSet n="1"><MeasurementResults id="299"><ThisResultsInstanceQPId>'
+        f"{uuid5(NAMESPACE_URL, 'plate/results')}</ThisResultsInstanceQPId>\n"
+        f'<MeasuredFeatures n="{count}">\n{results}\n</MeasuredFeatures><InspectionStatus><InspectionStatusEnum>'
+        "PASS</InspectionStatusEnum></InspectionStatus></MeasurementResults></MeasurementResultsSet>"
+        "<InspectionTraceability><InspectionStart>2026-03-04T09:30:00+01:00</InspectionStart></InspectionTraceability>"
+        "</Results>\n</QIFDocument>\n"
     )
 
 
@@ -264,7 +271,7 @@ SAMPLES = {
 - `square.prn` is what DPRNT prints (operator's manuals of Haas mills, macros, formatted output).
 """,
     "files-of-a-plate": """\
-- `plate.qif` has the elements of QIF 3 (ISO 23952) that hold measured points.
+- `plate.qif` has the elements of QIF 3 (ISO 23952) that hold measured points; it is valid by the published schema.
 - `plate.dfq` has the K-fields of the Q-DAS ASCII transfer format.
 - `TCHPR421.TXT` is the log of touch probe cycle 421 as the HEIDENHAIN manuals print it.
 - `tracker.txt` is a table in metres; no document of a maker was at hand.

@@ -24,6 +24,7 @@ from monitor.store import (
     import_campaign,
     list_campaigns,
     save_identification,
+    sharing,
     verify_audit,
     withdraw_campaign,
 )
@@ -140,6 +141,19 @@ def _is_open(path: Path) -> bool:
     if not links.is_dir():
         return False
     return any(os.path.realpath(link) == str(path.resolve()) for link in links.iterdir())
+
+
+def test_who_stood_still_while_it_began_to_write_writes(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Overdue before the first statement, it let go of the file and opened it to read: the statement was a fault."""
+    Database(path).close()
+    monkeypatch.setattr(sharing, "_LONGEST_S", -1.0)
+    with SharedDatabase(path) as db:
+        for number in (1, 2):
+            with db.transaction():
+                db.execute(
+                    f"INSERT INTO registered_machine VALUES ({number}, 'M{number}', 'w X t', TIMESTAMP '2026-01-01')"
+                )
+        assert db.rows("SELECT count(*) FROM registered_machine") == [(2,)]
 
 
 def test_a_file_that_another_part_of_the_process_is_closing_is_waited_for_and_not_called_damaged(

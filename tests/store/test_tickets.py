@@ -181,3 +181,17 @@ def test_without_such_locks_all_come_in_by_chance(path: Path, monkeypatch: pytes
         assert db.rows("SELECT count(*) FROM registered_machine") == [(0,)]
     with open(str(path) + LOCK_ENDING, "rb") as file:
         assert tickets._taken(file.fileno(), tickets._WRITERS) is None
+
+
+def test_macos_has_no_tickets_whatever_names_its_locks_have(tmp_path: Path) -> None:
+    """There ``struct flock`` begins with start and length; what is laid out for Linux says something else."""
+    path = tmp_path / "shop.duckdb.lock"
+    path.touch()
+    code = (
+        "import sys\nsys.platform = 'darwin'\nfrom monitor.store import tickets\n"
+        "with open(sys.argv[1], 'rb') as file:\n    print(tickets._taken(file.fileno(), 1 << 41))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == "None\n"

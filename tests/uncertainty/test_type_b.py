@@ -128,6 +128,12 @@ def test_the_expansion_coefficient_acts_over_the_distance_from_the_reference_tem
     u = agree(warm, source, [move])
     ambient = balls.runs[0].conditions["ambient_degC"]
     assert u[-1] == pytest.approx(1e-6 * (ambient - 20.0), rel=1e-3)
+    # A bar that has a temperature of its own: its distance counts, not that of the air.
+    runs = tuple(replace(run, conditions={**run.conditions, "bar_degC": 27.0}) for run in warm.runs)
+    own = replace(warm, runs=runs)
+    assert agree(own, source, [lambda part: replace(move(part), runs=runs)])[-1] == pytest.approx(
+        7e-6, rel=1e-3
+    )
 
 
 def test_drift_is_three_slow_moves_of_the_linear_axes(balls):

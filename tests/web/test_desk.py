@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,10 +13,12 @@ import pytest
 pytest.importorskip("fastapi", reason="the extra web is not installed")
 
 from monitor.exceptions import BusyError, InputError, NotFoundError
+from monitor.progress import told
 from monitor.web import desk as desk_module
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
 from monitor.web.users import Role, User
+from monitor.web.words import so_far
 
 ADA = User("ada", Role.ENGINEER)
 SUMS = ("fleet", {"top": 0})
@@ -170,3 +173,31 @@ def test_the_trend_that_somebody_looks_at_does_not_wait_behind_long_questions(
         begun = aside.submit(lambda: next(iter(filter(None, iter(lambda: quick.is_running, None)))))
         assert begun.result(60.0)
         assert not waiting.is_running
+
+
+def test_what_is_computed_says_how_far_it_is() -> None:
+    told_to, go = threading.Event(), threading.Event()
+
+    class Telling:
+        freshness = Freshness()
+
+        def __call__(self, *_: object) -> str:
+            told(0.25)
+            told(0.4)
+            told_to.set()
+            assert go.wait(60.0)
+            return "answer"
+
+    desk = Desk(Telling())  # type: ignore[arg-type]
+    try:
+        ticket = desk.ask(ADA, *SUMS)
+        assert told_to.wait(60.0)
+        assert re.fullmatch(r"\d+ seconds? so far, about 40 % done", so_far(ticket))
+        go.set()
+        assert ticket.answer(60.0) == "answer"
+        # Where nothing is told nothing is said: what another thread tells is not this work's.
+        told(0.9)
+        assert ticket.shares == [0.4]
+    finally:
+        go.set()
+        desk.close()

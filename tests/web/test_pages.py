@@ -19,6 +19,7 @@ import pytest
 
 from monitor.documents import from_document
 from monitor.reporting.certificate.laboratory import read_laboratory
+from monitor.reporting.texts import languages
 from monitor.web.charts.machine import machine_traces, motion_of
 from monitor.web.charts.residuals import scene_vectors
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
@@ -338,6 +339,20 @@ def test_texts_that_could_leave_their_box_stay_in_it(tmp_path: Path) -> None:
     assert stated.laboratory.address == ("1 Road", "Town ✓")
     assert stated.temperature is not None
     assert stated.temperature["machine_degC"] == 20.5
+
+
+@pytest.mark.parametrize("language", languages())
+def test_every_box_has_words_and_the_key_of_the_file(language: str) -> None:
+    boxes = [box for group in groups({"laboratory.language": language}, {}) for box in group.boxes]
+    assert len(boxes) == len({(box.name, box.label) for box in boxes})
+    for box in boxes:
+        section, _, key = box.key.replace("[", "").partition("]")
+        key = key.removeprefix("]").strip()
+        assert box.name.startswith(f"{section}.")
+        assert box.name.endswith(f".{key}")
+        # No label is the key with blanks for underscores.
+        assert box.label.lower() != key.replace("_", " ")
+    assert groups({"laboratory.language": "xx"}, {})[0].title == "The laboratory"
 
 
 def test_every_key_that_a_refusal_names_has_a_box() -> None:

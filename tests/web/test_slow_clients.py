@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +47,18 @@ async def _said(pieces: list[bytes], pause_s: float) -> bytes:
     async with server:
         reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname()[:2])
         sending = asyncio.create_task(_send(writer, pieces, pause_s))
-        said = await asyncio.wait_for(reader.read(), PATIENCE_S)
+        said = await asyncio.wait_for(_until_closed(reader), PATIENCE_S)
         sending.cancel()
         writer.close()
+    return said
+
+
+async def _until_closed(reader: asyncio.StreamReader) -> bytes:
+    said = b""
+    # A piece that was on its way when the server closed is answered by a reset and not by an end.
+    with contextlib.suppress(ConnectionResetError):
+        while part := await reader.read(65536):
+            said += part
     return said
 
 

@@ -20,6 +20,7 @@ from monitor.store import Database
 from monitor.web.asking import ForbiddenError
 from monitor.web.desk import Desk, Ticket
 from monitor.web.freshness import Freshness
+from monitor.web.pages import machine, model
 from monitor.web.users import Role, User
 
 ADA, BOB, EVE = User("ada", Role.VIEWER), User("bob", Role.ENGINEER), User("eve", Role.APPROVER)
@@ -136,6 +137,32 @@ def test_a_page_says_who_took_it_back_and_offers_to_compute_it(local: Any) -> No
         away = local.client.post("/work/again", data={**form, "then": "//elsewhere.example"})
         assert away.headers["location"] == "/"
         assert "taken back" not in local.client.get(address).text
+    finally:
+        free.set()
+    assert all(future.result(60.0) for future in busy)
+
+
+@pytest.mark.parametrize(
+    ("address", "question"),
+    [
+        ("/machine/parameters?name=HU40-T", "trend"),
+        ("/model/explained?campaign=hidden-spindle-growth&effect=EXX:reversal", "residuals"),
+    ],
+)
+def test_a_script_that_waits_for_what_was_taken_back_is_told_so(
+    local: Any, address: str, question: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for page in (machine, model):
+        monkeypatch.setattr(page, "FETCH_S", 0.0)
+    desk: Desk = local.client.app._app.state.desk
+    free = Event()
+    busy = [desk._pool.submit(free.wait) for _ in range(2)]
+    try:
+        assert local.client.get(address).status_code == 202
+        ticket: Ticket = next(ticket for ticket in desk.under_way() if ticket.question == question)
+        local.client.post("/work/cancel", data={"proof": local.proof(), "number": str(ticket.number)})
+        # Asked again and again it would be said to be computed for ever.
+        assert local.client.get(address).status_code == 409
     finally:
         free.set()
     assert all(future.result(60.0) for future in busy)

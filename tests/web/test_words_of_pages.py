@@ -68,7 +68,7 @@ def test_a_page_that_waits_asks_whether_it_is_worth_to_be_loaded_again(local: An
     ticket = desk.begin(User("ada", Role.APPROVER), "import", {"folders": ["a"]}, lambda tell: end.wait(60.0))
     waits = local.client.get(f"/work/state?number={ticket.number}")
     assert waits.status_code == 202
-    assert re.fullmatch(r"\d+ seconds? so far", waits.json()["so_far"])
+    assert re.fullmatch(r"\d+ seconds? so far(, about \d+ % done)?", waits.json()["so_far"])
     end.set()
     assert ticket.future.result(60.0)
     assert local.client.get(f"/work/state?number={ticket.number}").status_code == 200

@@ -97,6 +97,8 @@ def test_what_is_said_without_the_option_is_what_was_said_before(db):
     run = answered(db, "five-days", run=20, holds_for="run")
     assert run.holds_for is HoldsFor.RUN
     assert run.guf.u["EB0C"] == pytest.approx(run.day_to_day.within_run["EB0C"], rel=0.2)
+    # Twenty repeated runs are not too few: the statement was taken because the run itself was asked for.
+    assert run.input_covariance.endswith("of 1 µm: an uncertainty of the run itself was asked for")
 
 
 def test_lines_add_up_and_stand_in_the_order_of_their_shares(db):

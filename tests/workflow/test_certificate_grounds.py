@@ -375,9 +375,9 @@ def moved(campaign: Campaign, change) -> Campaign:
 @pytest.mark.parametrize(
     ("change", "apart"),
     [
-        # The sphere of the file stands at (80, 0, 60). Read with the other sign it seems to stand on a circle about an
-        # axis that was not turned; with X and Y exchanged a quarter of a turn away.
-        (lambda read: {**read, "X": -read["X"]}, 40.0),
+        # The sphere of the file stands at (80, 0, 60). Read with the other sign, or with X and Y exchanged, it seems to
+        # stand on the axis, about which it goes around twice.
+        (lambda read: {**read, "X": -read["X"]}, 80.0),
         (lambda read: {**read, "X": read["Y"], "Y": read["X"]}, 80.0),
     ],
 )

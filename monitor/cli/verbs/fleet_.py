@@ -12,7 +12,12 @@ from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
-from monitor.reporting.messages import attention_words, machines_lacking, machines_refuted
+from monitor.reporting.messages import (
+    attention_words,
+    machines_lacking,
+    machines_refuted,
+    numbers_of_older_version,
+)
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
@@ -67,7 +72,7 @@ def run(options: Namespace) -> int:
             len(answer.not_identified) > MOST_NAMED
         )
         output.say(
-            f"not identified by the model that their machine is followed by, and left out: {names}; "
+            f"not identified by the model that the numbers of their machine come from, and left out: {names}; "
             f"type `monitor identify {answer.not_identified[0]}`"
         )
     return 0
@@ -92,7 +97,14 @@ def _table(answer: FleetAnswer, most: int) -> None:
 
 
 def _say_of_machines(answer: FleetAnswer) -> None:
-    """Say of whole machines where their limits come from, and whose readings refute their model."""
+    """Say of whole machines which version their numbers are of, where their limits come from, and whose readings refute
+    their model."""
+    older = answer.older_versions or {}
+    for machine, versions in list(older.items())[:MOST_NAMED]:
+        for version in versions:
+            output.say(numbers_of_older_version(machine, version.model, version.newest))
+    if len(older) > MOST_NAMED:
+        output.say(f"so are those of {len(older) - MOST_NAMED} more machines; --json names all")
     for machine, name in (answer.tolerances_of_type or {}).items():
         output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
     if answer.models_refuted:

@@ -19,7 +19,7 @@ from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points
-from monitor.methods.instruments.first_guess import guess_with_lines, stance_at
+from monitor.methods.instruments.first_guess import first_guess, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
@@ -92,11 +92,11 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def own_start(self) -> Array:
-        """The first guesses (R, q): zeros and slopes as a machine without errors leaves them."""
+        """The first guesses (R, q): zeros, slopes and spheres as a machine without errors leaves them."""
         runs = len(self.runs)
         start = np.zeros((runs, len(self.own_names)))
         for part, columns in zip(self.parts, self.own_columns, strict=True):
-            start[:, columns] = guess_with_lines(part, runs, self._nominal)
+            start[:, columns] = first_guess(part, runs, self._nominal)
         return start
 
     @property

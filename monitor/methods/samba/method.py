@@ -13,6 +13,7 @@ import numpy as np
 from monitor.effects import ChainEffect, context_of
 from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
+from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.chain.touch import Distance, TouchProblem
@@ -30,7 +31,8 @@ DEFAULT_MODEL = Model(NAME)
 def bar_length(campaign: Campaign) -> Array:
     """Length (R,) mm of the bar in every run, in the order of the runs' numbers.
 
-    With an expansion coefficient and a reference temperature it follows ``ambient_degC``.
+    With an expansion coefficient and a reference temperature it follows how warm the bar was: its own recorded
+    temperature, else that of the air. A run without either has the calibrated length.
     """
     bar = campaign.artefact.scale_bar
     if bar is None:
@@ -38,9 +40,11 @@ def bar_length(campaign: Campaign) -> Array:
     runs = sorted(campaign.runs, key=lambda run: run.run)
     length = np.full(len(runs), bar.length)
     if bar.expansion_coefficient is not None and bar.reference_temperature is not None:
-        ambient = np.array([run.conditions.get("ambient_degC", np.nan) for run in runs])
-        warmer = np.where(np.isfinite(ambient), ambient - bar.reference_temperature, 0.0)
-        length *= 1.0 + bar.expansion_coefficient * warmer
+        temperatures = [bar_temperature(campaign, run) for run in runs]
+        warmer = [
+            0.0 if warmth is None else warmth.degrees - bar.reference_temperature for warmth in temperatures
+        ]
+        length *= 1.0 + bar.expansion_coefficient * np.array(warmer)
     return length
 
 

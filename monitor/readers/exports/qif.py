@@ -16,10 +16,12 @@ from typing import Any
 
 from monitor.readers.export import Export, ExportFile, ExportFormat
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_units import decimal_of, foreign_unit
+from monitor.readers.foreign_units import ForeignUnit, decimal_of, foreign_unit
 
 #: Largest document in bytes; as a tree it takes some ten times that.
 LARGEST_XML = 16 * 1024**2
+#: A factor to metres that differs from its unit's by more than this part is another unit's; some digits are cut.
+SAME_UNIT = 1e-6
 _NAMESPACE = "qifstandards.org"
 _LETTERS = "xyz"
 _FACTS = ("Author", "Organization", "ApplicationName")
@@ -153,12 +155,28 @@ def _unit(name: str, root: Any, faults: Faults) -> str | None:
         if linear is None:
             continue
         text = _text(linear, "UnitName") or _text(linear, "SIUnitName")
-        if foreign_unit(text) is None:
+        unit = foreign_unit(text)
+        if unit is None:
             faults.add(
                 name, linear.sourceline, "LinearUnit", f"{quoted(text)} is no unit of lengths; export in mm"
             )
+        elif factor := _text(_child(linear, "UnitConversion"), "Factor"):
+            _check_factor(name, linear, unit, factor, faults)
         return text
     return None
+
+
+def _check_factor(name: str, linear: Any, unit: ForeignUnit, factor: str, faults: Faults) -> None:
+    """Note a factor to metres that is not that of the unit by its name: one of the two is wrong."""
+    metres, stated = float(unit.factor) / 1000.0, decimal_of(factor)
+    if stated is None or abs(float(stated) / metres - 1.0) > SAME_UNIT:
+        faults.add(
+            name,
+            linear.sourceline,
+            "LinearUnit",
+            f"the unit is called {unit.name}, which is {metres:g} m, and the factor to metres is {quoted(factor)}; "
+            "export in mm",
+        )
 
 
 def _numbers(name: str, node: Any, prefix: str, label: str, faults: Faults) -> dict[str, str]:

@@ -179,7 +179,7 @@ def _single(quantity: ET.Element, label: str, texts: Texts) -> tuple[tuple[Value
     """One value with its expanded uncertainty: D-SI 2.1 and 2.2.1 name it otherwise."""
     expanded = float(_any(quantity, "valueExpandedMU", "uncertainty"))
     unit = written_unit(_text(quantity, "si:unit"))
-    rounded = round_result(float(_text(quantity, "si:value")), expanded, direction="up")
+    rounded = round_result(float(_text(quantity, "si:value")), expanded)
     row = ValueRow(label, texts.number(rounded.estimate), texts.number(rounded.uncertainty), unit)
     return (row,), _coverage(quantity, "", texts)
 
@@ -193,7 +193,7 @@ def _vector(vector: ET.Element, texts: Texts) -> tuple[tuple[ValueRow, ...], str
     factor = 1.0 if _ellipsoidal(vector) else float(_any(vector, "coverageFactorXMLList", "coverageFactor"))
     rows = []
     for label, value, uncertainty, unit in zip(labels, values, factor * u, units, strict=True):
-        rounded = round_result(value, float(uncertainty), direction="up")
+        rounded = round_result(value, float(uncertainty))
         rows.append(ValueRow(label, texts.number(rounded.estimate), texts.number(rounded.uncertainty), unit))
     correlation = covariance / np.outer(u, u)
     correlations = tuple(

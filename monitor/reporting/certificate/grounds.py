@@ -24,6 +24,7 @@ class GroundKind(StrEnum):
     TEMPERATURE = "temperature"
     UNITS = "units"
     WORK_POINT = "work-point"
+    INSTRUMENTS = "instruments"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Ground:
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
     them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and
-    none where the residuals are a ``size`` of what the statements leave.
+    none where the residuals are a ``size`` of what the statements leave. Of instruments the subject is a parameter with
+    the two that disagree, and ``size`` is their E_n.
     """
 
     kind: GroundKind

@@ -32,9 +32,9 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
             continue
         lines.append((effect.name, describe(effect.name, texts), effect.value, effect.u, effect.unit))
         if effect.reversal_value is not None and effect.u_reversal is not None:
-            words = texts("page.effect_reversal")
-            lines.append((effect.name, words, effect.reversal_value, effect.u_reversal, effect.unit))
-    known = [effect for effect in effects if effect.value is not None]
+            meaning = texts("page.effect_reversal")
+            lines.append((effect.name, meaning, effect.reversal_value, effect.u_reversal, effect.unit))
+    with_value = [effect for effect in effects if effect.value is not None]
     unknown = [effect.name for effect in effects if effect.value is None]
     values = aligned(
         [texts.number(round_result(value, u).estimate) for _, _, value, u, _ in lines], texts.decimal_sign
@@ -42,11 +42,11 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
     uncertainties = aligned([texts.number(round_uncertainty(u)) for *_, u, _ in lines], texts.decimal_sign)
     return PrintedEffects(
         tuple(
-            (name, words, (value, u), unit)
-            for (name, words, _, _, unit), value, u in zip(lines, values, uncertainties, strict=True)
+            (name, meaning, (value, u), unit)
+            for (name, meaning, _, _, unit), value, u in zip(lines, values, uncertainties, strict=True)
         ),
-        texts.markup("page.effects_explained", runs=known[0].runs, days=known[0].days)
-        if known
+        texts.markup("page.effects_explained", runs=with_value[0].runs, days=with_value[0].days)
+        if with_value
         else Markup(""),
         texts.markup("page.effects_unknown", effects=", ".join(unknown)) if unknown else Markup(""),
     )

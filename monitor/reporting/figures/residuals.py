@@ -20,6 +20,10 @@ from monitor.reporting.texts import texts_of
 
 #: A residual's arrow: the longest is this part of the workspace's longest edge.
 _LONGEST_ARROW = 0.2
+#: So far from the middle a view reaches, in parts of that edge: half of it, and the longest arrow outwards.
+_REACH = 0.5 + 1.1 * _LONGEST_ARROW
+#: The edge in mm of the view of a single pose, which has none.
+_LONE_EDGE_MM = 1.0
 
 
 #: Part of a figure that each of its panels has at least, so that its words have room.
@@ -140,13 +144,12 @@ class View:
 def view_of(positions: Array, residuals: Array) -> View:
     """Return the view of residuals (n, 3) µm at positions (n, 3) mm, one scale for all three sides."""
     length = np.linalg.norm(residuals, axis=1)
-    extent = float(np.max(np.ptp(positions, axis=0)))
+    extent = float(np.max(np.ptp(positions, axis=0))) or _LONE_EDGE_MM
     longest = float(np.max(length))
-    visible = longest > 0.0 and extent > 0.0
     return View(
-        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if visible else 1.0,
+        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if longest > 0.0 else 1.0,
         middle=(np.max(positions, axis=0) + np.min(positions, axis=0)) / 2,
-        reach=0.66 * extent or 1.0,
+        reach=_REACH * extent,
         large=length >= np.quantile(length, 0.9),
         longest=longest,
         key=nice(longest) if longest > 0.0 else 1.0,

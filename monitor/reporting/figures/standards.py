@@ -6,7 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from monitor.records import Array
 from monitor.reporting.figures.style import new_figure, style, zero_line
@@ -56,14 +58,13 @@ def circle_figure(angle: Array, radial: Array, sense: Array, *, plane: tuple[str
                     angle[mine], 1.0 + unit * radial[mine], line, color=colour, linewidth=1.1, label=name
                 )
         axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
-        step = _step(largest)
-        marks = np.array([-step, 0.0, step])
-        axes.set_yticks(1.0 + unit * marks, [f"{mark:+.3g} µm" if mark else "" for mark in marks])
+        _number_radii(axes, unit, _signed(largest, "µm"), _least_moved(angle, radial))
         axes.set_xticks(
             np.arange(4) * np.pi / 2.0, [f"+{plane[0]}", f"+{plane[1]}", f"-{plane[0]}", f"-{plane[1]}"]
         )
         axes.grid(color=MID, linewidth=0.3)
-        axes.legend(loc="center")
+        # Beside the circle: within it the lines of the directions run through the words.
+        axes.legend(loc="upper left", bbox_to_anchor=(1.1, 1.0))
     return figure
 
 
@@ -79,9 +80,7 @@ def rotation_figure(angle: Array, synchronous: Array, *, unit: str, title: str) 
         axes.plot(around, np.ones_like(around), color=MID, linewidth=0.7)
         axes.plot(np.append(angle, angle[:1]), 1.0 + scale * closed, color=BLUE, linewidth=1.1)
         axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
-        step = _step(largest)
-        marks = np.array([-step, 0.0, step])
-        axes.set_yticks(1.0 + scale * marks, [f"{mark:+.3g} {unit}" if mark else "" for mark in marks])
+        _number_radii(axes, scale, _signed(largest, unit), _least_moved(angle, synchronous))
         axes.grid(color=MID, linewidth=0.3)
     return figure
 
@@ -112,6 +111,7 @@ def part_figure(elements: Sequence[tuple[str, Array, Array, Array]], *, title: s
     largest = max(float(np.max(np.abs(deviation))) for *_, deviation in elements) or 1.0
     size = max(float(np.ptp(places, axis=0).max()) for _, places, _, _ in elements)
     scale = 0.1 * size / largest
+    middle = np.mean([places.mean(axis=0) for _, places, _, _ in elements], axis=0)
     with style():
         figure = new_figure(PAGE_WIDTH_MM, CIRCLE_MM, title)
         axes = figure.subplots()
@@ -119,12 +119,60 @@ def part_figure(elements: Sequence[tuple[str, Array, Array, Array]], *, title: s
             moved = places + scale * deviation[:, None] * across
             axes.plot(places[:, 0], places[:, 1], color=MID, linewidth=0.7)
             axes.plot(moved[:, 0], moved[:, 1], color=(BLUE, ORANGE)[number % 2], linewidth=1.1)
-            axes.annotate(
-                name, tuple(places.mean(axis=0) if len(elements) == 1 else places[0]), fontsize="small"
-            )
+            _name_element(axes, name, places, middle, size)
+        # Names of several elements stand beside the part: a letter is some 2.3 % of its size wide.
+        longest = max(len(name) for name, *_ in elements)
+        axes.margins(*((0.05, 0.05) if len(elements) == 1 else (0.15 + 0.023 * longest, 0.2)))
         axes.set_aspect("equal")
-        axes.set_xlabel(f"mm; deviations magnified {scale:.0f} times")
+        times = f"{scale:.0f}" if scale >= 10.0 else f"{scale:.3g}"
+        axes.set_xlabel(f"mm; deviations magnified {times} times")
     return figure
+
+
+def _signed(largest: float, unit: str) -> dict[float, str]:
+    """Return the deviations at which a polar plot has rings, and what is written there: nothing at zero."""
+    step = _step(largest)
+    minus = "\N{MINUS SIGN}"
+    return {-step: f"{minus}{step:.3g} {unit}", 0.0: "", step: f"+{step:.3g} {unit}"}
+
+
+def _number_radii(axes: Axes, scale: float, labels: Mapping[float, str], angle: float) -> None:
+    """Draw rings at deviations and write their labels at an angle in rad, on white: no line runs through them."""
+    assert isinstance(axes, PolarAxes)
+    axes.set_yticks([1.0 + scale * deviation for deviation in labels], list(labels.values()))
+    for label in axes.get_yticklabels():
+        label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
+    axes.set_rlabel_position(float(np.degrees(angle)))
+
+
+def _least_moved(angle: Array, deviation: Array) -> float:
+    """Return the angle in rad, of 16 between the names of the directions, about which a curve (n,) deviates least."""
+    beside = np.pi / 16.0 + np.arange(16) * np.pi / 8.0
+    apart = np.abs(np.angle(np.exp(1j * (angle[None, :] - beside[:, None]))))
+    # A number covers some 15 degrees to either side.
+    near = np.where(apart < np.pi / 12.0, np.abs(deviation), 0.0)
+    return float(beside[np.argmin(near.max(axis=1))])
+
+
+def _name_element(axes: Axes, name: str, places: Array, middle: Array, size: float) -> None:
+    """Write a name beside the middle of an element, on the side away from the ``middle`` (2,) of a part of this
+    ``size``, beyond the largest deviation; within the element where it goes around that middle."""
+    at = places.mean(axis=0)
+    away = at - middle
+    distance = float(np.hypot(*away))
+    if distance < 0.05 * size:
+        axes.text(float(at[0]), float(at[1]), name, fontsize="small", ha="center", va="center")
+        return
+    across, up = away / distance
+    sides = (
+        "right" if across < -0.5 else "left" if across > 0.5 else "center",
+        "top" if up < -0.5 else "bottom",
+    )
+    x, y = at + 0.13 * size * away / distance
+    axes.text(
+        float(x), float(y), name, fontsize="small", ha=sides[0],
+        va="center" if abs(up) <= 0.5 else sides[1],
+    )  # fmt: skip
 
 
 def _step(largest: float) -> float:

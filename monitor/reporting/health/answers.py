@@ -23,7 +23,6 @@ from monitor.reporting.health.records import (
 from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
 from monitor.reporting.messages import DRIFT_OR_SEASON
-from monitor.reporting.plain_names import plain_name
 
 #: States in which a machine wants something done; in the others nothing is wrong, or nothing is known.
 URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index(State.SUSPECT_DATA) + 1])
@@ -109,7 +108,7 @@ def _out(health: MachineHealth) -> str:
         )
     shares = binding_shares(health)
     if shares:
-        sentences.append(f"most of it comes from {_shares(shares)}")
+        sentences.append(f"most of it comes from {_shares(health, shares)}")
     sentences += [
         f"{parameter.name} {moves.removeprefix(' and ')}"
         for share in shares
@@ -125,10 +124,12 @@ def _out(health: MachineHealth) -> str:
     return "; ".join(sentences)
 
 
-def _shares(shares: Sequence[MapShare]) -> str:
+def _shares(health: MachineHealth, shares: Sequence[MapShare]) -> str:
     """Parameters with what each adds to the worst volumetric error."""
+    name_of = {parameter.name: f"{parameter.in_words} ({parameter.name}" for parameter in health.parameters}
     return ", ".join(
-        f"{plain_name(share.parameter)} ({share.parameter}, {share.error_um:+.1f} µm)" for share in shares
+        f"{name_of.get(share.parameter, f'({share.parameter}')}, {share.error_um:+.1f} µm)"
+        for share in shares
     )
 
 
@@ -157,7 +158,7 @@ def _changed(health: MachineHealth) -> str:
     parameter = concern(health)
     name = ""
     if parameter is not None and any(change.at in parameter.changed_at for change in changes):
-        name = f" ({plain_name(parameter.name)})"
+        name = f" ({parameter.in_words})"
     return "; ".join(str(change.what) for change in changes) + name
 
 
@@ -197,7 +198,7 @@ def _beyond(parameter: ParameterHealth) -> str:
 def _stands(parameter: ParameterHealth) -> str:
     value, expanded = in_words(parameter.estimate, parameter.expanded, sign=True)
     limit = "" if parameter.tolerance is None else f", tolerance ± {plain(parameter.tolerance)}"
-    name = plain_name(parameter.name)
+    name = parameter.in_words
     return f"{name} ({parameter.name}) is {value} {parameter.unit} (U = {expanded}{limit})"
 
 
@@ -237,11 +238,13 @@ def _since(health: MachineHealth) -> str:
 def to_do(health: MachineHealth) -> str:
     """Return what to do on a machine, and by when to measure it again."""
     parameter = concern(health)
-    name = "its errors" if parameter is None else f"{plain_name(parameter.name)} ({parameter.name})"
+    name = "its errors" if parameter is None else f"{parameter.in_words} ({parameter.name})"
     wrong, judged = name, name
     if volumetric_binds(health.state, health.parameters, health.map):
         shares, judged = binding_shares(health), "the volumetric error"
-        wrong = _shares(shares) if shares else "what makes the volumetric error (monitor map names it)"
+        wrong = (
+            _shares(health, shares) if shares else "what makes the volumetric error (monitor map names it)"
+        )
     action = {
         State.OUT_OF_TOLERANCE: f"adjust or compensate {wrong} and measure again",
         State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {judged} is too near its limit to be judged",

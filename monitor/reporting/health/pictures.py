@@ -100,9 +100,10 @@ def where_it_fails(residual_map: ResidualMap) -> str:
             x, y = panel.x0 + 14.0, panel.top + side - 16.0
             on.line(x, y, x + length, y, INK, 7)
             on.text(x, y - 9, f"{view.key:g} µm", bold=True)
+    times = _thousands(view.magnify) if view.magnify >= 1.0 else f"{view.magnify:g}"
     on.text(
         0.0, 62.4 * SCALE,
-        f"Mean of the runs at every pose of the plan, {_thousands(view.magnify)} times enlarged; bar: {view.key:g} µm; "
+        f"Mean of the runs at every pose of the plan, {times} times enlarged; bar: {view.key:g} µm; "
         "thick: the largest tenth.",
         colour=MID,
     )  # fmt: skip

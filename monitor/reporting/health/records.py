@@ -97,7 +97,8 @@ class ParameterHealth:
     """One parameter: estimate, standard and expanded uncertainty, tolerance of its absolute value, history.
 
     ``probability_out`` of lying beyond the tolerance; ``out_since`` the first of the runs without a break whose
-    value lies beyond it. ``changed_at`` are the times of changes that were found.
+    value lies beyond it. ``changed_at`` are the times of changes that were found. ``in_words`` is its name on the shop
+    floor.
     """
 
     name: str
@@ -112,6 +113,7 @@ class ParameterHealth:
     history: History
     changed_at: tuple[datetime, ...]
     drift: Drift | None
+    in_words: str
 
     @property
     def reaches_soon(self) -> bool:

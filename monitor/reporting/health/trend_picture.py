@@ -9,7 +9,6 @@ import numpy as np
 
 from monitor.reporting.health.records import Drift, ParameterHealth
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE
-from monitor.reporting.plain_names import plain_name
 from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, text_width, tick_room, tick_words
 from monitor.reporting.svg.sparkline import value_range
 from monitor.units import DAYS_PER_YEAR
@@ -47,7 +46,7 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
     left_edge = max(_LEFT, tick_room((low, high), 5) + 6.0)
     limits = () if parameter.tolerance is None else (parameter.tolerance, -parameter.tolerance)
     right_room = max(_RIGHT, *(text_width(_limit_words(limit), bold=True) + 14.0 for limit in (0.0, *limits)))
-    on = Drawing(WIDTH_MM, HEIGHT_MM, f"{machine}: {plain_name(parameter.name)} over dates")
+    on = Drawing(WIDTH_MM, HEIGHT_MM, f"{machine}: {parameter.in_words} over dates")
     panel = Panel(
         left_edge, _TOP, WIDTH_MM * SCALE - left_edge - right_room, HEIGHT_MM * SCALE - _TOP - _BOTTOM,
         (_days(first - margin), _days(last + margin)), (low, high),
@@ -110,7 +109,7 @@ def _ends(on: Drawing, panel: Panel, at: float, estimate: float, expanded: float
 def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
     """Write machine, parameter and unit above the panel, and below them what the line says."""
     room = int(WIDTH_MM * SCALE / (WIDE * LETTER))
-    name = f"{plain_name(parameter.name)} ({parameter.name}) / {parameter.unit}"
+    name = f"{parameter.in_words} ({parameter.name}) / {parameter.unit}"
     title = f"{_shortened(machine, room - len(name) - 2)}: {name}"
     on.text(0.0, 0.9 * LETTER, title, bold=True)
     half = parameter.history.u[-1] * parameter.expanded / parameter.u

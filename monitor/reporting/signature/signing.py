@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
+from monitor.reporting.signature.field import NAME, field_drawing, place_in
 from monitor.reporting.signature.long_term import fetching_context, together_with_signature
 from monitor.reporting.signature.signature import need_pyhanko, signer_in
 from monitor.reporting.signature.signer import Signer
 
-_FIELD = "Signature"
 #: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
 _ROOM_BYTES = 32_768
 #: How long an authority may take for a time stamp, in seconds.
@@ -94,14 +94,30 @@ def sign(pdf: bytes, key: Key, timestamp_url: str | None = None, long_term: Path
 
 async def _signed(pdf: bytes, signer: Any, timestamp_url: str | None, long_term: Path | None) -> bytes:
     """Return the signed PDF. Raises what pyHanko raises, and InputError for the file of ``long_term``."""
+    from pyhanko.pdf_utils.content import RawContent
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.pdf_utils.layout import BoxConstraints
     from pyhanko.sign import fields, signers, timestamps
+    from pyhanko.stamp import StaticStampStyle
 
     stamper = None if timestamp_url is None else timestamps.HTTPTimeStamper(timestamp_url, timeout=_WAIT_S)
     out = io.BytesIO()
+    writer = IncrementalPdfFileWriter(io.BytesIO(pdf))
+    spot = place_in(writer.prev)
+    visible: dict[str, Any] = {}
+    if spot is not None:
+        x0, y0, x1, y1 = spot.box
+        content = field_drawing(signer_in(signer.signing_cert).common_name, datetime.now(UTC))
+        drawing = RawContent(content, box=BoxConstraints(x1 - x0, y1 - y0))
+        visible = {
+            "new_field_spec": fields.SigFieldSpec(NAME, on_page=spot.page, box=spot.box),
+            "stamp_style": StaticStampStyle(
+                border_width=0, background=drawing, background_layout=_filling_the_field()
+            ),
+        }
     async with nullcontext() if long_term is None else fetching_context(long_term) as context:
         meta = signers.PdfSignatureMetadata(
-            field_name=_FIELD,
+            field_name=NAME,
             md_algorithm="sha256",
             subfilter=fields.SigSeedSubFilter.PADES,
             certify=True,
@@ -110,15 +126,17 @@ async def _signed(pdf: bytes, signer: Any, timestamp_url: str | None, long_term:
             embed_validation_info=context is not None,
             dss_settings=together_with_signature(),
         )
-        await signers.async_sign_pdf(
-            IncrementalPdfFileWriter(io.BytesIO(pdf)),
-            meta,
-            signer=signer,
-            output=out,
-            bytes_reserved=_ROOM_BYTES,
-            timestamper=stamper,
-        )
+        pdf_signer = signers.PdfSigner(meta, signer, timestamper=stamper, **visible)
+        await pdf_signer.async_sign_pdf(writer, output=out, bytes_reserved=_ROOM_BYTES)
     return out.getvalue()
+
+
+def _filling_the_field() -> Any:
+    """Return pyHanko's rule for a drawing that fills its field; by itself it leaves ten points at each side."""
+    from pyhanko.pdf_utils.layout import AxisAlignment, Margins, SimpleBoxLayoutRule
+
+    middle = AxisAlignment.ALIGN_MID
+    return SimpleBoxLayoutRule(middle, middle, Margins(0, 0, 0, 0))
 
 
 def signer_of(key: Key) -> Signer:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from monitor.store.events import NOTE
+from monitor.store.machine_models import NUMBERED
 
 MACHINES = """
 CREATE OR REPLACE TEMP TABLE fleet_machine AS
@@ -27,10 +28,11 @@ SELECT row_number() OVER () AS heading, parameters, identifications,
 FROM heading, every
 """
 
-# Models of single machines, by campaign, and the latest version of each method's own: few rows both.
-MODELS = """
+# Models of single machines, by campaign, and the latest version of each method's own: few rows both, but for the time
+# between a new version and the identifications by it.
+MODELS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_model AS
-SELECT c.campaign_id, m.method, m.model, m.model_version FROM v_machine_models AS m JOIN campaign AS c USING (machine)
+SELECT c.campaign_id, m.method, m.model, m.model_version FROM ({NUMBERED}) AS m JOIN campaign AS c USING (machine)
 """
 
 OWN = """
@@ -48,7 +50,7 @@ WITH latest AS (
     LEFT JOIN fleet_model AS f USING (campaign_id, method)
     LEFT JOIN fleet_own AS o ON o.model = identification.method
     WHERE CASE WHEN getvariable('model') IS NULL
-          -- That which the machine is followed by, else the latest version of the method's own.
+          -- That which its numbers come from, else the latest version of the method's own.
           THEN identification.model = coalesce(f.model, identification.method)
                AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
           ELSE identification.model = getvariable('model')

@@ -1,4 +1,4 @@
-"""Machines whose latest campaign refutes the model that they are followed by, over the whole fleet."""
+"""Machines whose latest campaign refutes the model that their numbers come from, over the whole fleet."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from monitor.records import Verdict
 from monitor.store.connection import Database
+from monitor.store.machine_models import NUMBERED
 
 # From the refuted ones, which are few, to the machines that have any, and of these alone to the campaign that counts.
-_REFUTED = """
+_REFUTED = f"""
 WITH suspect AS (
     SELECT DISTINCT c.machine
     FROM lack_of_fit JOIN identification USING (identification_id) JOIN campaign AS c USING (campaign_id)
@@ -23,10 +24,10 @@ WITH suspect AS (
     FROM identification AS i
     JOIN campaign AS c USING (campaign_id)
     SEMI JOIN suspect USING (machine)
-    LEFT JOIN v_machine_models AS f ON f.machine = c.machine AND f.method = c.method
+    LEFT JOIN ({NUMBERED}) AS f ON f.machine = c.machine AND f.method = c.method
     LEFT JOIN own AS o ON o.model = i.method
     WHERE CASE WHEN $model IS NULL
-          -- That which the machine is followed by, else the latest version of the method's own.
+          -- That which its numbers come from, else the latest version of the method's own.
           THEN i.model = coalesce(f.model, i.method)
                AND i.model_version = coalesce(f.model_version, o.version, i.model_version)
           ELSE i.model = $model AND ($version IS NULL OR i.model_version = $version) END
@@ -60,15 +61,15 @@ def refuted_machines(
 ) -> tuple[RefutedMachine, ...]:
     """The machines whose latest identified campaign refutes its model at a ``level``, by name.
 
-    Without ``model`` that which each machine is followed by. Reads what was stored with the identifications.
+    Without ``model`` that which the numbers of each machine come from. Reads what was stored with the identifications.
     """
     rows = db.rows(_REFUTED, {"level": level, "model": model, "version": version})
     return tuple(RefutedMachine(*row) for row in rows)
 
 
-# The latest campaign of each machine by its runs, and of its comparisons under the model that the machine is followed
-# by the latest: what `compare`, `explain`, the page of the model or a weekly report stored.
-_UNEXPLAINED = """
+# The latest campaign of each machine by its runs, and of its comparisons under the model that its numbers come from
+# the latest: what `compare`, `explain`, the page of the model or a weekly report stored.
+_UNEXPLAINED = f"""
 WITH own AS (
     SELECT model, max(version) AS version FROM model
     WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
@@ -82,7 +83,7 @@ WITH own AS (
 )
 SELECT c.machine, arg_max(c.campaign, j.analysis_id)
 FROM latest JOIN campaign AS c USING (campaign_id) JOIN judged AS j USING (campaign_id)
-LEFT JOIN v_machine_models AS f ON f.machine = c.machine AND f.method = c.method
+LEFT JOIN ({NUMBERED}) AS f ON f.machine = c.machine AND f.method = c.method
 LEFT JOIN own AS o ON o.model = c.method
 WHERE j.model = coalesce(f.model, c.method)
       AND j.model_version = coalesce(f.model_version, o.version, j.model_version)

@@ -53,6 +53,14 @@ def machine_descriptions(db: Database) -> list[MachineDescription]:
     return [MachineDescription(*("" if text is None else str(text) for text in row)) for row in rows]
 
 
+def machine_topology(db: Database, machine: str) -> str:
+    """The chain of a machine as it was registered; empty for one that no campaign measured."""
+    rows = db.rows(
+        "SELECT arg_max(topology, registration) FROM registered_machine WHERE machine = ?", [machine]
+    )
+    return str(rows[0][0] or "")
+
+
 def machine_runs(db: Database, machine: str) -> list[RecordedRun]:
     """Every run of the campaigns of a machine that count, in the order of time.
 

@@ -168,8 +168,14 @@ class _Other:
 
     @staticmethod
     def of(matrix: Array, dof: float, kind: Estimated, count: int) -> _Other:
-        """The part with the covariance ``matrix`` (b, b), ``count`` times."""
-        root = covariance_root(matrix).root
+        """The part with the covariance ``matrix`` (b, b), ``count`` times.
+
+        The unit is the rest, of which a part is a summand: what is negligible in it, or below zero by rounding, is
+        dropped by that unit. In units of the part's own variances rounding would count in coordinates that it misses.
+        """
+        values, vectors = np.linalg.eigh(matrix)
+        has_part = values > _NEGLIGIBLE
+        root = vectors[:, has_part] * np.sqrt(values[has_part])
         return _Other(np.broadcast_to(root, (count, *root.shape)), dof, kind)
 
     def redrawn(self, rng: np.random.Generator) -> _Other:

@@ -32,7 +32,7 @@ from monitor.web.words import (
 from monitor.workflow.fleet.attention import ATTENTION, Attention
 
 if TYPE_CHECKING:
-    from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
+    from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow, OlderVersion
     from monitor.workflow.history.values import ValuesAnswer
     from monitor.workflow.query import TableAnswer
 
@@ -57,7 +57,7 @@ class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
     numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it: numbers that
-    ask for nothing do not make such a machine usual."""
+    ask for nothing do not make such a machine usual. ``topology`` and ``parameters`` name the parameters."""
 
     machine: str
     plant: str
@@ -70,10 +70,12 @@ class MachineRow:
     others: tuple[FleetTableRow, ...]
     latest: str
     unexplained: str = ""
+    topology: str = ""
+    parameters: frozenset[str] = frozenset()
 
 
 def machine_rows(
-    table: Iterable[FleetTableRow], plants: Mapping[str, str], unexplained: Mapping[str, str]
+    table: Iterable[FleetTableRow], described: Mapping[str, Mapping[str, Any]], unexplained: Mapping[str, str]
 ) -> list[MachineRow]:
     """Return a row a machine, in the order of the table, which has the most urgent first."""
     rows: dict[str, list[FleetTableRow]] = {}
@@ -88,7 +90,7 @@ def machine_rows(
     return [
         MachineRow(
             machine=machine,
-            plant=plants.get(machine, ""),
+            plant=str(described.get(machine, {}).get("location") or ""),
             urgency=CLASSES[classes[machine]],
             attention=classes[machine],
             season_not_told=of_machine[0].season_not_told,
@@ -98,6 +100,8 @@ def machine_rows(
             others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < _USUAL),
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
             unexplained=unexplained.get(machine, ""),
+            topology=str(described.get(machine, {}).get("topology") or ""),
+            parameters=frozenset(row.parameter for row in of_machine),
         )
         for machine, of_machine in rows.items()
     ]
@@ -166,10 +170,21 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
     if (answer := sums.answer) is not None:
         refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
         unexplained = {**(answer.models_lacking or {}), **refuted}
-        rows = machine_rows(answer.table, plants_of(machines), unexplained)
+        rows = machine_rows(
+            answer.table, {str(row["machine"]): row for row in _described(machines)}, unexplained
+        )
     rows += unnumbered_rows(machines, {row.machine for row in rows})
     ranks = {label: rank for rank, label in enumerate(CLASSES)}
     return sorted(rows, key=lambda row: ranks[row.attention])
+
+
+def _older(answer: FleetAnswer | None) -> list[tuple[OlderVersion, list[str]]]:
+    """Return the versions that numbers are of beside the newest one, each with its machines."""
+    machines: dict[OlderVersion, list[str]] = {}
+    for machine, versions in ({} if answer is None else answer.older_versions or {}).items():
+        for version in versions:
+            machines.setdefault(version, []).append(machine)
+    return list(machines.items())
 
 
 def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
@@ -184,11 +199,6 @@ def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
 def _within(latest: str, since: str, until: str) -> bool:
     """Whether a date lies in a period whose ends belong to it; an end that is not named is open."""
     return (not since or latest >= since) and (not until or (latest != "" and latest <= until))
-
-
-def plants_of(machines: TableAnswer) -> dict[str, str]:
-    """Return the location of every machine that states one."""
-    return {str(row["machine"]): str(row["location"]) for row in _described(machines) if row["location"]}
 
 
 def routes() -> APIRouter:
@@ -221,6 +231,7 @@ def routes() -> APIRouter:
             state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
+            older=_older(answer),
         )  # fmt: skip
 
     @router.post("/fleet/identify")
@@ -260,5 +271,5 @@ def _drawn(values: ValuesAnswer, parameter: str) -> ParameterHealth:
             u=tuple(series.u[row] or 0.0 for row in rows),
             this_week=tuple(values.started_at[row].date() == last for row in rows),
         ),
-        changed_at=(), drift=None,
+        changed_at=(), drift=None, in_words="",
     )  # fmt: skip

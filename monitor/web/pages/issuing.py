@@ -19,7 +19,7 @@ from monitor.reporting.certificate.grounds import GroundKind
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
-from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
+from monitor.web.laboratory_form import box_of, form_words, groups, laboratory_file, texts_of_file
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 from monitor.web.users import User
@@ -137,6 +137,7 @@ def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Res
     return page(
         request, "certificate_new.html", status=outcome.refusal.status if outcome.refusal else 200,
         campaign=campaign, texts=texts, runs=runs, groups=groups(texts, outcome.faults), outcome=outcome,
+        not_applicable=form_words(texts)("boxes.not_applicable"),
         methods=METHODS, rules=RULES, grounds=tuple(GroundKind),
     )  # fmt: skip
 

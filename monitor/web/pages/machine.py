@@ -50,9 +50,13 @@ def routes() -> APIRouter:
         trends = _Trends(request, _asked(name, since, campaign), parameter)
         # The whole history, of which a period is cut: it is read once and held for every period that is looked at.
         values: ValuesAnswer = ask(user, "values", {"machine": name})
-        is_unidentified = not values.parameters or (campaign and campaign not in values.campaign)
+        is_unidentified = (
+            not values.parameters
+            or values.newer_versions is not None
+            or (campaign and campaign not in values.campaign)
+        )
         if is_unidentified and trends.of_all() is not None:
-            # The trend has identified what nobody had identified before.
+            # The trend has identified what nobody had identified before: both are then of one version.
             values = ask(user, "values", {"machine": name})
         values = _within(values, **_ends(since, until))
         methods = sorted(set(values.method))
@@ -65,7 +69,7 @@ def routes() -> APIRouter:
         all_trends = trends.of_all() if every else trends.of_all_already()
         return page(
             request, "machine.html",
-            name=name, parameter=shown, parameters=names, values=values, trend=trend,
+            name=name, parameter=shown, parameters=names, topology=values.topology, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
             every=all_trends if shown else None, waiting=trends.waiting,
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
@@ -100,15 +104,20 @@ def routes() -> APIRouter:
 async def _table_of_all(
     request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
 ) -> Response:
-    """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there."""
+    """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there, 409
+    where somebody took the question back."""
     desk: Desk = request.app.state.desk
     ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
     await ticket.settled(FETCH_S)
+    if ticket.is_taken_back:
+        return JSONResponse({}, 409)
     if not ticket.is_done:
         return JSONResponse({}, 202)
+    values = await run_in_threadpool(request.app.state.asker, request.state.user, "values", {"machine": name})
     return page(
         request, "parameters.html",
-        name=name, parameter=parameter, since=since, until="", campaign=campaign, every=ticket.answer(),
+        topology=values.topology, name=name, parameter=parameter, since=since, until="", campaign=campaign,
+        every=ticket.answer(),
     )  # fmt: skip
 
 
@@ -182,7 +191,7 @@ def _two_periods(
     days = [f"{at:%Y-%m-%d}" for at in values.started_at]
     return page(
         request, "periods.html",
-        name=name, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+        name=name, topology=values.topology, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
         first=min(days, default=""), last=max(days, default=""),
     )  # fmt: skip
 

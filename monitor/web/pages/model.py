@@ -121,11 +121,16 @@ def _effects(form: Form) -> list[str]:
 
 
 async def _explained(request: Request, campaign: str, effect: str, model: str = "") -> Response:
-    """Send what an effect explains of every residual, for the script; 202 while it is being computed."""
+    """Send what an effect explains of every residual, for the script.
+
+    202 while it is being computed, 409 where somebody took the question back.
+    """
     document = {"campaign": campaign, **({"model": model} if model else {}), "effect": effect}
     desk: Desk = request.app.state.desk
     ticket = await run_in_threadpool(desk.ask, request.state.user, "residuals", document)
     await ticket.settled(FETCH_S)
+    if ticket.is_taken_back:
+        return JSONResponse(None, 409)
     residuals = ticket.answer()
     return JSONResponse(None, 202) if residuals is None else JSONResponse(explained_vectors(residuals))
 

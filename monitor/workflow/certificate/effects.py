@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import ModelEffect
@@ -21,15 +22,18 @@ def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect,
     that is not identified under the model is named without a value.
     """
     model, campaign = evaluated.model, evaluated.campaign
-    own = {*evaluated.names, *(name for refused in evaluated.answer.refused for name in refused.parameters)}
-    shared = [text for text in model.effects if not any(name.startswith(text) for name in own)]
+    local_names = {
+        *evaluated.names,
+        *(name for refused in evaluated.answer.refused for name in refused.parameters),
+    }
+    shared = [text for text in model.effects if not any(name.startswith(text) for name in local_names)]
     if not shared:
         return None
     history = machine_history(db, campaign.machine.id, model=model.name, version=model.version)
     history = history.part(history.campaign == campaign.name)
     effects: list[ModelEffect] = []
     for text in shared:
-        names = [name for name in history.parameters if name.startswith(text) and name not in own]
+        names = [name for name in history.parameters if name.startswith(text) and name not in local_names]
         stated = [_effect(history, name) for name in names]
         effects += [effect for effect in stated if effect is not None] or [ModelEffect(text)]
     return tuple(effects)
@@ -51,7 +55,7 @@ def _effect(history: MachineHistory, name: str) -> ModelEffect | None:
     )  # fmt: skip
 
 
-def _u_of_mean(values: Array, u: Array, days: Array) -> float:
+def _u_of_mean(values: Array, u: Array, days: npt.NDArray[np.int64]) -> float:
     """The standard uncertainty of a mean of runs: by their own u, by their scatter, by that of the days' means."""
     runs = len(values)
     candidates = [math.sqrt(float(np.sum(u**2))) / runs]

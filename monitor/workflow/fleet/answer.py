@@ -56,11 +56,24 @@ class FleetTableRow:
 
 
 @dataclass(frozen=True)
+class OlderVersion:
+    """The version of a model (``NAME@VERSION``) that the numbers of a machine come from, and the ``newest``.
+
+    Nobody identified the machine by that yet.
+    """
+
+    model: str
+    newest: str
+
+
+@dataclass(frozen=True)
 class FleetAnswer:
     """The most urgent rows of ``rows``, and how many of all need attention, by kind.
 
-    ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
-    part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
+    ``not_identified`` are campaigns without numbers under the model that the numbers of their machine come from: they
+    have no part in it. ``older_versions`` by machine say where these are of an older version than the newest of the
+    method's own model, as nobody identified the machine by that yet. ``tolerances_of_type`` names
+    the machine type by machine, where its campaign states no tolerances.
     ``without_numbers`` are machines of which no run has numbers, which no row stands for; not said of a model that was
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
@@ -79,3 +92,4 @@ class FleetAnswer:
     models_refuted: Mapping[str, RefutedCampaign] | None = field(default=None, metadata=OMITTED)
     models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    older_versions: Mapping[str, tuple[OlderVersion, ...]] | None = field(default=None, metadata=OMITTED)

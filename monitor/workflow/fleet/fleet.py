@@ -6,6 +6,7 @@ from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +22,14 @@ from monitor.store import (
     latest_frames,
     latest_tolerances,
     machines_with_runs,
-    not_identified,
+    older_numbers,
     refuted_machines,
     tolerance_types,
     unexplained_machines,
+    without_part,
 )
 from monitor.units import DAYS_PER_YEAR
-from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow, OlderVersion
 from monitor.workflow.fleet.attention import ATTENTION, Attention, Onset
 from monitor.workflow.fleet.ranking import (
     CUT,
@@ -154,15 +156,36 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             label: int((ranking.kind == number).sum()) + sum(row.attention is label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
-        not_identified=not_identified(db) if request.model is None else (),
         table=_shown(db, [row for _, _, row in measured[:most]]),
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
-        models_lacking=(unexplained_machines(db) or None) if request.model is None else None,
-        # Under a model by its name those of other methods are lacking, which have numbers of their own.
-        without_numbers=_without_numbers(db, numbered) or None if request.model is None else None,
+        **_by_their_own_models(db, request.model, numbered),
     )
+
+
+def _by_their_own_models(db: Database, model: str | None, numbered: Container[str]) -> dict[str, Any]:
+    """Return what is said of machines where each is judged by the model of its own numbers: the fields of the answer.
+
+    Under a ``model`` by its name those of other methods are lacking, which have numbers of their own: nothing is said.
+    """
+    if model is not None:
+        return {"not_identified": ()}
+    return {
+        "not_identified": without_part(db),
+        "models_lacking": unexplained_machines(db) or None,
+        "without_numbers": _without_numbers(db, numbered) or None,
+        "older_versions": _older_versions(db) or None,
+    }
+
+
+def _older_versions(db: Database) -> dict[str, tuple[OlderVersion, ...]]:
+    """Return by machine the older versions that its numbers come from, one a method."""
+    versions: dict[str, tuple[OlderVersion, ...]] = {}
+    for row in older_numbers(db):
+        older = OlderVersion(f"{row.model}@{row.version}", f"{row.model}@{row.newest}")
+        versions[row.machine] = (*versions.get(row.machine, ()), older)
+    return versions
 
 
 def _without_numbers(db: Database, numbered: Container[str]) -> tuple[str, ...]:

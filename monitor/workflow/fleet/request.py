@@ -9,10 +9,11 @@ from monitor.exceptions import InputError
 
 @dataclass(frozen=True)
 class FleetRequest:
-    """Every machine and parameter under a model (by default that which each machine is followed by).
+    """Every machine and parameter under a model (by default that which each machine is followed by; while nobody has
+    identified a machine by the newest version of a method's own, the newest that somebody did).
 
     ``top`` rows are listed (0: all). ``weekly_looks`` adds what looks at all of them every week noticed, each
-    machine by the model that it is followed by.
+    machine by the same model.
     """
 
     model: str | None = None

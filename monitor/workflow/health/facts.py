@@ -57,8 +57,9 @@ def parameter_health(
     stated: UncertaintyAnswer,
     judgement: Judgement,
     week: Week,
+    in_words: str,
 ) -> ParameterHealth:
-    """One parameter of the page; ``starts`` are the local starts of the runs that have it."""
+    """One parameter of the page; ``starts`` are the local starts of the runs that have it, ``in_words`` its name."""
     series, tolerance = past.series, judgement.tolerance
     name, values = series.name, series.values
     beyond = None
@@ -85,6 +86,7 @@ def parameter_health(
         changed_at=tuple(moment_of(change.at, series) for change in past.search.changes),
         # Scatter of a few days, stated a year, would only mislead.
         drift=stated_drift(past.drift, judgement.ahead),
+        in_words=in_words,
     )
 
 

@@ -19,6 +19,7 @@ from monitor.reporting.health.sentences import (
     RunNamed,
     TolerancesOfType,
 )
+from monitor.reporting.plain_names import plain_name
 from monitor.store import (
     Database,
     MachineEvent,
@@ -48,8 +49,8 @@ from monitor.workflow.health.results import MeasuredWeek, Results, stored_result
 from monitor.workflow.health.runs import campaign_span, first_run, past_runs
 from monitor.workflow.health.task import Task, TaskResult
 from monitor.workflow.health.verdict import (
-    MOST_NAMED,
     conformity_of,
+    drifting_named,
     drifting_to_limit,
     drifting_unjudged,
     due_by_drift,
@@ -161,14 +162,17 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     judged = with_volumetric(conformity_of(stated, limits), beyond)
     parameters, drifts = [], {}
     added = [name for name in parameter_pasts if name.startswith(model.effects)]
-    for name in () if stated is None else (*stated.parameters, *added):
+    names = () if stated is None else (*stated.parameters, *added)
+    topology = past.name.description.topology if isinstance(past.name.description, MachineNamed) else ""
+    for name in names:
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]
         drifts[name] = drift_forecast(parameter.drift, limits.get(name))
         starts = [at.replace(tzinfo=None) for at in compress(history.started_at, parameter.mask)]
         judgement = Judgement(limits.get(name), judged.single.get(name), drifts[name])
-        parameters.append(parameter_health(parameter, starts, stated, judgement, week))
+        in_words = plain_name(name, topology, names)
+        parameters.append(parameter_health(parameter, starts, stated, judgement, week, in_words))
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
     unchanged = _unchanged(parameter_pasts, past.events, of_campaign)
     noted = changes_noted(
@@ -190,8 +194,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     error_map = stated_map(results.map, limit_um, beyond)
     check = next_check(state, drifts, limits, week)
     due = due_by_drift(state, check)
-    drifting = drifting_to_limit(state, parameters, error_map, due)
-    drifting += tuple(each for each in unjudged if each not in drifting)[:MOST_NAMED]
+    drifting = drifting_named(drifting_to_limit(state, parameters, error_map, due), unjudged)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
         changed=new_this_week(noted, explanation, quality, drifting),

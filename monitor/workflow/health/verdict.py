@@ -145,6 +145,11 @@ def drifting_unjudged(parameters: Sequence[ParameterHealth]) -> tuple[Drifting, 
     return tuple(_drifting(each) for each in drifting_without_limit(parameters) if q_of[each.name] < DRIFTING)
 
 
+def drifting_named(to_limit: tuple[Drifting, ...], unjudged: tuple[Drifting, ...]) -> tuple[Drifting, ...]:
+    """Return the drifts that are named of a machine: those that make its state, then the surest that nothing judges."""
+    return to_limit + tuple(drifting for drifting in unjudged if drifting not in to_limit)[:MOST_NAMED]
+
+
 def _is_seen(parameter: ParameterHealth) -> bool:
     """Whether a parameter has a drift that is not by chance."""
     return parameter.drift is not None and parameter.drift.p_value < DRIFT_P

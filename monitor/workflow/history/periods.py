@@ -12,7 +12,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError, InputError
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
-from monitor.store import Database, MachineHistory, followed_by, machine_history
+from monitor.store import Database, MachineHistory, machine_history, numbered_by
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series
 
@@ -106,7 +106,7 @@ def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
     Runs that are marked as warming up take no part where enough others remain. Raises NotFoundError for a machine that
     is not there, DataError where a period has no run.
     """
-    history = machine_history(db, request.machine, followed_by=followed_by(db, request.machine))
+    history = machine_history(db, request.machine, followed_by=numbered_by(db, request.machine))
     masks = [_within(history, period) for period in (request.earlier, request.later)]
     for mask, period in zip(masks, (request.earlier, request.later), strict=True):
         if not mask.any():

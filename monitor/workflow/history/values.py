@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database, followed_by, machine_history
+from monitor.store import Database, machine_history, machine_topology, numbered_by, older_numbers
 from monitor.workflow.models import resolve
 
 
 @dataclass(frozen=True)
 class ValuesRequest:
-    """The runs of a machine under a ``model`` (None: those by which it is followed); one ``parameter``, or all.
+    """The runs of a machine under a ``model`` (None: those that its numbers come from); one ``parameter``, or all.
 
     ``since`` and ``until`` have an offset from UTC; the first belongs to the period, the second does not.
     """
@@ -54,9 +55,14 @@ class ParameterValues:
 
 @dataclass(frozen=True)
 class ValuesAnswer:
-    """The n runs of a machine in the order of time, with n values of each parameter and each condition."""
+    """The n runs of a machine in the order of time, with n values of each parameter and each condition.
+
+    ``topology`` is its chain, by which plain names say to what an orientation is an angle. ``newer_versions`` are those
+    (``NAME@VERSION``) by which nobody identified the machine yet: the values are then of the version before.
+    """
 
     machine: str
+    topology: str
     started_at: tuple[datetime, ...]
     campaign: tuple[str, ...]
     method: tuple[str, ...]
@@ -65,6 +71,7 @@ class ValuesAnswer:
     warm_up: tuple[bool, ...]
     parameters: Mapping[str, ParameterValues]
     conditions: Mapping[str, tuple[float | None, ...]]
+    newer_versions: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
@@ -75,7 +82,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
         name, version = stored.name, stored.version
     history = machine_history(
         db, request.machine, model=name, version=version,
-        parameter=request.parameter, since=request.since, followed_by=followed_by(db, request.machine),
+        parameter=request.parameter, since=request.since, followed_by=numbered_by(db, request.machine),
     )  # fmt: skip
     if request.until is not None:
         history = history.part(np.array([at < request.until for at in history.started_at], dtype=np.bool_))
@@ -83,8 +90,10 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
         raise NotFoundError(
             f"machine {request.machine} has no parameter {request.parameter!r} in any run of this period"
         )
+    older = older_numbers(db, request.machine) if request.model is None else ()
     return ValuesAnswer(
         machine=request.machine,
+        topology=machine_topology(db, request.machine),
         started_at=history.started_at,
         campaign=tuple(history.campaign.tolist()),
         method=tuple(history.method.tolist()),
@@ -101,6 +110,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
             for column, name in enumerate(history.parameters)
         },
         conditions={name: _numbers(values.tolist()) for name, values in history.conditions.items()},
+        newer_versions=tuple(f"{row.model}@{row.newest}" for row in older) or None,
     )
 
 

@@ -20,11 +20,11 @@ from monitor.statistics.weekly_looks import RATE, Look, WeeklyLooks
 from monitor.store import (
     NOTE,
     Database,
-    followed_by,
     machine_descriptions,
     machine_events,
     machine_history,
     machine_runs,
+    numbered_by,
 )
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.runs import only_runs, possible_campaigns
@@ -52,8 +52,8 @@ class _MachineWeeks:
 def weekly_notices(db: Database, last: Week | None = None) -> WeeklyNotices:
     """Go through all weeks of all machines up to ``last`` (by default the last with a run) and say what was noticed.
 
-    Each machine by the model that it is followed by and the method of its last run, the steady runs of campaigns that
-    one machine can have made. Recorded events that may have changed a machine let it begin anew.
+    Each machine by the model that its numbers come from and the method of its last run, the steady runs of campaigns
+    that one machine can have made. Recorded events that may have changed a machine let it begin anew.
     """
     fleet = [
         machine
@@ -65,7 +65,7 @@ def weekly_notices(db: Database, last: Week | None = None) -> WeeklyNotices:
 
 def _machine_weeks(db: Database, name: str, last: Week | None) -> _MachineWeeks | None:
     """The weeks of a machine; None where it has no value."""
-    history = machine_history(db, name, followed_by=followed_by(db, name))
+    history = machine_history(db, name, followed_by=numbered_by(db, name))
     recorded = machine_runs(db, name)
     campaigns, _ = possible_campaigns(recorded, ())
     history = only_runs(

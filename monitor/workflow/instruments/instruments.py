@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import scipy
 
 from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
@@ -74,21 +75,25 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
 
 
 def disagreement(
-    problem: ChainProblem, solution: Solution, ability: Instruments | Unable
+    problem: ChainProblem,
+    solution: Solution,
+    ability: Instruments | Unable,
+    run: int | None = None,
+    doubtful: float = DOUBTFUL,
 ) -> Disagreement | None:
-    """The worst E_n between instruments in the last run of a fit; None where chance explains it, or nothing is
-    compared.
+    """The worst E_n between instruments in a run of a fit, the last one without ``run``; None where chance makes it
+    more often than ``doubtful``, or nothing is compared.
 
     Nothing is fitted anew: what an instrument says alone is one step from the joint point.
     """
     if not isinstance(ability, Instruments):
         return None
-    run = int(problem.runs[-1])
+    run = int(problem.runs[-1]) if run is None else run
     of_all, beforehand = ability.shares(problem, solution, run)
     parameters, _ = _parameters(problem, solution, run, of_all, beforehand)
     pairs = [(shares.parameter, pair) for shares in parameters for pair in shares.agreement]
     by_chance = _by_chance([pair.e_n for _, pair in pairs])
-    if by_chance is None or by_chance > DOUBTFUL:
+    if by_chance is None or by_chance > doubtful:
         return None
     parameter, worst = max(pairs, key=lambda compared: compared[1].e_n)
     return Disagreement(run, parameter, worst.first, worst.second, worst.e_n, len(pairs), by_chance)
@@ -114,6 +119,11 @@ def _parameters(
         shares = _parameter(name, unit, value, number, of_all, float(beforehand[number]))
         parameters.append(replace(shares, refers_to=frames.get(name)))
     return tuple(parameters), tuple(open_ones)
+
+
+def limit_of(comparisons: int, doubtful: float) -> float:
+    """The E_n that the largest of so many comparisons exceeds by chance so often at most, as ``_by_chance`` has it."""
+    return float(scipy.special.erfcinv(doubtful / comparisons)) * math.sqrt(2.0) / K
 
 
 def _by_chance(e_n: list[float]) -> float | None:

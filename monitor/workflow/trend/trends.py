@@ -22,6 +22,8 @@ from monitor.store import (
     latest_text,
     machine_events,
     machine_history,
+    numbered_by,
+    older_numbers,
     parameter_frames,
     save_analysis,
     tolerance_types,
@@ -94,7 +96,10 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
 
 
 def _history(db: Database, request: TrendRequest) -> MachineHistory:
-    """The history of a machine; campaigns not yet identified are identified first where the database may be written."""
+    """The history of a machine; campaigns not yet identified are identified first where the database may be written.
+
+    While none is identified by the newest version of a method's own model, that of the newest which one is.
+    """
     machine = request.machine
     model, version = None, None
     if request.model is not None:
@@ -103,13 +108,12 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
         stored = resolve(db, request.model)
         model, version = stored.name, stored.version
 
-    def read() -> MachineHistory:
+    def read(by: Mapping[str, tuple[str, int]]) -> MachineHistory:
         return machine_history(
-            db, machine, model=model, version=version, parameter=request.parameter, since=request.since,
-            followed_by=followed_by(db, machine),
+            db, machine, model=model, version=version, parameter=request.parameter, since=request.since, followed_by=by,
         )  # fmt: skip
 
-    history = read()
+    history = read(followed_by(db, machine))
     if not db.read_only and history.unidentified:
         # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
         from monitor.workflow.identify.identify import identify
@@ -121,7 +125,7 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
             except DataError:
                 # A campaign that cannot be identified does not keep the others from being followed.
                 continue
-        history = read()
+    history = read(numbered_by(db, machine))
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
         every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters
@@ -155,6 +159,7 @@ def _answer(
         notes=(
             *map(str, same_hours(history)),
             *_not_followed(history),
+            *_of_older_version(db, request),
             *_limits_of_type(db, history),
             *_refuted(refuted),
         ),
@@ -216,6 +221,18 @@ def _not_followed(history: MachineHistory) -> list[str]:
     if not history.unidentified:
         return []
     return [messages.not_identified_by_model(history.machine, history.unidentified)]
+
+
+def _of_older_version(db: Database, request: TrendRequest) -> list[str]:
+    """Which version the values are of, where that is not the newest of a method's own model."""
+    if request.model is not None:
+        return []
+    return [
+        messages.numbers_of_older_version(
+            request.machine, f"{older.model}@{older.version}", f"{older.model}@{older.newest}"
+        )
+        for older in older_numbers(db, request.machine)
+    ]
 
 
 def _why_none(request: TrendRequest) -> str:

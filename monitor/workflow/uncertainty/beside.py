@@ -90,7 +90,7 @@ def beside_readings(
             holds_for=HoldsFor.CAMPAIGN if adds_days else holds,
             day_to_day=day_to_day(components, run.names, run.units),
             sources=stated(sources, counted),
-            length=length_reference(campaign, number, _gains(fit, run.names)),
+            length=length_reference(campaign, number, _gains(fit, run.names), sources),
         ),
         bool(linear) and linear <= axes_stated(sources, chain),
     )

@@ -12,9 +12,10 @@ import numpy as np
 
 from monitor.discovery import RobustFit
 from monitor.effects import ChainEffect
+from monitor.methods import campaign_method
+from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.instruments.contradiction import STATED_WITHIN
 from monitor.readers.doubts import (
-    AIR_NAMES,
     AIR_RANGE,
     LARGEST_BAR_DIFFERENCE,
     bar_difference,
@@ -25,6 +26,7 @@ from monitor.records import Campaign, Run
 from monitor.reporting.certificate.grounds import Ground, GroundKind
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.notes import TOO_SMALL
+from monitor.workflow.instruments.instruments import disagreement, limit_of
 
 #: The residuals over what the stated uncertainties leave. Up to three a probe's statement may be wrong, and lack of fit
 #: has its line in the budget; from five on 96 % of their variance has no known source. Largest of a complete model:
@@ -39,6 +41,8 @@ LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
 #: mm. An axis of a machine given by letters lies where the machine file's coordinates put it, to some tenths. Largest
 #: in the examples: 0.11. Of a chain with lengths `identify` compares each with its own.
 LARGEST_OFFSET = 5.0
+#: Chance makes the largest E_n between instruments in at most so many right campaigns; as for a model that is refuted.
+DISAGREE = 1e-3
 
 
 def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground, ...]:
@@ -53,6 +57,7 @@ def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground,
         *_lack_of_fit(robust, run),
         *_implausible(campaign, robust, run),
         *_work_points(robust, run),
+        *_instruments(campaign, robust, run),
         *_scale_bar(campaign, run),
         *_temperature(campaign, measured),
     )
@@ -124,6 +129,17 @@ def _work_points(robust: RobustFit, run: int) -> Iterator[Ground]:
         yield Ground(GroundKind.WORK_POINT, run, point.setup, point.distance, STATED_WITHIN, "mm")
 
 
+def _instruments(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
+    """The worst disagreement of two instruments that chance does not explain: one of them was read, placed or stated
+    otherwise than the file says, and the joint fit lies between the two."""
+    ability = campaign_method(campaign).instruments
+    apart = disagreement(robust.fit.problem, robust.fit.solution, ability, run, DISAGREE)
+    if apart is not None:
+        subject = f"{apart.parameter}: {apart.first}, {apart.second}"
+        limit = limit_of(apart.comparisons, DISAGREE)
+        yield Ground(GroundKind.INSTRUMENTS, run, subject, apart.e_n, limit)
+
+
 def _scale_bar(campaign: Campaign, run: int) -> Iterator[Ground]:
     difference = bar_difference(campaign)
     if difference is not None and abs(difference) > LARGEST_BAR_DIFFERENCE:
@@ -140,12 +156,5 @@ def _temperature(campaign: Campaign, run: Run) -> Iterator[Ground]:
     bar = campaign.artefact.scale_bar
     if bar is None:
         return
-    recorded = [name for name, value in run.conditions.items() if np.isfinite(value)]
-    rows = campaign.probings.run == run.run
-    recorded += [
-        name for name, values in campaign.probings.channels.items() if np.isfinite(values[rows]).any()
-    ]
-    if not any(
-        name.endswith("_degC") and any(word in name.lower() for word in AIR_NAMES) for name in recorded
-    ):
+    if bar_temperature(campaign, run) is None:
         yield Ground(GroundKind.TEMPERATURE, run.run, "-".join(bar.balls))

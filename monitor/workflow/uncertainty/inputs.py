@@ -82,8 +82,14 @@ def reading_inputs(
         u = max(stated, lack_of_fit(fit)[1] or 0.0)
         inputs = uncorrelated(names, units, run.inputs[:count], run.stated * (u / stated), source=READINGS)
         source = _stated_source(u, stated, several=several, selection=name)
+        source = replace(source, for_the_run=_chose_the_run(holds_for, len(values)))
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source
+
+
+def _chose_the_run(holds_for: HoldsFor | None, repeated: int) -> bool | None:
+    """Whether an uncertainty of the run itself was asked for where the ``repeated`` runs would do; None where not."""
+    return (holds_for is HoldsFor.RUN and repeated - 1 >= FEWEST_DEGREES_OF_FREEDOM) or None
 
 
 def _stated_source(u: float, stated: float, *, several: bool, selection: str | None) -> CovarianceSource:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from monitor.effects import ChainEffect, parse_effect
 from monitor.exceptions import InputError
 from monitor.machine import Chain
+from monitor.methods.bar_temperature import bar_temperature
 from monitor.records import Array, Campaign, LinearAxes
 from monitor.reporting.budget import LengthKind, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceKind
@@ -17,6 +18,7 @@ from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.type_b import SourceColumns, source_columns
 from monitor.units import ONE
 
+_OF_STANDARD = (Quantity.STANDARD_TEMPERATURE, Quantity.STANDARD_EXPANSION)
 _LINEAR = (Quantity.LINEAR_POSITIONING, Quantity.LINEAR_STRAIGHTNESS)
 #: What a covariance from repeated runs contains: what takes another value in every run, and within it.
 _BY_RUN: Mapping[Sharing, float] = {Sharing.RUN: 1.0, Sharing.PROBING: 1.0}
@@ -111,16 +113,29 @@ def stated(sources: tuple[Source, ...], counted: tuple[SourceColumns, ...]) -> t
     )
 
 
-def length_reference(campaign: Campaign, number: int, gains: tuple[str, ...]) -> LengthReference | None:
-    """At which temperature the gains of a run hold; None where it has none."""
+def length_reference(
+    campaign: Campaign, number: int, gains: tuple[str, ...], sources: tuple[Source, ...]
+) -> LengthReference | None:
+    """At which temperature the gains of a run hold, and what of the bar's no source states; None for no gains."""
     if not gains:
         return None
     bar = campaign.artefact.scale_bar
-    ambient = next((run.conditions.get("ambient_degC") for run in campaign.runs if run.run == number), None)
+    run = next(run for run in campaign.runs if run.run == number)
     if bar is None:
-        return LengthReference(LengthKind.NO_BAR, gains, temperature=ambient)
-    if bar.expansion_coefficient is None or bar.reference_temperature is None or ambient is None:
-        return LengthReference(LengthKind.NOT_CORRECTED, gains, temperature=ambient)
-    return LengthReference(
-        LengthKind.CORRECTED, gains, ambient, bar.reference_temperature, bar.expansion_coefficient
+        return LengthReference(LengthKind.NO_BAR, gains, temperature=run.conditions.get("ambient_degC"))
+    measured, of_sources = bar_temperature(campaign, run), {source.quantity for source in sources}
+    reference = LengthReference(
+        LengthKind.NOT_CORRECTED,
+        gains,
+        temperature=None if measured is None else measured.degrees,
+        columns=None if measured is None else measured.columns,
+        not_in_u=tuple(quantity.value for quantity in _OF_STANDARD if quantity not in of_sources),
+    )
+    if bar.expansion_coefficient is None or bar.reference_temperature is None or measured is None:
+        return reference
+    return replace(
+        reference,
+        kind=LengthKind.CORRECTED,
+        reference=bar.reference_temperature,
+        expansion=bar.expansion_coefficient,
     )

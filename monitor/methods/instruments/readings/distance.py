@@ -20,8 +20,16 @@ from monitor.records import Array, Setup
 # Where all directions of the bar lie across a direction to this part, the bar shows only products of errors along it:
 # errors of 1 mrad and 1 mm on a bar of 150 mm turn it by less than a hundredth.
 FLAT = 1e-2
-# A bar's ends stand within a millimetre or so of where they were stated; lengths further off come from another centre.
-STATED_WITHIN = 2.0
+# mm. A centre that a swing puts nearer to the stated one than this begins there: in the plane of the swing, where its
+# readings show it, and across, where 0.1 mm makes 0.05 um of a bar of 100 mm.
+STATED_WITHIN, STATED_HEIGHT = 0.3, 0.1
+# mm. Lengths that a stated centre leaves further off come from another one, whatever the bar's directions; a constant
+# of the readings beyond it from a centre off the plane. A smaller constant may be a length that was typed wrong, which
+# no centre may take up.
+FAR = 2.0
+# Standard deviation of the tool points across their longest direction, in lengths of the bar, from which their circle
+# has a centre: that of half a turn is 0.3, of a quarter 0.09.
+SWUNG = 0.2
 
 
 @dataclass(frozen=True)
@@ -120,26 +128,43 @@ def _centre(tips: Array, lengths: Array, stated: Array) -> Array:
     """The stated centre (3,) where it explains the ``lengths`` (m,) mm of a bar to the tool points (m, 3) mm; else the
     centre of the sphere through them, in directions that they leave open the nearest to the stated one.
 
-    The differences of |p|^2 - 2 p.c + |c|^2 = L^2 from their means are linear in c. Off the plane of a flat swing the
-    centre lies where the length says, on the side of the stated one.
+    The differences of |p|^2 - 2 p.c + |c|^2 = L^2 from their means are linear in c.
     """
     off = np.linalg.norm(tips - stated, axis=1) - lengths
-    if len(tips) < 4 or np.sqrt(np.mean(off**2)) < STATED_WITHIN:
-        return stated
+    is_far = np.sqrt(np.mean(off**2)) >= FAR
     middle = tips.mean(axis=0)
     about, from_middle = tips - middle, stated - middle
     _, size, axes = np.linalg.svd(about, full_matrices=False)
+    swung = len(tips) >= 4 and size[1] > SWUNG * lengths.mean() * np.sqrt(len(tips))
+    if len(tips) < 4 or not (is_far or swung):
+        return stated
     is_spanned = size > FLAT * size[0]
     right = 0.5 * (np.sum(about**2, axis=1) - lengths**2)
     inside = about @ axes[is_spanned].T
     solved = np.linalg.lstsq(inside - inside.mean(axis=0), right - right.mean(), rcond=None)[0]
-    left_open = from_middle - axes[is_spanned].T @ (axes[is_spanned] @ from_middle)
+    in_plane, across = solved - axes[is_spanned] @ from_middle, np.zeros(3)
     if np.count_nonzero(~is_spanned) == 1:
         square = float(np.mean(lengths**2 - np.sum((inside - solved) ** 2, axis=1)))
-        height = np.sqrt(square) if square > (FLAT * size[0]) ** 2 else 0.0
         normal = axes[~is_spanned][0]
-        left_open = height * normal * (np.sign(normal @ from_middle) or 1.0)
-    return np.asarray(middle + axes[is_spanned].T @ solved + left_open)
+        height = float(normal @ from_middle)
+        across = normal * (_height(square, height, 2.0 * float(lengths.mean())) - height)
+    if not is_far and np.linalg.norm(in_plane) < STATED_WITHIN:
+        in_plane = np.zeros_like(in_plane)
+    return np.asarray(stated + axes[is_spanned].T @ in_plane + across)
+
+
+def _height(square: float, stated: float, twice: float) -> float:
+    """How far (mm) a centre lies off the plane of a flat swing, on the side of the ``stated`` height.
+
+    That is the stated one, none, or what the length says: its ``square`` (mm^2) is 2 L = ``twice`` times a constant.
+
+    A swing in the plane of its centre shows 18 um of a centre that is stated 1.9 mm off a plane of 100 mm: the height
+    that leaves the smaller constant is the right one. The length itself says it to 2 mm at best near the plane.
+    """
+    if_flat, if_stated = abs(square), abs(stated**2 - square)
+    if min(if_flat, if_stated) < FAR * twice:
+        return 0.0 if if_flat < if_stated and abs(stated) > STATED_HEIGHT else stated
+    return float(np.sqrt(max(square, 0.0)) * (np.sign(stated) or 1.0))
 
 
 READING = DistanceReading
