@@ -73,7 +73,7 @@ def _named(rng: np.random.Generator, parameters: int, drift: float) -> list[str]
 
 
 def test_a_machine_on_which_nothing_drifts_is_rarely_said_to(seeds) -> None:
-    """At 1 % of machines of 13 parameters, as changes are; the rates over 500 stand in docs/reports-and-certificates.md."""
+    """At 1 % of machines of 13 parameters, as changes are; docs/reports-and-certificates.md has the rates over 500."""
     machines = seeds(500, 25)
     false = sum(bool(_named(np.random.default_rng([77100, seed]), 13, 0.0)) for seed in machines)
     # More would have a probability of 1e-4 at twice the nominal rate.
