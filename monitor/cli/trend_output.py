@@ -123,12 +123,23 @@ _COLUMNS: dict[str, Callable[[ParameterTrend], str]] = {
     "limit": lambda parameter: "-" if parameter.forecast.limit is None else f"{parameter.forecast.limit:g}",
     "crosses": lambda parameter: _crosses(parameter),
     "in tolerance next": lambda parameter: output.probability(parameter.forecast.in_tolerance_at_next_check),
-    "charts": lambda parameter: (
-        "-" if parameter.control.why else ", ".join(parameter.control.alarms) or "in control"
-    ),
+    "charts": lambda parameter: _chart_words(parameter),
+}
+#: What is said of charts without an alarm beside a slope that is not by chance: they are slow to see one.
+_QUIET_CHARTS = {
+    SlopeVerdict.DRIFT: "no alarm, but drifts",
+    SlopeVerdict.DRIFT_OR_SEASON: "no alarm, but moves",
 }
 #: Headings that are shorter on paper than what tells two columns apart.
 _HEADINGS = {"u of slope": "u"}
+
+
+def _chart_words(parameter: ParameterTrend) -> str:
+    """The charts in alarm; without one a parameter is in control, unless its drift says that it is not."""
+    if parameter.control.why:
+        return "-"
+    quiet = "in control" if parameter.drift.verdict is None else _QUIET_CHARTS[parameter.drift.verdict]
+    return ", ".join(parameter.control.alarms) or quiet
 
 
 def _crosses(parameter: ParameterTrend) -> str:

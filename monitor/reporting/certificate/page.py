@@ -13,6 +13,7 @@ from monitor.reporting.certificate.draft_word import draft_word
 from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
+from monitor.reporting.certificate.model_effects import PrintedEffects, printed_effects
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
 from monitor.reporting.certificate.record import (
     CertificateRecord,
@@ -47,6 +48,7 @@ class PrintedResult:
     beside: bool
     pictures: tuple[Picture, ...]
     behind: PrintedBehind | None
+    effects: PrintedEffects | None
 
 
 def certificate_context(record: CertificateRecord) -> dict[str, Any]:
@@ -184,4 +186,5 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         beside=beside(result),
         pictures=pictures_of(result, texts),
         behind=printed_behind(result, texts),
+        effects=printed_effects(result.effects, texts),
     )

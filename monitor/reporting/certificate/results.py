@@ -18,6 +18,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.budget import Budget, HoldsFor
 from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
+from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
@@ -50,6 +51,7 @@ class ResultSet:
     covariance as a whole; not finite where it is known. ``sampling`` is that of the factors; None in a result of an
     earlier version, whose factors hold for ``dof`` (Student, Hotelling). ``machine_frame`` has the location errors in
     the frame of the machine, ``budget`` what stands behind u; both are None in a result of an earlier version.
+    ``effects`` are those that were added to the model; None where it has none, and in a result of an earlier version.
     """
 
     state: str
@@ -72,6 +74,7 @@ class ResultSet:
     machine_frame: MachineFrameResult | None = field(default=None, metadata=OMITTED)
     budget: Budget | None = field(default=None, metadata=OMITTED)
     sampling: FactorSampling | None = None
+    effects: tuple[ModelEffect, ...] | None = field(default=None, metadata=OMITTED)
 
     @property
     def k_p_error(self) -> float:

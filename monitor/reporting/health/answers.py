@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from monitor.reporting.health.comparison import MissingEffect
+from monitor.reporting.health.concern import DRIFT_P, binding_shares, concern, likeliest_out, volumetric_binds
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
@@ -14,6 +15,7 @@ from monitor.reporting.health.records import (
     Fleet,
     FleetRow,
     MachineHealth,
+    MapShare,
     ParameterHealth,
     State,
     is_due,
@@ -30,13 +32,12 @@ FINE: tuple[State, ...] = (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
 _WITHOUT_LIMIT: tuple[State, ...] = (
     State.MODEL_FAILS,
     State.CHANGED,
+    State.DRIFTS,
     State.SUSPECT_DATA,
     State.NO_CHANGE_SEEN,
 )
 #: Names of machines in a sentence; of more, their number.
 _NAMED = 6
-#: A drift is spoken of below this probability of seeing it where there is none.
-DRIFT_P = 0.05
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
 _QUIET_IN_PART = (
     "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
@@ -89,31 +90,6 @@ def _quiet(fleet: Fleet) -> str:
     return _QUIET_IN_PART if State.NO_CHANGE_SEEN in states else _QUIET
 
 
-def concern(health: MachineHealth) -> ParameterHealth | None:
-    """Return the parameter that makes a machine's state, or is nearest to make it; None without parameters."""
-    parameters = health.parameters
-    if is_due(health):
-        named = [each for each in parameters if each.name == health.due]
-        if named:
-            return named[0]
-    if health.state is State.CHANGED:
-        noted = [
-            change.at for change in health.changes if change.kind is ChangeKind.CHANGE and change.this_week
-        ]
-        changed = [parameter for parameter in parameters if any(at in parameter.changed_at for at in noted)]
-        if changed:
-            return changed[0]
-    return max(parameters, key=_urgency, default=None)
-
-
-def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
-    """A drift that reaches its limit counts before one that does not, after the probability to be out already."""
-    out, drift = parameter.probability_out or 0.0, parameter.drift
-    reaches = parameter.reaches_soon and drift is not None and drift.p_value < DRIFT_P
-    used = abs(parameter.estimate) / parameter.tolerance if parameter.tolerance else 0.0
-    return (out if out > 0.01 else 0.0), float(reaches), used
-
-
 def reason(health: MachineHealth) -> str:
     """Return why a machine is in its state, in plain words with numbers."""
     reason = _REASONS.get(health.state, _nearest_limit)(health)
@@ -122,7 +98,7 @@ def reason(health: MachineHealth) -> str:
 
 def _out(health: MachineHealth) -> str:
     """What is beyond its tolerance, or may be: a parameter, the volumetric error, or both."""
-    parameter, error_map, sentences = concern(health), health.map, []
+    parameter, error_map, sentences = likeliest_out(health), health.map, []
     if parameter is not None and parameter.probability_out:
         sentences.append(_beyond(parameter))
     if error_map is not None and error_map.probability_out and error_map.limit_um is not None:
@@ -130,12 +106,31 @@ def _out(health: MachineHealth) -> str:
             f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
             f"{plain(error_map.limit_um)} µm (beyond it with a probability of {percent(error_map.probability_out)})"
         )
+    shares = binding_shares(health)
+    if shares:
+        sentences.append(f"most of it comes from {_shares(health, shares)}")
+    sentences += [
+        f"{parameter.name} {moves.removeprefix(' and ')}"
+        for share in shares
+        for parameter in health.parameters
+        if parameter.name == share.parameter and parameter.drift is not None
+        if (moves := _moves(parameter, parameter.drift))
+    ]
     missing = _first_missing(health)
     if missing is not None and health.state is State.MAY_BE_OUT_OF_TOLERANCE:
         sentences.append(
             f"the model lacks {missing.meaning} ({missing.effect}), and its lack of fit is part of what is uncertain"
         )
     return "; ".join(sentences)
+
+
+def _shares(health: MachineHealth, shares: Sequence[MapShare]) -> str:
+    """Parameters with what each adds to the worst volumetric error."""
+    name_of = {parameter.name: f"{parameter.in_words} ({parameter.name}" for parameter in health.parameters}
+    return ", ".join(
+        f"{name_of.get(share.parameter, f'({share.parameter}')}, {share.error_um:+.1f} µm)"
+        for share in shares
+    )
 
 
 def _first_missing(health: MachineHealth) -> MissingEffect | None:
@@ -244,9 +239,16 @@ def to_do(health: MachineHealth) -> str:
     """Return what to do on a machine, and by when to measure it again."""
     parameter = concern(health)
     name = "its errors" if parameter is None else f"{parameter.in_words} ({parameter.name})"
+    wrong, judged = name, name
+    if volumetric_binds(health.state, health.parameters, health.map):
+        shares, judged = binding_shares(health), "the volumetric error"
+        wrong = (
+            _shares(health, shares) if shares else "what makes the volumetric error (monitor map names it)"
+        )
     action = {
-        State.OUT_OF_TOLERANCE: f"adjust or compensate {name} and measure again",
-        State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {name} is too near its limit to be judged",
+        State.OUT_OF_TOLERANCE: f"adjust or compensate {wrong} and measure again",
+        State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {judged} is too near its limit to be judged",
+        State.DRIFTS: f"state a tolerance for {name}, or compensate it; measure again as planned",
         State.NOT_EVALUATED: "mend what its page names and measure again",
         State.CHANGED: "find out what was done or happened then, record it as an event, and measure again",
         State.SUSPECT_DATA: "look at the points that its page names and measure again",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from monitor.reporting.health.answers import URGENT, concern
+from monitor.reporting.health.answers import URGENT
+from monitor.reporting.health.concern import concern
 from monitor.reporting.health.records import MachineHealth, is_due
 
 #: Machines that the first page draws: as many as leave room for the table.

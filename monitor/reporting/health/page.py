@@ -8,8 +8,9 @@ from typing import Any
 
 from markupsafe import Markup
 
-from monitor.reporting.health.answers import URGENT, answers, concern, first_names, reason, to_do
+from monitor.reporting.health.answers import URGENT, answers, first_names, reason, to_do
 from monitor.reporting.health.columns import column_widths
+from monitor.reporting.health.concern import concern
 from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
     ALARMS,
@@ -42,6 +43,7 @@ SIGNS = {
     State.NOT_EVALUATED: "?",
     State.CHANGED: "◆",
     State.MODEL_FAILS: "◇",
+    State.DRIFTS: "↗",
     State.SUSPECT_DATA: "○",
     State.NOT_MEASURED: "–",
     State.IN_TOLERANCE: "✓",
@@ -54,6 +56,7 @@ LOOKS = {
     State.NOT_EVALUATED: "doubtful",
     State.CHANGED: "doubtful",
     State.MODEL_FAILS: "doubtful",
+    State.DRIFTS: "doubtful",
     State.SUSPECT_DATA: "doubtful",
     State.NOT_MEASURED: "unknown",
     State.IN_TOLERANCE: "good",

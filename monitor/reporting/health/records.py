@@ -25,6 +25,7 @@ class State(StrEnum):
     NOT_EVALUATED = "not evaluated"
     CHANGED = "changed"
     MODEL_FAILS = "model fails"
+    DRIFTS = "drifts"
     SUSPECT_DATA = "suspect data"
     NOT_MEASURED = "not measured"
     IN_TOLERANCE = "in tolerance"
@@ -47,6 +48,8 @@ STATES: dict[State, str] = {
     State.NOT_EVALUATED: "measured, but its last run could not be evaluated: nothing is known of its tolerances",
     State.CHANGED: "a parameter or an artefact changed this week",
     State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing",
+    State.DRIFTS: "a parameter without a tolerance drifts, or follows a season that the history is too short to "
+    "tell from a drift",
     State.SUSPECT_DATA: "bad points, or a ball that scatters, were found and count by less; nothing else",
     State.NOT_MEASURED: "no run this week",
     State.IN_TOLERANCE: "every parameter is within its tolerance and nothing changed",
@@ -186,12 +189,21 @@ class PoseError:
 
 
 @dataclass(frozen=True)
+class MapShare:
+    """What a parameter adds to the worst error of a map, in µm along its vector; below zero where it shortens it."""
+
+    parameter: str
+    error_um: float
+
+
+@dataclass(frozen=True)
 class VolumetricMap:
     """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm).
 
     ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
     expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``. ``limit_um`` of the
-    machine's file for the worst of them, and the probability to be beyond it.
+    machine's file for the worst of them, and the probability to be beyond it. ``by_parameter`` is what each parameter
+    adds to the worst error, the largest first; None in older records.
     """
 
     run: int
@@ -206,6 +218,7 @@ class VolumetricMap:
     p: float = 0.95
     limit_um: float | None = field(default=None, metadata=OMITTED)
     probability_out: float | None = field(default=None, metadata=OMITTED)
+    by_parameter: tuple[MapShare, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from enum import Enum, auto
 from monitor.documents import Said, Sentence
 from monitor.reporting.health.words import in_words
 from monitor.reporting.lacks import Undecided
+from monitor.reporting.messages import DRIFT_OR_SEASON
 
 
 @dataclass(frozen=True)
@@ -99,15 +100,19 @@ class ModelLacks(Sentence):
 
 @dataclass(frozen=True)
 class Drifting(Sentence):
-    """A parameter that makes the state of its machine drifts, by ``per_year`` with ``u_per_year``."""
+    """A parameter that makes the state of its machine drifts, by ``per_year`` with ``u_per_year``; or it moves, where
+    a season can be all of it."""
 
     parameter: str
     per_year: float
     u_per_year: float
     unit: str
+    season_not_told: bool = False
 
     def __str__(self) -> str:
         month, _ = in_words(self.per_year / 12.0, self.u_per_year / 12.0, sign=True)
+        if self.season_not_told:
+            return f"{self.parameter} moves by {month} {self.unit} a month ({DRIFT_OR_SEASON})"
         return f"{self.parameter} drifts by {month} {self.unit} a month"
 
 

@@ -14,6 +14,7 @@ from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.dcc_elements import NEWEST
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
+from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
@@ -30,6 +31,7 @@ from monitor.store import (
 from monitor.workflow.certificate.answer import CertificateFileAnswer, CertificateState
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of
+from monitor.workflow.certificate.effects import effects_of
 from monitor.workflow.certificate.files import keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.inputs import CertificateInputs
@@ -78,6 +80,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
     accepted = accepted_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
     inputs = inputs_of(runs, request.asked, request.fonts)
+    effects = [effects_of(db, run.evaluated) for run in runs]
 
     signer = None if request.key is None else signer_of(request.key)
 
@@ -86,7 +89,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
             number, day, label(runs[-1].evaluated.model),
             method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),
         )  # fmt: skip
-        record = _record(stated, runs, request, identity)
+        record = _record(stated, runs, effects, request, identity)
         return dataclasses.replace(
             record,
             replaces=replaced,
@@ -179,6 +182,7 @@ def _method_name(name: str, texts: Texts) -> str:
 def _record(
     stated: LaboratoryFile,
     runs: Sequence[CertifiedRun],
+    effects: Sequence[tuple[ModelEffect, ...] | None],
     request: CertificateRequest,
     identity: CertificateIdentity,
 ) -> CertificateRecord:
@@ -186,6 +190,9 @@ def _record(
     results = [
         results_of(run.evaluated, texts, run.monte_carlo, request.method, state=texts(run.measured.text))
         for run in runs
+    ]
+    results = [
+        dataclasses.replace(result, effects=of_run) for result, of_run in zip(results, effects, strict=True)
     ]
     last = runs[-1].evaluated
     record = certificate_record(

@@ -31,7 +31,16 @@ from monitor.store import (
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow, OlderVersion
 from monitor.workflow.fleet.attention import ATTENTION, Attention, Onset
-from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked, split_times, warmth_beside
+from monitor.workflow.fleet.ranking import (
+    CUT,
+    RATE,
+    Ranking,
+    cell_tests,
+    means_p,
+    ranked,
+    split_times,
+    warmth_beside,
+)
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
@@ -40,17 +49,14 @@ from monitor.workflow.models import label_of, resolve
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """Every machine and parameter: its sums, tests and q-values, the limit, its class (``kind``), the measure within
-    that, and the years to the limit."""
+    """Every machine and parameter: its sums, tests and q-values, the limit, and how urgent it is."""
 
     sums: FleetSums
     cells: CellTests
     drift: CellDrift
     q_values: Mapping[str, Array]
     limit: Array
-    kind: npt.NDArray[np.int64]
-    measure: Array
-    years: Array
+    ranking: Ranking
 
     @cached_property
     def warmth(self) -> npt.NDArray[np.bool_]:
@@ -60,7 +66,8 @@ class _Cells:
     @property
     def order(self) -> npt.NDArray[np.int64]:
         """The most urgent first."""
-        return np.lexsort((self.sums.parameter, self.sums.machine, -self.measure, self.kind))
+        ranking = self.ranking
+        return np.lexsort((self.sums.parameter, self.sums.machine, -ranking.measure, ranking.urgency))
 
     @cached_property
     def differs_d(self) -> Array:
@@ -69,7 +76,7 @@ class _Cells:
 
     def onset(self, index: int) -> tuple[float, Onset]:
         """Since when a row holds (days since 1970), and what began then."""
-        sums, attention = self.sums, ATTENTION[int(self.kind[index])]
+        sums, attention = self.sums, ATTENTION[int(self.ranking.kind[index])]
         if attention is Attention.OUT and np.isfinite(sums.beyond_d[index]):
             return float(sums.beyond_d[index]), Onset.BEYOND
         if attention in (Attention.OUT, Attention.STANDS_OUT):
@@ -87,7 +94,7 @@ class _Cells:
             rank=0,
             machine=str(self.sums.machine[index]),
             parameter=str(self.sums.parameter[index]),
-            attention=ATTENTION[int(self.kind[index])],
+            attention=ATTENTION[int(self.ranking.kind[index])],
             unit=str(self.sums.unit[index]),
             n=int(self.sums.runs[index]),
             days=int(self.sums.groups[index]),
@@ -110,7 +117,7 @@ class _Cells:
             latest_at=_date(float(self.sums.last_d[index])),
             since=_date(float(self.sums.since_d[index])),
             limit=_number(self.limit[index]),
-            years_to_limit=_number(self.years[index]) if self.kind[index] == 1 else None,
+            years_to_limit=_number(self.ranking.years[index]) if self.ranking.kind[index] == 1 else None,
             temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
             season_not_told=True if self.drift.season_p[index] >= REFUTED else None,
             onset=_date(onset),
@@ -127,11 +134,13 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     sums, most = cells.sums, request.top or None
     numbered = set(sums.machine.tolist())
     volumetric = volumetric_rows(db, numbered)
-    measured = [(cells.row(index), float(cells.measure[index])) for index in cells.order[:most]]
-    measured += [(row, share_of_limit(row)) for row in volumetric]
-    measured.sort(
-        key=lambda pair: (ATTENTION.index(pair[0].attention), -pair[1], pair[0].machine, pair[0].parameter)
-    )
+    ranking = cells.ranking
+    measured = [
+        (float(ranking.urgency[index]), -float(ranking.measure[index]), cells.row(index))
+        for index in cells.order[:most]
+    ]
+    measured += [(float(ATTENTION.index(row.attention)), -share_of_limit(row), row) for row in volumetric]
+    measured.sort(key=lambda ranked_row: (*ranked_row[:2], ranked_row[2].machine, ranked_row[2].parameter))
     noticed = None
     if request.weekly_looks:
         # Loaded where it is asked for: the histories of all machines, which the table needs none of.
@@ -144,10 +153,10 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
         attention={
-            label: int((cells.kind == number).sum()) + sum(row.attention is label for row in volumetric)
+            label: int((ranking.kind == number).sum()) + sum(row.attention is label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
-        table=_shown(db, [row for row, _ in measured[:most]]),
+        table=_shown(db, [row for _, _, row in measured[:most]]),
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
@@ -216,7 +225,7 @@ def _cells_of(db: Database, model: str | None) -> _Cells:
     q_values = {
         test: control_false_discoveries(p_values, rate=RATE).q_value for test, p_values in tests.items()
     }
-    return _Cells(sums, cells, drift, q_values, limit, *ranked(sums, cells, drift, q_values["drift"], limit))
+    return _Cells(sums, cells, drift, q_values, limit, ranked(sums, cells, drift, q_values["drift"], limit))
 
 
 def _date(days: float) -> str | None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from monitor.records import Array
+from monitor.statistics import control_false_discoveries
 from monitor.statistics.days.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, ROUNDING, Blocks
 from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
 from monitor.statistics.sufficient import (
@@ -34,6 +36,8 @@ DAYS_OVER_RUNS = 3.0
 FEWEST_DAYS = 5
 #: The latest day stands out where it lies so many standard deviations of the days from their mean, with so many days.
 STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
+#: Where a latest day comes in the order of the classes that chance lets stand out among so many rows.
+BEHIND_DRIFTS = 3.5
 
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
@@ -116,15 +120,21 @@ def _level(sums: FleetSums, drift: CellDrift) -> Array:
     return np.asarray(sums.origin + sums.sum_m / sums.groups + drift.slope * ahead)
 
 
-def ranked(
-    sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array
-) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Class of each cell (0 is the most urgent), its measure within the class (larger first), years to the limit."""
-    latest = sums.origin + sums.latest
-    share = np.abs(latest) / limit
-    per_year = drift.slope * DAYS_PER_YEAR
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """How urgent each cell is: its class ``kind`` (c,), 0 the most urgent; ``urgency`` (c,) by which classes are
+    sorted, smaller first; its ``measure`` within that (c,), larger first; ``years`` to the limit (c,)."""
+
+    kind: npt.NDArray[np.int64]
+    urgency: Array
+    measure: Array
+    years: Array
+
+
+def _latest_day(sums: FleetSums, cells: CellTests) -> tuple[Array, Array]:
+    """How many standard deviations of the other days the latest one lies from their mean (c,), NaN of few days; and
+    the p-value of that (c,), by Student's t distribution with the degrees of freedom of those days."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
         # Against the other days: the latest one is taken out of their mean.
         k = sums.groups
         others = (sums.sum_m - sums.latest) / (k - 1.0)
@@ -134,18 +144,31 @@ def ranked(
         fewer = 1.0 / sums.latest_runs - (k - 1.0) / (sums.runs - sums.latest_runs)
         sd = np.sqrt(variance + np.nan_to_num(cells.sd_pooled) ** 2 * np.maximum(fewer, 0.0))
         z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
-        z = np.where(np.abs(sums.latest - others) <= ROUNDING * np.abs(latest), 0.0, z)
+        latest = np.abs(sums.origin + sums.latest)
+        z = np.where(np.abs(sums.latest - others) <= ROUNDING * latest, 0.0, z)
+    return z, 2.0 * scipy.special.stdtr(np.maximum(k - 2.0, 1.0), -z)
+
+
+def ranked(sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array) -> Ranking:
+    """Rank the cells. A latest day that chance alone lets stand out among as many rows (false discoveries above
+    ``RATE``) comes behind the drifts, which chance does not make."""
+    share = np.abs(sums.origin + sums.latest) / limit
+    per_year = drift.slope * DAYS_PER_YEAR
+    with np.errstate(divide="ignore", invalid="ignore"):
+        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
         ratio = cells.between / cells.sd_pooled
+    z, p_value = _latest_day(sums, cells)
+    by_chance = ~(control_false_discoveries(p_value, rate=RATE).q_value < RATE)
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
     kind = np.where(sums.groups < 2.0, 6, 5)
     measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
     for number, holds, size in (
         (4, ratio > DAYS_OVER_RUNS, ratio),
         (3, drifting, drift.steepness),
-        (2, z > STANDS_OUT, z),
+        (2, (z > STANDS_OUT) & ~(drifting & by_chance), z),
         (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
         (0, share >= 1.0, share),
     ):
         mask = np.asarray(holds, dtype=np.bool_)
         kind[mask], measure[mask] = number, np.nan_to_num(size)[mask]
-    return kind, measure, years
+    return Ranking(kind, np.where((kind == 2) & by_chance, BEHIND_DRIFTS, kind), measure, years)

@@ -50,7 +50,9 @@ from monitor.workflow.health.runs import campaign_span, first_run, past_runs
 from monitor.workflow.health.task import Task, TaskResult
 from monitor.workflow.health.verdict import (
     conformity_of,
+    drifting_named,
     drifting_to_limit,
+    drifting_unjudged,
     due_by_drift,
     factor_of,
     imports_refused,
@@ -187,12 +189,17 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     can_be = not isinstance(method_named(last.method).uncertainty, Unable)
     # A campaign whose identification is refused has no numbers, whatever a robust fit of one run made of it.
     evaluated = (stated is not None and last.campaign not in history.unidentified) or not can_be
-    state = state_of(judged, noted, explanation, quality, past.options.risk, evaluated=evaluated)
+    unjudged = drifting_unjudged(parameters)
+    state = state_of(
+        judged, noted, explanation, quality, past.options.risk, evaluated=evaluated, drifts=bool(unjudged)
+    )
+    error_map = stated_map(results.map, limit_um, beyond)
     check = next_check(state, drifts, limits, week)
     due = due_by_drift(state, check)
+    drifting = drifting_named(drifting_to_limit(state, parameters, error_map, due), unjudged)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
-        changed=new_this_week(noted, explanation, quality, drifting_to_limit(state, parameters, due)),
+        changed=new_this_week(noted, explanation, quality, drifting),
         since=since_when(state, parameters, noted, measured.span.first), probability_out=judged.any,
         next_check=check,
         run=_named(last),
@@ -202,7 +209,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
             explanation, results.versions, measured.span, unchanged, _refuted_p(history, measured),
         ),
         quality=quality,
-        map=stated_map(results.map, limit_um, beyond), due=due,
+        map=error_map, due=due,
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import scipy
 
-from monitor.reporting.health.records import PoseError, VolumetricMap
+from monitor.reporting.health.records import MapShare, PoseError, VolumetricMap
 from monitor.reporting.health.sentences import Pose, Position, Region
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
@@ -44,4 +44,13 @@ def stated_map(
         p=answer.p,
         limit_um=limit_um,
         probability_out=probability_out,
+        by_parameter=_shares(answer),
     )
+
+
+def _shares(answer: VolumetricAnswer) -> tuple[MapShare, ...] | None:
+    """What each parameter adds to the worst error, the largest first; None in a map that was stored without."""
+    shares = answer.worst.by_parameter_um
+    if shares is None:
+        return None
+    return tuple(MapShare(name, shares[name]) for name in sorted(shares, key=lambda name: -shares[name]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from monitor.documents import Said
 from monitor.records import VOLUMETRIC, Verdict
-from monitor.reporting.health.answers import DRIFT_P
+from monitor.reporting.health.concern import DRIFT_P, drifting_without_limit, largest_shares, volumetric_binds
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
@@ -20,6 +20,7 @@ from monitor.reporting.health.records import (
     ParameterHealth,
     RefusedImport,
     State,
+    VolumetricMap,
 )
 from monitor.reporting.health.sentences import (
     CheckKind,
@@ -31,6 +32,7 @@ from monitor.reporting.health.sentences import (
     NextCheck,
     NoFactor,
 )
+from monitor.statistics import control_false_discoveries
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.weeks import Week
@@ -41,6 +43,8 @@ from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 #: So many sentences of a week are named one by one.
 MOST_NAMED = 3
+#: False discovery rate of drifts without a tolerance on one machine: that of changes (``docs/statistics.md``).
+DRIFTING = 0.01
 
 
 @dataclass(frozen=True)
@@ -129,16 +133,55 @@ def due_by_drift(state: State, check: NextCheck) -> str | None:
 
 
 def drifting_to_limit(
-    state: State, parameters: Sequence[ParameterHealth], due: str | None
+    state: State, parameters: Sequence[ParameterHealth], error_map: VolumetricMap | None, due: str | None
 ) -> tuple[Drifting, ...]:
-    """The drift of the parameter that makes the state of a machine, where it is not by chance; else nothing."""
+    """The drifts that make the state of a machine, where they are not by chance; else nothing.
+
+    That of the parameter which is out of tolerance or due; of a volumetric error those of what adds most to it.
+    """
     if due is None and state not in (State.OUT_OF_TOLERANCE, State.MAY_BE_OUT_OF_TOLERANCE):
         return ()
+    if due is None and error_map is not None and volumetric_binds(state, parameters, error_map):
+        by_name = {each.name: each for each in parameters}
+        names = [share.parameter for share in largest_shares(error_map)]
+        return tuple(
+            _drifting(by_name[name]) for name in names if name in by_name and _is_seen(by_name[name])
+        )
     judged = [each for each in parameters if each.name == due or (due is None and each.probability_out)]
     worst = max(judged, key=lambda each: each.probability_out or 0.0, default=None)
-    if worst is None or worst.drift is None or worst.drift.p_value >= DRIFT_P:
+    return () if worst is None or not _is_seen(worst) else (_drifting(worst),)
+
+
+def drifting_unjudged(parameters: Sequence[ParameterHealth]) -> tuple[Drifting, ...]:
+    """The drifts that no tolerance judges and that are beyond chance, the surest first.
+
+    False discoveries among all drifts of the machine are controlled at ``DRIFTING``: of a machine on which nothing
+    drifts one is named with that probability, as for changes.
+    """
+    p_values = [each.drift.p_value for each in parameters if each.drift is not None]
+    if not p_values:
         return ()
-    return (Drifting(worst.name, worst.drift.per_year, worst.drift.u_per_year, worst.unit),)
+    q_value = control_false_discoveries(np.array(p_values), rate=DRIFTING).q_value
+    q_of = dict(zip((each.name for each in parameters if each.drift is not None), q_value, strict=True))
+    return tuple(_drifting(each) for each in drifting_without_limit(parameters) if q_of[each.name] < DRIFTING)
+
+
+def drifting_named(to_limit: tuple[Drifting, ...], unjudged: tuple[Drifting, ...]) -> tuple[Drifting, ...]:
+    """Return the drifts that are named of a machine: those that make its state, then the surest that nothing judges."""
+    return to_limit + tuple(drifting for drifting in unjudged if drifting not in to_limit)[:MOST_NAMED]
+
+
+def _is_seen(parameter: ParameterHealth) -> bool:
+    """Whether a parameter has a drift that is not by chance."""
+    return parameter.drift is not None and parameter.drift.p_value < DRIFT_P
+
+
+def _drifting(parameter: ParameterHealth) -> Drifting:
+    drift = parameter.drift
+    assert drift is not None
+    return Drifting(
+        parameter.name, drift.per_year, drift.u_per_year, parameter.unit, bool(drift.season_not_told)
+    )
 
 
 def imports_refused(refused: Sequence[RefusedImport]) -> tuple[ImportsRefused, ...]:
@@ -151,13 +194,16 @@ def since_when(
     state: State, parameters: Sequence[ParameterHealth], noted: Sequence[Change], compared: datetime
 ) -> datetime | None:
     """Since when the machine is in this state: beyond a tolerance, another one than before, or not explained by the
-    model, which then is so from the first run ``compared`` with it."""
+    model, which then is so from the first run ``compared`` with it; drifting, from the first run that shows it."""
     beyond = [parameter.out_since for parameter in parameters if parameter.out_since is not None]
     if state in ALARMS:
         # Of the volumetric error there is no value run by run: no day is better than a wrong one.
         return min(beyond, default=None)
     if state is State.MODEL_FAILS:
         return compared
+    if state is State.DRIFTS:
+        surest = drifting_without_limit(parameters)[0].drift
+        return None if surest is None else surest.since
     changed = [change for change in noted if change.kind is ChangeKind.CHANGE]
     if state is State.CHANGED:
         return min(change.at for change in changed if change.this_week)
@@ -172,8 +218,12 @@ def state_of(
     risk: float,
     *,
     evaluated: bool,
+    drifts: bool = False,
 ) -> State:
-    """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives."""
+    """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives.
+
+    ``drifts``: whether a parameter without a tolerance drifts.
+    """
     if judged.any is not None and max(judged.single.values()) > 0.5:
         return State.OUT_OF_TOLERANCE
     if judged.any is not None and judged.any > risk:
@@ -184,6 +234,8 @@ def state_of(
         return State.CHANGED
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
         return State.MODEL_FAILS
+    if drifts:
+        return State.DRIFTS
     if quality.suspect:
         return State.SUSPECT_DATA
     return State.IN_TOLERANCE if judged.every_has_one else State.NO_CHANGE_SEEN

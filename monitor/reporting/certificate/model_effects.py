@@ -1,0 +1,52 @@
+"""Prints the values of the effects that were added to the model of a certificate: its results hold beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from monitor.reporting.certificate.model_effect import ModelEffect
+from monitor.reporting.certificate.tables import Number, aligned
+from monitor.reporting.numbers import round_result, round_uncertainty
+from monitor.reporting.symbols import describe
+from monitor.reporting.texts import Texts
+
+
+@dataclass(frozen=True)
+class PrintedEffects:
+    """The rows (symbol, words, (value, u), unit) of the effects, what they are, and those without a value."""
+
+    rows: tuple[tuple[str, str, tuple[Number, Number], str], ...]
+    explained: Markup
+    unknown: Markup
+
+
+def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> PrintedEffects | None:
+    """What the page says of the effects; None where the model has none, or the result is of an earlier version."""
+    if not effects:
+        return None
+    lines: list[tuple[str, str, float, float, str]] = []
+    for effect in effects:
+        if effect.value is None or effect.u is None:
+            continue
+        lines.append((effect.name, describe(effect.name, texts), effect.value, effect.u, effect.unit))
+        if effect.reversal_value is not None and effect.u_reversal is not None:
+            meaning = texts("page.effect_reversal")
+            lines.append((effect.name, meaning, effect.reversal_value, effect.u_reversal, effect.unit))
+    with_value = [effect for effect in effects if effect.value is not None]
+    unknown = [effect.name for effect in effects if effect.value is None]
+    values = aligned(
+        [texts.number(round_result(value, u).estimate) for _, _, value, u, _ in lines], texts.decimal_sign
+    )
+    uncertainties = aligned([texts.number(round_uncertainty(u)) for *_, u, _ in lines], texts.decimal_sign)
+    return PrintedEffects(
+        tuple(
+            (name, meaning, (value, u), unit)
+            for (name, meaning, _, _, unit), value, u in zip(lines, values, uncertainties, strict=True)
+        ),
+        texts.markup("page.effects_explained", runs=with_value[0].runs, days=with_value[0].days)
+        if with_value
+        else Markup(""),
+        texts.markup("page.effects_unknown", effects=", ".join(unknown)) if unknown else Markup(""),
+    )
