@@ -142,6 +142,9 @@ def test_who_is_killed_or_stopped_while_waiting_keeps_nobody_out(
             with turn_to_write(str(path), Patience()):
                 until(lambda: last_ticket(str(path), tickets._WRITERS) > tickets._WRITERS)
                 os.kill(ended.pid, end)
+                if end == signal.SIGKILL:
+                    # Until it is gone its ticket counts, and the next one gets the same number.
+                    ended.wait()
                 waiting = Waiting(path)
                 waiting.writer("the next")
             assert waiting.end() == ["the next"]
