@@ -32,10 +32,10 @@ def too_late(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Ticket]]:
     "address",
     [
         f"/campaign?name={CAMPAIGN}",
-        f"/model?campaign={CAMPAIGN}",
+        pytest.param(f"/model?campaign={CAMPAIGN}", marks=pytest.mark.slow),
         f"/map?campaign={CAMPAIGN}",
         f"/plan?campaign={CAMPAIGN}",
-        "/reports?week={week}",
+        pytest.param("/reports?week={week}", marks=pytest.mark.slow),
         "/machine?name={machine}&parameter={parameter}",
         "/machine?name={machine}&every=1",
         "/",

@@ -72,6 +72,7 @@ def _named(rng: np.random.Generator, parameters: int, drift: float) -> list[str]
     return [each.parameter for each in drifting_unjudged(histories)]
 
 
+@pytest.mark.slow
 def test_a_machine_on_which_nothing_drifts_is_rarely_said_to(seeds) -> None:
     """At 1 % of machines of 13 parameters, as changes are; docs/reports-and-certificates.md has the rates over 500."""
     machines = seeds(500, 25)
@@ -104,6 +105,7 @@ def table(tmp_path_factory: pytest.TempPathFactory):
     return {row.machine: row for row in rows}
 
 
+@pytest.mark.slow
 def test_the_fleet_ranks_a_drift_before_a_day_that_chance_makes(table) -> None:
     ranks = [table[name].rank for name in ("Crashed", "Drifting", "Chance")]
     assert ranks == [1, 2, 3]
