@@ -215,15 +215,18 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         hint = did_you_mean(head.verb, VERBS)
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(
-        db=head.db, wait=head.wait, server=head.server, server_token=head.server_token
-    )
     try:
         # People write options before, between and behind the other words.
-        options = parser.parse_intermixed_args(head.rest, database)
+        options = parser.parse_intermixed_args(head.rest)
     except TypeError:
         # A verb with verbs of its own cannot be read so.
-        options = parser.parse_args(head.rest, database)
+        options = parser.parse_args(head.rest)
+    for name in ("db", "wait", "server", "server_token"):
+        if name in options and name in first.typed:
+            option = f"--{name.replace('_', '-')}"
+            first.error(f"argument {option}: one value is taken, a second one was typed behind `{head.verb}`")
+        if name not in options:
+            setattr(options, name, getattr(head, name))
     if not hasattr(options, "run"):
         options.run = run
     options.json, options.quiet = options.json or head.json, options.quiet or head.quiet
