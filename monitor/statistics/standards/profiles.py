@@ -28,8 +28,9 @@ LEAST_CUTTER = 0.2
 PLANE, LEAST_FACE = 5e-3, 1.0
 #: Steps until the part lies where it agrees best, each quadratic.
 MOST_STEPS, SETTLED = 30, 1e-8
-#: Unknowns of which less than this part shows are left where they are.
-SEPARATED = 1e-6
+#: Moves of the part that move its walls by less than this part of others along their normals are left out: of a line in
+#: a plane the two tilts, which show by what the points lie out of that plane alone.
+SEPARATED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -82,10 +83,10 @@ def profile_of(measured: Array, nominal: Array, axes: Array) -> Profile | None:
         return None  # the tool plunges
     outward = side / length[:, None]
     moved, radius = _moved(measured, nominal, outward, measured.mean(axis=0))
-    if abs(radius) < LEAST_CUTTER:
-        return _face(measured, nominal, axes)
     if _turning(along, axes) < LEAST_TURN:
         return None
+    if abs(radius) < LEAST_CUTTER:
+        return _face(measured, nominal, axes)
     middle = nominal.mean(axis=0)
     for _ in range(MOST_STEPS):
         # From here on by the points themselves: tangents of a coarse path are chords.
@@ -95,8 +96,7 @@ def profile_of(measured: Array, nominal: Array, axes: Array) -> Profile | None:
         if distance.min() < 0.1 * LEAST_CUTTER:
             return None
         outward = across / distance[:, None]
-        columns = np.column_stack([outward, np.cross(moved - middle, outward), -np.ones(len(moved))])
-        step = _solved(columns, distance - distance.mean())
+        step = _step(outward, moved - middle, distance - distance.mean())
         moved = _turned(moved - middle, -step[3:6]) + middle - step[:3]
         if np.abs(step[:3]).max() + np.abs(step[3:6]).max() * np.abs(moved - middle).max() < SETTLED:
             break
@@ -120,9 +120,7 @@ def _face(measured: Array, nominal: Array, axes: Array) -> Profile | None:
 
 
 def _profile(outward: Array, about: Array, distance: Array, radius: float) -> Profile:
-    columns = np.column_stack([outward, np.cross(about, outward), np.ones(len(about))])
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
-    basis, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    basis, strength, _ = np.linalg.svd(_columns(outward, about) / _scale(about), full_matrices=False)
     basis = basis[:, strength > SEPARATED * strength[0]]
     return Profile(distance - basis @ (basis.T @ distance), outward, basis, radius)
 
@@ -149,17 +147,28 @@ def _moved(measured: Array, nominal: Array, outward: Array, middle: Array) -> tu
     with its sign."""
     moved, radius = measured, 0.0
     for _ in range(MOST_STEPS):
-        columns = np.column_stack([outward, np.cross(moved - middle, outward), -np.ones(len(moved))])
-        step = _solved(columns, np.sum((moved - nominal) * outward, axis=1))
+        step = _step(outward, moved - middle, np.sum((moved - nominal) * outward, axis=1))
         moved, radius = _turned(moved - middle, -step[3:6]) + middle - step[:3], float(step[6])
         if np.abs(step[:6]).max() < SETTLED:
             break
     return moved, radius
 
 
-def _solved(columns: Array, right: Array) -> Array:
-    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
-    return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=SEPARATED)[0] / scale)
+def _columns(outward: Array, about: Array) -> Array:
+    """What three shifts, three turns about the middle of points ``about`` (n, 3) and a radius do (n, 7)."""
+    return np.column_stack([outward, np.cross(about, outward), -np.ones(len(about))])
+
+
+def _scale(about: Array) -> Array:
+    """The size (7,) of each unknown that moves points by some millimetre."""
+    size = float(np.linalg.norm(about, axis=1).max())
+    return np.array([1.0, 1.0, 1.0, size, size, size, 1.0])
+
+
+def _step(outward: Array, about: Array, right: Array) -> Array:
+    """The unknowns (7,) that make up ``right`` (n,) mm."""
+    scale = _scale(about)
+    return np.asarray(np.linalg.lstsq(_columns(outward, about) / scale, right, rcond=SEPARATED)[0] / scale)
 
 
 def _turned(points: Array, turn: Array) -> Array:
