@@ -18,7 +18,7 @@ from monitor.methods.chain.least_squares import Linearisation, Solution, elimina
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
-from monitor.methods.instruments.contradiction import contradiction, displaced_work_points
+from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
 from monitor.methods.instruments.first_guess import first_guess, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
@@ -149,12 +149,8 @@ class InstrumentProblem(ChainProblem):
 
     @property
     def unsettled(self) -> str:
-        """Bars that kept one direction: a centre that is stated some millimetres wrong cannot be mended then."""
-        return "".join(
-            f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
-            "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
-            for name in self.bars_of_one_direction
-        )
+        """Lasers that read something else than the travel, and bars that kept one direction."""
+        return unsettled(self.parts, self.bars_of_one_direction)
 
     @property
     def largest_error(self) -> float:
