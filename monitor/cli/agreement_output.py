@@ -22,7 +22,26 @@ def agreement_line(pair: AgreementPair) -> str:
     subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
     if not pair.disagree:
         return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
-    return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
+    return (
+        f"{subject}{_apart(pair.days_apart)} disagree in {', '.join(pair.disagree)}{number}{_meanwhile(pair)}"
+    )
+
+
+def _apart(days: float | None) -> str:
+    """How many days lie between two measurements; nothing of the same day."""
+    return f", {_days(days)} apart," if days is not None and round(abs(days)) >= 1 else ""
+
+
+def _meanwhile(pair: AgreementPair) -> str:
+    """What a difference of two days holds besides that of the methods."""
+    if not _apart(pair.days_apart):
+        return ""
+    return "; what the machine changed meanwhile is in the difference: measure with both on one day to tell them apart"
+
+
+def _days(days: float) -> str:
+    count = round(abs(days))
+    return f"{count} day{'s' if count != 1 else ''}"
 
 
 def _moved(pair: AgreementPair) -> str:

@@ -87,7 +87,8 @@ class ParameterAgreement:
 class AgreementPair:
     """Two results with E_n of every parameter that both have; ``disagree`` names those beyond their uncertainties.
 
-    Two ``methods``; or one ``method`` before and after an ``event``.
+    Two ``methods``, of which the second was measured ``days_apart`` after the first (before it where negative); or one
+    ``method`` before and after an ``event``.
     """
 
     kind: PairKind
@@ -96,6 +97,7 @@ class AgreementPair:
     description: str | None = field(default=None, metadata=OMITTED)
     method: str | None = field(default=None, metadata=OMITTED)
     campaigns: tuple[str, str]
+    days_apart: float | None = field(default=None, metadata=OMITTED)
     parameters: Mapping[str, ParameterAgreement]
     disagree: tuple[str, ...]
 
@@ -134,16 +136,17 @@ def agreement(
 
 def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Iterator[_Comparison]:
     latest: dict[str, str] = {}
-    for campaign, method in zip(history.campaign.tolist(), history.measured_by.tolist(), strict=True):
-        latest[method] = campaign  # runs are in the order of time
-    for first, second in combinations(latest, 2):
+    seconds, last = history.seconds, {}
+    runs = zip(history.campaign.tolist(), history.measured_by.tolist(), seconds.tolist(), strict=True)
+    for campaign, method, second in runs:
+        latest[method], last[method] = campaign, second  # runs are in the order of time
+    for first, other in combinations(latest, 2):
         yield _Comparison(
             AgreementPair(
-                kind=PairKind.METHODS, methods=(first, second), campaigns=(latest[first], latest[second]),
-                parameters={}, disagree=(),
+                kind=PairKind.METHODS, methods=(first, other), campaigns=(latest[first], latest[other]),
+                days_apart=(last[other] - last[first]) / SECONDS_PER_DAY, parameters={}, disagree=(),
             )
         )  # fmt: skip
-    seconds = history.seconds
     moments = np.sort([event.at.timestamp() for event in events])
     for event in events:
         for method in latest:
