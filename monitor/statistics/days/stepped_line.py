@@ -152,13 +152,18 @@ def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool)
     return min(open_, key=lambda line: abs(line.step) / line.u)
 
 
-def moves(campaigns: Campaigns, before: int, after: int) -> tuple[float, int]:
+def moves(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> tuple[float, int]:
     """Return the largest difference of two campaigns that follow each other in one era, and how many there are.
 
-    Those nearer to each other than the two sides count for as much more time as lies between the sides.
+    Those nearer to each other than the two sides count for as much more time as lies between the sides: between the
+    means of their campaigns with ``levels``, else between the two campaigns.
     """
     inside = _near(campaigns, before, after)
-    gap = float(campaigns.t[after] - campaigns.t[before])
+    ends = [np.array([end]) for end in (before, after)]
+    if levels:
+        ends = [np.flatnonzero(inside & (campaigns.piece == campaigns.piece[end])) for end in (before, after)]
+    first, second = (float(campaigns.t[side].mean()) for side in ends)
+    gap = second - first
     together = (
         inside[1:] & inside[:-1] & (np.diff(campaigns.era) == 0) & (np.diff(campaigns.t) > 0.0)
     ).nonzero()[0]
