@@ -94,11 +94,13 @@ def test_fewer_campaigns_than_lines_need_have_none_and_neighbours_say_how_far_th
     campaigns = of_means([0.0, 4.0, 20.0, 21.0], [0.0, 30.0, 90.0, 120.0], [0, 0, 1, 1])
     assert stepped_line(campaigns, 1, 2, levels=True) is None
     # The event lies between campaigns twice as far apart as their neighbours are.
-    assert moves(campaigns, 1, 2) == (8.0, 2)
-    assert moves(of_means([0.0, 4.0], [0.0, 30.0], [0, 1]), 0, 1) == (0.0, 0)
+    assert moves(campaigns, 1, 2, levels=False) == (8.0, 2)
+    assert moves(of_means([0.0, 4.0], [0.0, 30.0], [0, 1]), 0, 1, levels=False) == (0.0, 0)
+    # The middles of both sides are three times as far apart.
+    assert moves(campaigns, 1, 2, levels=True) == (12.0, 2)
     # A change that somebody found is a move without an event.
     found = replace(campaigns, piece=np.array([0, 1, 2, 2]))
-    assert moves(found, 1, 2) == (8.0, 2)
+    assert moves(found, 1, 2, levels=False) == (8.0, 2)
 
 
 def test_means_of_campaigns_are_means_of_means_of_days_and_an_event_cuts_one_in_two():

@@ -65,20 +65,23 @@ def campaigns_of(
 ) -> Campaigns:
     """Return the means of the means of days of each campaign, from runs (n,) with the labels of theirs; without ``era``
     the pieces are between events alone."""
-    labels = [label_groups(names, len(values))[1] for names in (campaign, days)]
-    parts, part = np.unique(np.column_stack([piece, labels[0]]), axis=0, return_inverse=True)
-    day, of_day = np.unique(np.column_stack([part.ravel(), labels[1]]), axis=0, return_inverse=True)
-    runs = np.bincount(of_day.ravel())
-    by_day, day_at = (
+    by_campaign, by_day = (label_groups(labels, len(values))[1] for labels in (campaign, days))
+    parts, part = np.unique(np.column_stack([piece, by_campaign]), axis=0, return_inverse=True)
+    # Sorted by part first, so that the days of one follow each other.
+    day, of_day = np.unique(np.column_stack([part.ravel(), by_day]), axis=0, return_inverse=True)
+    runs, count = np.bincount(of_day.ravel()), np.bincount(day[:, 0])
+    mean_of_day, day_at = (
         np.bincount(of_day.ravel(), column - column[0]) / runs + column[0] for column in (values, t)
     )
-    days_in = [day[:, 0] == number for number in range(len(parts))]
-    mean, at = (np.array([column[inside].mean() for inside in days_in]) for column in (by_day, day_at))
+    mean, at = (
+        np.bincount(day[:, 0], column - column[0]) / count + column[0] for column in (mean_of_day, day_at)
+    )
     first = np.unique(part.ravel(), return_index=True)[1]
     era = parts[:, 0] if era is None else era[first]
     order = np.lexsort((at, parts[:, 0]))
+    of_days = np.split(mean_of_day, np.cumsum(count)[:-1])
     return Campaigns(
-        mean[order], at[order], parts[order, 0], era[order], tuple(by_day[days_in[index]] for index in order)
+        mean[order], at[order], parts[order, 0], era[order], tuple(of_days[index] for index in order)
     )
 
 
@@ -149,13 +152,18 @@ def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool)
     return min(open_, key=lambda line: abs(line.step) / line.u)
 
 
-def moves(campaigns: Campaigns, before: int, after: int) -> tuple[float, int]:
+def moves(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> tuple[float, int]:
     """Return the largest difference of two campaigns that follow each other in one era, and how many there are.
 
-    Those nearer to each other than the two sides count for as much more time as lies between the sides.
+    Those nearer to each other than the two sides count for as much more time as lies between the sides: between the
+    means of their campaigns with ``levels``, else between the two campaigns.
     """
     inside = _near(campaigns, before, after)
-    gap = float(campaigns.t[after] - campaigns.t[before])
+    ends = [np.array([end]) for end in (before, after)]
+    if levels:
+        ends = [np.flatnonzero(inside & (campaigns.piece == campaigns.piece[end])) for end in (before, after)]
+    first, second = (float(campaigns.t[side].mean()) for side in ends)
+    gap = second - first
     together = (
         inside[1:] & inside[:-1] & (np.diff(campaigns.era) == 0) & (np.diff(campaigns.t) > 0.0)
     ).nonzero()[0]
