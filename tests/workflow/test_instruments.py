@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import scipy
 
-from monitor.exceptions import DataError, NotFoundError
 from monitor.cli.agreement_output import agreement_line
+from monitor.exceptions import DataError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.compare import compare

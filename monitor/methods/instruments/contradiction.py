@@ -155,8 +155,8 @@ def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
         if as_stated > LEAST_POINT and remaining < LEFT_BY_POINT * as_stated:
             point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
             yield (
-                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where the "
-                f"stated one leaves {as_stated:.2g} mm"
+                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where "
+                f"the stated one leaves {as_stated:.2g} mm"
             )
 
 
