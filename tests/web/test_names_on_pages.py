@@ -9,7 +9,9 @@ from typing import Any
 
 from tests.web.test_pages import looked_at
 
-_ROW = re.compile(r'data-title="Parameter">(?:<a [^>]*>)?([^<]+?)(?:</a>)? <span class="quiet">([^<]+)</span>')
+_ROW = re.compile(
+    r'data-title="Parameter">(?:<a [^>]*>)?([^<]+?)(?:</a>)? <span class="quiet">([^<]+)</span>'
+)
 _OPTION = re.compile(r'<option value="([^"]+)"[^>]*>\1 – ([^<]+)</option>')
 _UNIT = re.compile(r", (µm|mm|µrad|mrad|µm/m|1|µm/K|°)$")
 

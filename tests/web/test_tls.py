@@ -21,6 +21,7 @@ pytest.importorskip("fastapi", reason="the extra web is not installed")
 from monitor.web.sessions import COOKIE
 from monitor.web.users import add_user
 
+
 class Served:
     """The port of a server, the certificate that its clients trust, and the token of a viewer."""
 

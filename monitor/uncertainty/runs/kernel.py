@@ -27,7 +27,9 @@ from monitor.uncertainty.workers.interrupts import interrupts_kept
 #: Trials that are computed together, so that what they need stays in the first-level cache.
 LANES = 64
 #: What whoever waits for the first call of a process is told.
-FIRST_CALL = "the program of the trials is being made ready, which takes half a minute the first time on this machine"
+FIRST_CALL = (
+    "the program of the trials is being made ready, which takes half a minute the first time on this machine"
+)
 # Rows of the work space, each of LANES numbers: frame (9), origin (3), readings' directions (9), force (3),
 # moment (3), force times reading (9), readings (3), target (3), residual force (3), direction (3), amount,
 # component, sine, cosine.

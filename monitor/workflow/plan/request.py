@@ -60,7 +60,5 @@ class PlanRequest:
             else:
                 parts[-1] += letter
         if len(parts) != 2 or not all(part.strip() for part in parts):
-            raise InputError(
-                f"'{text}': name two effects with a comma, for example EBZ:poly2,EZZ:poly2"
-            )
+            raise InputError(f"'{text}': name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
         return parts[0].strip(), parts[1].strip()
