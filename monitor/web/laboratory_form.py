@@ -133,7 +133,10 @@ def box_of(key: str) -> list[str]:
 
 
 def laboratory_file(texts: Mapping[str, str]) -> str:
-    """Return the laboratory's file (TOML) that says what the form says. Raises InputError for a number or a day that is none."""
+    """Return the laboratory's file (TOML) that says what the form says.
+
+    Raises InputError for a number or a day that is none.
+    """
     lines: list[str] = []
     for section, keys in SECTIONS.items():
         for prefix in _prefixes(section):
