@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, ROUND_HALF_UP, ROUND_UP, Context, Decimal
-from typing import Literal
 
 from monitor.exceptions import DataError
 
@@ -26,8 +25,6 @@ _UNITY = Decimal("1e-9")
 _EXACT = Context(prec=700)
 MINUS = "\N{MINUS SIGN}"
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
-
-Direction = Literal["nearest", "up"]
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,8 @@ def decimal_of(value: float, what: str = "the number") -> Decimal:
     return Decimal(repr(float(value)))
 
 
-def round_uncertainty(uncertainty: float, digits: int = DIGITS, direction: Direction = "nearest") -> Decimal:
-    """Round an uncertainty to so many significant digits; ``up`` never makes it smaller.
+def round_uncertainty(uncertainty: float, digits: int = DIGITS) -> Decimal:
+    """Round an uncertainty to so many significant digits, never by more than ``LARGEST_LOSS`` downwards.
 
     Raises DataError where it is negative, zero (no digit is significant) or not finite, or digits below 1.
     """
@@ -55,7 +52,7 @@ def round_uncertainty(uncertainty: float, digits: int = DIGITS, direction: Direc
     exact = decimal_of(uncertainty, "an uncertainty")
     if exact <= 0:
         raise DataError(f"an uncertainty must be positive to be rounded, but is {uncertainty}")
-    rounded = _significant(exact, digits, ROUND_UP if direction == "up" else ROUND_HALF_UP)
+    rounded = _significant(exact, digits, ROUND_HALF_UP)
     if exact - rounded > LARGEST_LOSS * exact:
         rounded = _significant(exact, digits, ROUND_UP)
     return rounded
@@ -68,11 +65,9 @@ def round_to_place(value: float, reference: Decimal) -> Decimal:
     return abs(rounded) if rounded.is_zero() else rounded
 
 
-def round_result(
-    estimate: float, uncertainty: float, digits: int = DIGITS, direction: Direction = "nearest"
-) -> Rounded:
+def round_result(estimate: float, uncertainty: float, digits: int = DIGITS) -> Rounded:
     """Round an estimate at the place of the rounded uncertainty. Raises DataError as ``round_uncertainty``."""
-    rounded = round_uncertainty(uncertainty, digits, direction)
+    rounded = round_uncertainty(uncertainty, digits)
     return Rounded(round_to_place(estimate, rounded), rounded)
 
 

@@ -9,6 +9,7 @@ from functools import reduce
 from monitor.documents import OMITTED
 from monitor.refusal import Advice, AdviceKind, Reason, ReasonKind, Refusal
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
+from monitor.reporting.unknown_names import unknown_words
 
 #: So many places of one table are named one by one.
 MOST_PLACES = 3
@@ -43,6 +44,11 @@ def why_refused(refused: RefusedParameters, texts: Texts) -> str:
     return refused.why if refusal is None or texts.language == ENGLISH else refusal_sentence(refusal, texts)
 
 
+def printed_names(names: Sequence[str], texts: Texts) -> list[str]:
+    """Return the names of parameters and unknowns as they are printed."""
+    return [unknown_words(name, texts) for name in names]
+
+
 def refusal_sentence(refusal: Refusal, texts: Texts | None = None) -> str:
     """The reason of a refusal in a sentence without its full stop, in the language of ``texts`` (English without)."""
     say = texts or texts_of()
@@ -50,21 +56,21 @@ def refusal_sentence(refusal: Refusal, texts: Texts | None = None) -> str:
     if reason.kind is ReasonKind.NOT_SEPARATED:
         return _not_separated(parameters, reason, say)
     u = "" if reason.u is None else f"{reason.u:.2g}".replace(".", say.decimal_sign)
-    names = _joined(_unknowns(parameters, say), "both", say)
+    names = _joined(printed_names(parameters, say), "both", say)
     key, several = f"sentences.{reason.kind.value}", f"sentences.{reason.kind.value}_several"
     return say(
         several if len(reason.others) > 1 and several in say.sentences else key,
         names=names,
-        others=", ".join(_unknowns(_by_table(reason.others, say), say)),
+        others=", ".join(printed_names(_by_table(reason.others, say), say)),
         u=u,
         unit=reason.unit,
     )
 
 
 def _not_separated(parameters: tuple[str, ...], reason: Reason, say: Texts) -> str:
-    what = _joined(_unknowns(_by_table(parameters, say), say), "both", say)
+    what = _joined(printed_names(_by_table(parameters, say), say), "both", say)
     if reason.others:
-        others = ", ".join(_unknowns(reason.others, say))
+        others = ", ".join(printed_names(reason.others, say))
         what = say("sentences.apart_from", names=what, others=others)
     elif len(parameters) > 1:
         what = say("sentences.apart", names=what)
@@ -77,13 +83,15 @@ def _advice(advice: Advice, say: Texts) -> str:
     if advice.kind is AdviceKind.OWN_WORDS:
         return advice.text or ""
     key, several = f"sentences.{advice.kind.value}", f"sentences.{advice.kind.value}_several"
-    conditions = zip(advice.names, advice.meanings or (), strict=False)
+    # What a condition fixes is stored in English.
+    meanings = (advice.meanings or ()) if say.language == ENGLISH else ()
+    conditions = [f"{name} = 0 ({meaning})" for name, meaning in zip(advice.names, meanings, strict=False)]
     return say(
         several if len(advice.names) > 1 and several in say.sentences else key,
         names=", ".join(advice.names),
         joined=_joined(advice.names, "both", say),
         planes=_joined(advice.names, "planes", say),
-        conditions="; ".join(f"{name} = 0 ({meaning})" for name, meaning in conditions),
+        conditions="; ".join(conditions or [f"{name} = 0" for name in advice.names]),
         count=advice.count,
         run=advice.run,
     )
@@ -93,14 +101,6 @@ def _joined(names: Sequence[str], key: str, say: Texts) -> str:
     if not names:
         return ""
     return reduce(lambda first, second: say(f"sentences.{key}", first=first, second=second), names)
-
-
-def _unknowns(names: Sequence[str], say: Texts) -> list[str]:
-    """Names of unknowns as they are printed: the coordinates of the stylus tip, ``tip x``, in words."""
-    return [
-        say("sentences.tip", axis=name.removeprefix("tip ")) if name.startswith("tip ") else name
-        for name in names
-    ]
 
 
 def _by_table(names: Sequence[str], say: Texts) -> list[str]:

@@ -31,6 +31,8 @@ ess_cert_id_alg = sha256
 """
 #: Serial numbers of what the authority issues.
 SERIALS = {"laboratory": 21, "stamps": 22, "revoked": 23, "silent": 24}
+#: How long certificates are valid, those of others 30 days.
+_DAYS = {"root": 90, "stamps": 60}
 _MEDIA = {
     "ocsp": "application/ocsp-response",
     "tsa": "application/timestamp-reply",
@@ -77,7 +79,7 @@ class Authority:
             .public_key(own.public_key())
             .serial_number(serial)
             .not_valid_before(now - timedelta(days=1))
-            .not_valid_after(now + timedelta(days=30))
+            .not_valid_after(now + timedelta(days=_DAYS.get(name, 30)))
             .add_extension(x509.BasicConstraints(is_root, None), critical=True)
             .add_extension(x509.SubjectKeyIdentifier.from_public_key(own.public_key()), critical=False)
             .add_extension(

@@ -67,6 +67,38 @@ def test_en_319_142_b_lt_signer_and_stamp_are_judged_by_the_file_alone(
     later = check_signature(signed, authority.folder / "root.pem", datetime.now(UTC) + timedelta(days=3650))
     assert later.long_term == material
     assert "valid from" in later.faults[0]
+    assert later.judged_until is None
+
+
+def test_en_319_102_1_5_6_past_validation_a_stamp_proves_the_signature_until_its_own_certificate_ends(
+    page: bytes, signed: bytes, authority: Authority
+) -> None:
+    folder = authority.folder
+    now = datetime.now(UTC)
+    root = folder / "root.pem"
+    # The signer's certificate ends after 30 days, that of the time stamps after 60.
+    assert _day_of_end("laboratory", folder) < _day_of_end("stamps", folder)
+    assert check_signature(signed, root).judged_until == _day_of_end("stamps", folder)
+    between = check_signature(signed, root, now + timedelta(days=45))
+    assert (between.good, between.faults, between.signer_trusted) == (True, (), True)
+    beyond = check_signature(signed, root, now + timedelta(days=75))
+    assert (beyond.good, beyond.judged_until) == (False, None)
+    # Without material the authority need not say any more whether the signer's was revoked before.
+    plain = sign(page, FileKey(folder / "laboratory.p12"), f"{authority.address}/tsa")
+    assert check_signature(plain, root).judged_until == _day_of_end("laboratory", folder)
+    assert check_signature(plain, root, now + timedelta(days=45)).good is False
+    # Nobody named: the material is not judged, and proves nothing.
+    assert check_signature(signed).judged_until == _day_of_end("laboratory", folder)
+
+
+def _day_of_end(name: str, folder: Path) -> datetime:
+    """When a certificate ends, as OpenSSL reads it."""
+    said = (
+        _openssl("x509", "-in", folder / f"{name}.pem", "-noout", "-enddate")
+        .strip()
+        .removeprefix("notAfter=")
+    )
+    return datetime.strptime(said, "%b %d %H:%M:%S %Y %Z").replace(tzinfo=UTC)
 
 
 def test_openssl_reads_in_the_store_that_both_certificates_were_in_force(

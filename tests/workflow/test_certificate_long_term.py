@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -60,6 +62,10 @@ def test_verify_says_what_the_file_carries_and_whether_it_suffices(
     said = " ".join(capsys.readouterr().out.split())
     assert "long-term material: 3 certificates, 1 revocation lists, 1 answers (OCSP); by these alone" in said
     assert "certificate L-1 is genuine and valid" in said
+    # The stamp's certificate is valid for 60 days, the signer's for 30.
+    until = re.search(r"can be judged by the file alone until (\S+)", said)
+    assert until is not None
+    assert 58 <= (date.fromisoformat(until[1]) - date.today()).days <= 61
     assert main([*verify, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["long_term"] == {

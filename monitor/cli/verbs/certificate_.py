@@ -275,6 +275,8 @@ def _verify(options: Namespace) -> int:
         output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
     if answer.long_term is not None:
         output.say(f"           {_long_term(answer.long_term)}")
+    if answer.judged_until is not None:
+        output.say(f"           can be judged by the file alone until {answer.judged_until:%Y-%m-%d}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"

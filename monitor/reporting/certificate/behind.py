@@ -21,8 +21,8 @@ from monitor.reporting.texts import Texts
 
 #: Lines of the budget that stand side by side on a page.
 _ABREAST = 10
-#: A contribution below this part of u is written as 0: rounding of the solver.
-_NOTHING = 1e-9
+#: A contribution below this part of u is written as 0, as the page says: it is 5e-9 of u in a sum of squares.
+_NOTHING = 1e-4
 _UNKNOWN = "\N{EN DASH}"
 
 

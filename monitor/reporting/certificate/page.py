@@ -27,7 +27,7 @@ from monitor.reporting.certificate.tables import Row, conformity_rows, result_ro
 from monitor.reporting.certificate.volumetric import POINTS_FILE, printed_map
 from monitor.reporting.certificate.words import amendment, answer
 from monitor.reporting.numbers import written_factor, written_probability
-from monitor.reporting.refused import why_refused
+from monitor.reporting.refused import printed_names, why_refused
 from monitor.reporting.texts import Texts, texts_of
 
 
@@ -175,7 +175,9 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         machine_frame=printed_machine_frame(result.machine_frame, texts),
         refused=tuple(
             texts.markup(
-                "page.refused", parameters=", ".join(refusal.parameters), why=why_refused(refusal, texts)
+                "page.refused",
+                parameters=", ".join(printed_names(refusal.parameters, texts)),
+                why=why_refused(refusal, texts),
             )
             for refusal in result.refused
         ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import NamedTuple
 
 from monitor.reporting.certificate.record import ConformityStatement, ConformityVerdict
 from monitor.reporting.certificate.results import ResultSet
@@ -29,8 +30,7 @@ class Number:
     room: float
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One parameter as printed: estimate, standard and expanded uncertainty."""
 
     name: str

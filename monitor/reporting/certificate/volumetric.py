@@ -18,6 +18,7 @@ from monitor.reporting.numbers import (
 )
 from monitor.reporting.refused import why_refused
 from monitor.reporting.texts import Texts
+from monitor.units import MICROMETRE
 
 #: The file inside the PDF that holds every point of the grid.
 POINTS_FILE = "volumetric-error-{place}.csv"
@@ -25,11 +26,11 @@ POINTS_FILE = "volumetric-error-{place}.csv"
 
 @dataclass(frozen=True)
 class PrintedMap:
-    """A volumetric error as printed: rows of (quantity, where, value, u, U), all lengths in µm."""
+    """A volumetric error as printed: rows of (quantity, where, (value, u, U), unit)."""
 
     state: str
     expanded: Markup
-    rows: tuple[tuple[str, str, tuple[Number, ...]], ...]
+    rows: tuple[tuple[str, str, tuple[Number, ...], str], ...]
     explained: str
     left_out: str
 
@@ -77,7 +78,7 @@ def _tenths(value: float, texts: Texts) -> str:
     return texts.number(round_to_place(value, Decimal("0.1")))
 
 
-def _rows(volumetric: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, tuple[Number, ...]], ...]:
+def _rows(volumetric: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, tuple[Number, ...], str], ...]:
     lengths: list[tuple[str, Length]] = [
         ("page.map_largest", volumetric.largest),
         ("page.map_rms", volumetric.rms),
@@ -91,6 +92,11 @@ def _rows(volumetric: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, t
         columns[2].append(texts.number(rounded.uncertainty))
     numbers = zip(*(aligned(column, texts.decimal_sign) for column in columns), strict=True)
     return tuple(
-        (texts(key), place_words(length.at, texts) if length.at else texts("page.map_all"), row)
+        (
+            texts(key),
+            place_words(length.at, texts) if length.at else texts("page.map_all"),
+            row,
+            MICROMETRE.name,
+        )
         for (key, length), row in zip(lengths, numbers, strict=True)
     )

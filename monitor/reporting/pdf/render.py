@@ -27,7 +27,7 @@ from monitor.reporting.certificate.data import Attached, certificate_files
 from monitor.reporting.certificate.page import certificate_context
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.tables import LETTERS_PT
-from monitor.reporting.pdf.last_page import ends_early, filling_breaks, with_breaks_before
+from monitor.reporting.pdf.last_page import closeness_saves, ends_early, filling_breaks, with_breaks_before
 from monitor.reporting.pdf.layout_engine import (
     HTML,
     Attachment,
@@ -130,11 +130,13 @@ def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) 
     if not ends_early(document):
         return document
     count, choices = len(document.pages), filling_breaks(document)
-    if closer is not None:
+    if closer is not None and closeness_saves(document):
         del document
         document = laid_out(closer)
         if len(document.pages) < count and not ends_early(document):
             return document
+    else:
+        closer = None
     for names in choices:
         del document
         document = laid_out(with_breaks_before(html, names))
@@ -184,6 +186,7 @@ def certificate_pdf(
         moment=moment,
         extra_fonts=extra_fonts,
         attached=certificate_files(record, inputs, document),
+        closer=html.replace("<body ", '<body class="close" ', 1),
     )
 
 

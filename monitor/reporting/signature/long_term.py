@@ -9,11 +9,12 @@ both certificates were in force. By pyHanko, an optional extra.
 from __future__ import annotations
 
 from contextlib import AbstractAsyncContextManager, aclosing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
 
@@ -30,7 +31,8 @@ class LongTermMaterial:
 
     ``complete`` says whether by these alone signer and time stamp lead to trusted certificates that were in force at
     the time of the stamp; None where nobody was named as trusted, or by fingerprints alone. ``why_not`` is the first
-    reason against.
+    reason against. ``until`` is when the first of the certificates ends that the time stamp leads to: from then on it
+    proves nothing by itself. None where it is not complete.
     """
 
     certificates: int
@@ -38,6 +40,7 @@ class LongTermMaterial:
     answers: int
     complete: bool | None = None
     why_not: str = ""
+    until: datetime | None = field(default=None, metadata=OMITTED)
 
 
 def fetching_context(roots_file: Path) -> AbstractAsyncContextManager[Any]:
@@ -107,7 +110,17 @@ def material_in(
         (stamp is not None and stamp.trusted, f"the certificate of the time stamp: {_reason(stamp)}"),
     )
     faults = [fault for passed, fault in checks if not passed]
-    return LongTermMaterial(*counted, not faults, faults[0] if faults else "")
+    if faults:
+        return LongTermMaterial(*counted, False, faults[0])
+    return LongTermMaterial(*counted, True, until=_first_end(stamp))
+
+
+def _first_end(status: Any) -> datetime:
+    """Return when the first certificate of a judged one's path ends; its root is trusted by itself."""
+    path = status.validation_path
+    below_root = [] if path is None else list(path)[1:]
+    ends: list[datetime] = [certificate.not_valid_after for certificate in [status.signing_cert, *below_root]]
+    return min(ends)
 
 
 def _reason(status: Any) -> str:

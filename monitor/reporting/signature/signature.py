@@ -27,7 +27,9 @@ class SignatureFinding:
 
     ``stamped_at`` is when a time stamp authority saw it; None without a time stamp that fits the signature.
     ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such. ``long_term`` is the
-    material for later validation, None without any; what it lacks is no fault of the signature.
+    material for later validation, None without any; what it lacks is no fault of the signature. ``judged_until`` is
+    when the file ceases to prove by itself who signed it, None for a signature that is not good: the end of the
+    signer's certificate, or that of the time stamp's where the material suffices.
     """
 
     good: bool | None
@@ -36,6 +38,7 @@ class SignatureFinding:
     stamped_at: datetime | None = None
     signer_trusted: bool = False
     long_term: LongTermMaterial | None = None
+    judged_until: datetime | None = None
 
 
 def is_signed(pdf: bytes) -> bool:
@@ -49,7 +52,8 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     ``trusted`` is a file of trusted signers (``trust``); without one nothing is concluded about the signer beyond the
     name in the certificate, which whoever made the key chose. ``at`` (with an offset) is a time at which the
     signature existed, from another source than the signer: certificates end, and what was signed before stays signed.
-    Without it they have to be valid today (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence).
+    Without it they have to be valid today (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence),
+    unless the file's own time stamp and long-term material prove that it existed while they were.
     Never raises for the file's own faults: they are the finding. Raises InputError where pyHanko is not installed or
     ``trusted`` cannot be read.
     """
@@ -82,9 +86,10 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
         message = f"the file's signature cannot be read: {_message(error)}: altered"
         return SignatureFinding(False, None, (message,))
     faults = _faults_of_file(status, clean)
-    is_trusted = status.trusted or certificate.signer.sha256 in signers.fingerprints
+    proven_at = _proven_at(material, stamped_at, moment)
+    is_trusted = status.trusted or certificate.signer.sha256 in signers.fingerprints or proven_at is not None
     if trusted is not None:
-        faults += _faults_of_signer(is_trusted, certificate, moment)
+        faults += _faults_of_signer(is_trusted, certificate, proven_at or moment)
     if status.timestamp_validity is not None and stamped_at is None:
         faults.append("the time stamp does not fit the signature")
     good = not faults
@@ -95,6 +100,7 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
         stamped_at,
         good and trusted is not None and is_trusted,
         material,
+        _judged_until(material, certificate) if good else None,
     )
 
 
@@ -103,6 +109,20 @@ def _time_of_stamp(status: Any) -> datetime | None:
     stamp = status.timestamp_validity
     fits = stamp is not None and stamp.intact and stamp.valid
     return stamp.timestamp if fits else None
+
+
+def _proven_at(
+    material: LongTermMaterial | None, stamped_at: datetime | None, moment: datetime
+) -> datetime | None:
+    """Return the time of the stamp where it still proves, at a moment, that the signature existed then."""
+    if material is None or material.until is None or moment > material.until:
+        return None
+    return stamped_at
+
+
+def _judged_until(material: LongTermMaterial | None, certificate: _Certificate) -> datetime:
+    """Return when the file alone ceases to suffice: at the end of the stamp's certificate, else of the signer's."""
+    return certificate.last if material is None or material.until is None else material.until
 
 
 @dataclass(frozen=True)

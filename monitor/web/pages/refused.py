@@ -1,4 +1,4 @@
-"""Why a form was refused: at an address of its own with the way back to the form, or at the form as it was sent."""
+"""Why a form was refused: at an address of its own with the way back to the form, or at the form as filled in."""
 
 from __future__ import annotations
 

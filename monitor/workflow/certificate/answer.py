@@ -100,7 +100,8 @@ class VerificationAnswer:
     """Whether a file is a valid certificate of this database, by its ``verdict`` a genuine one; ``faults`` say why not.
 
     ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed; ``stamped_at``
-    when a time stamp authority saw the signature, ``long_term`` what the file carries to be judged by later.
+    when a time stamp authority saw the signature, ``long_term`` what the file carries to be judged by later,
+    ``judged_until`` when it ceases to prove by itself who signed it: from then on the record of the database does.
     """
 
     number: str | None
@@ -113,3 +114,4 @@ class VerificationAnswer:
     stamped_at: datetime | None = field(default=None, metadata=OMITTED)
     verdict: Verdict = Verdict.NOT_CONFIRMED
     long_term: LongTermMaterial | None = field(default=None, metadata=OMITTED)
+    judged_until: datetime | None = field(default=None, metadata=OMITTED)

@@ -61,6 +61,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         stamped_at=signature.stamped_at,
         verdict=_verdict(signature) if ok else Verdict.NOT_CONFIRMED,
         long_term=signature.long_term,
+        judged_until=signature.judged_until,
     )
 
 
