@@ -57,7 +57,7 @@ def volumetric_error(
     say(parent, "name", texts("dcc.map", state=volumetric.state), texts.language)
     printed = printed_map(volumetric, texts)
     results = _results(parent, record, printed.explained, texts, volumetric.state)
-    for length, (name, where, _) in zip(
+    for length, (name, where, *_) in zip(
         (volumetric.largest, volumetric.rms, volumetric.mean), printed.rows, strict=True
     ):
         element = add(results, "result")
