@@ -1,4 +1,4 @@
-"""Tells whoever waits for a computation how far it is: a share from 0 to 1.
+"""Tells whoever waits for a computation how far it is: a share from 0 to 1, or in words what is being done.
 
 A face that shows progress begins with ``listening``; a loop that can say how much is left tells it. Where nobody
 listens nothing is told, and nothing should be computed to be told: ``is_awaited`` says so.
@@ -14,14 +14,29 @@ _THREAD = threading.local()
 
 
 @contextmanager
-def listening(tell: Callable[[float], None]) -> Iterator[None]:
-    """Let ``tell`` hear how far what this thread does in the block is."""
-    outer = getattr(_THREAD, "tell", None)
-    _THREAD.tell = tell
+def listening(tell: Callable[[float], None], say: Callable[[str], None] | None = None) -> Iterator[None]:
+    """Let ``tell`` hear how far what this thread does in the block is, and ``say`` what it does where nobody knows how
+    far that is (None: whoever listens already hears that)."""
+    outer, outer_say = getattr(_THREAD, "tell", None), getattr(_THREAD, "say", None)
+    _THREAD.tell, _THREAD.say = tell, outer_say if say is None else say
     try:
         yield
     finally:
-        _THREAD.tell = outer
+        _THREAD.tell, _THREAD.say = outer, outer_say
+
+
+@contextmanager
+def saying(words: str) -> Iterator[None]:
+    """Say what the block does, once and of unknown length; empty words say that it is over."""
+    say: Callable[[str], None] | None = getattr(_THREAD, "say", None)
+    if say is None:
+        yield
+        return
+    say(words)
+    try:
+        yield
+    finally:
+        say("")
 
 
 @contextmanager

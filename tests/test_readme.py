@@ -152,6 +152,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_readme_examples_do_what_it_says(folder: Path) -> None:
     typed = examples(README.read_text(encoding="utf-8"))
     assert any(example.language == "console" for example in typed)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from monitor.api.pictures import Pictures
-from monitor.api.tables import main_table, shown
+from monitor.api.tables import as_html, as_text, main_table
 from monitor.documents import inlined_parts, to_document
 from monitor.exceptions import InputError
 
@@ -83,12 +83,12 @@ class Answer(Generic[Content]):
 
     def _text(self) -> str:
         try:
-            rows = shown(main_table(self.content))
+            rows = main_table(self.content)
         except InputError:
             return self._sentence()
         if rows.empty and self._sentence():
             return self._sentence()
-        return f"{self._sentence()}\n{rows.to_string(max_rows=20, line_width=120)}".strip()
+        return f"{self._sentence()}\n{as_text(rows)}".strip()
 
     def _repr_html_(self) -> str:
         """Return the sentence, the table and the first picture, as a notebook shows them; ``plot()`` shows all."""
@@ -96,9 +96,9 @@ class Answer(Generic[Content]):
 
         parts = [f"<p>{escape(self._sentence())}</p>"] if self._sentence() else []
         try:
-            rows = shown(main_table(self.content))
+            rows = main_table(self.content)
             if not (rows.empty and parts):
-                parts.append(rows._repr_html_())  # type: ignore[operator]
+                parts.append(as_html(rows))
         except InputError:
             parts.append(f"<p>{escape(self._summary())}</p>")
         if self._draw is not None:

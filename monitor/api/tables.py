@@ -24,6 +24,8 @@ MAIN_ROWS = (
     "missing", "table", "parameters", "versions", "models", "effects", "runs", "campaigns", "imported",
     "selections", "certificates", "machines", "entries", "history",
 )  # fmt: skip
+#: A table of so few rows and so many columns is wider than a notebook and is shown turned.
+FEW_ROWS, MANY_COLUMNS = 5, 12
 SCALARS = (str, int, float, bool, date, datetime, type(None))
 
 
@@ -74,9 +76,37 @@ def _numbers_first(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[sorted(frame.columns, key=lambda column: str(column).startswith("why"))]
 
 
-def shown(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a table as a screen shows it: without columns of which no row has anything."""
-    return frame.dropna(axis="columns", how="all")
+def as_text(frame: pd.DataFrame) -> str:
+    """Return a table as a terminal shows it: see :func:`_shown`."""
+    rows, is_turned = _shown(frame)
+    if is_turned:
+        rows = rows.apply(lambda column: column.str.ljust(column.str.len().max()))
+    return rows.to_string(max_rows=40, line_width=120, float_format=_in_digits)
+
+
+def as_html(frame: pd.DataFrame) -> str:
+    """Return a table as a notebook shows it: see :func:`_shown`."""
+    import pandas as pd
+
+    rows, is_turned = _shown(frame)
+    # Sentences stand whole in a table that is turned, and would make another wider still.
+    with pd.option_context("display.max_colwidth", None if is_turned else 50):
+        return str(rows.to_html(max_rows=60, float_format=_in_digits, notebook=True))
+
+
+def _shown(frame: pd.DataFrame) -> tuple[pd.DataFrame, bool]:
+    """Return a table as a screen shows it, and whether it is turned: without columns of which no row has anything; of
+    few rows and many columns as text, a line for each column."""
+    filled = frame.dropna(axis="columns", how="all")
+    rows, columns = filled.shape
+    if not FEW_ROWS >= rows > 0 or columns <= MANY_COLUMNS:
+        return filled, False
+    return filled.T.map(lambda cell: _in_digits(cell) if isinstance(cell, float) else str(cell)), True
+
+
+def _in_digits(number: float) -> str:
+    """Return a number as a screen shows it; the table itself has all its digits."""
+    return f"{number:.6g}"
 
 
 def table_of(answer: TableAnswer) -> pd.DataFrame:

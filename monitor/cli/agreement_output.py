@@ -22,14 +22,34 @@ def agreement_line(pair: AgreementPair) -> str:
     subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
     if not pair.disagree:
         return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
-    return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
+    return (
+        f"{subject}{_apart(pair.days_apart)} disagree in {', '.join(pair.disagree)}{number}{_meanwhile(pair)}"
+    )
+
+
+def _apart(days: float | None) -> str:
+    """How many days lie between two measurements; nothing of the same day."""
+    return f", {_days(days)} apart," if days is not None and round(abs(days)) >= 1 else ""
+
+
+def _meanwhile(pair: AgreementPair) -> str:
+    """What a difference of two days holds besides that of the methods."""
+    if not _apart(pair.days_apart):
+        return ""
+    return "; what the machine changed meanwhile is in the difference: measure with both on one day to tell them apart"
+
+
+def _days(days: float) -> str:
+    count = round(abs(days))
+    return f"{count} day{'s' if count != 1 else ''}"
 
 
 def _moved(pair: AgreementPair) -> str:
     """The parameters that moved at an event, from which value to which."""
     moved = [(name, pair.parameters[name]) for name in pair.disagree]
     undecided = any(result.why_not_decided for result in pair.parameters.values())
-    quiet = "nothing decided" if undecided else "nothing moved beyond the scatter of runs and days"
+    drift = " and the drift" if any(result.drift_in_30_days for result in pair.parameters.values()) else ""
+    quiet = "nothing decided" if undecided else f"nothing moved beyond the scatter of runs and days{drift}"
     return (
         ", ".join(f"{name} {result.first:.3g} -> {result.second:.3g} {result.unit}" for name, result in moved)
         or quiet
@@ -45,7 +65,17 @@ def _judged_with(pair: AgreementPair) -> str:
     judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
     undecided = "".join(
         f"; {', '.join(names)} {reason}"
-        for reason in (Undecided.DAYS_MAY_DO, Undecided.ONE_DAY_EACH)
+        for reason in (Undecided.DAYS_MAY_DO, Undecided.DRIFT_MAY_DO, Undecided.ONE_DAY_EACH)
         if (names := [name for name, result in pair.parameters.items() if result.why_not_decided is reason])
     )
-    return judged + undecided
+    return judged + _drifting(pair) + undecided
+
+
+def _drifting(pair: AgreementPair) -> str:
+    """What the machine drifts by beside the event, where that is seen."""
+    drifts = [
+        f"{name} {result.drift_in_30_days:+.3g} {result.unit}"
+        for name, result in pair.parameters.items()
+        if result.drift_in_30_days is not None
+    ]
+    return f"; beside a drift in 30 days of {', '.join(drifts)}" if drifts else ""

@@ -67,7 +67,8 @@ def _taken_up(answer: IdentifyAnswer) -> None:
 def _doing_the_same(names: tuple[str, ...]) -> str:
     """Half a sentence on what takes an error up."""
     if len(names) == 1:
-        return f"{names[0]} does the same"
+        # The one name that is a plural: of the unknowns of setups.
+        return f"{names[0]} {'do' if names[0].startswith('the unknowns ') else 'does'} the same"
     return f"{', '.join(names[:-1])} and {names[-1]} together do the same"
 
 

@@ -216,7 +216,10 @@ def working(activity: str) -> Iterator[None]:
             )  # fmt: skip
             progress.update(task, total=1.0, completed=share)
 
-        with listening(tell):
+        def say(words: str) -> None:
+            progress.update(task, description=f"{activity}; {words}" if words else activity)
+
+        with listening(tell, say):
             yield
 
 

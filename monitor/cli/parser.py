@@ -215,18 +215,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         hint = did_you_mean(head.verb, VERBS)
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(
-        db=head.db, wait=head.wait, server=head.server, server_token=head.server_token
-    )
     try:
         # People write options before, between and behind the other words.
-        options = parser.parse_intermixed_args(head.rest, database)
+        options = parser.parse_intermixed_args(head.rest)
     except TypeError:
         # A verb with verbs of its own cannot be read so.
-        options = parser.parse_args(head.rest, database)
+        options = parser.parse_args(head.rest)
+    _join(first, head, options)
     if not hasattr(options, "run"):
         options.run = run
-    options.json, options.quiet = options.json or head.json, options.quiet or head.quiet
     options.wait = seconds_to_wait(options.wait)
     _choose_server(head.verb, options)
     if options.server is not None:
@@ -237,6 +234,17 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
     check_path(options.db, may_be_new=needs_none)
     return options
+
+
+def _join(first: Parser, head: argparse.Namespace, options: argparse.Namespace) -> None:
+    """Add what was typed before the verb to what was typed behind it; end the program where both name one thing."""
+    for name in ("db", "wait", "server", "server_token"):
+        if name in options and name in first.typed:
+            option = f"--{name.replace('_', '-')}"
+            first.error(f"argument {option}: one value is taken, a second one was typed behind `{head.verb}`")
+        if name not in options:
+            setattr(options, name, getattr(head, name))
+    options.json, options.quiet = options.json or head.json, options.quiet or head.quiet
 
 
 def _choose_server(verb: str, options: argparse.Namespace) -> None:

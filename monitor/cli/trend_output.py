@@ -189,7 +189,9 @@ def _event_step(name: str, step: StepAtEvent) -> str:
     # Loaded here: most machines have no step at an event, and the report has two dozen kinds of sentences.
     from monitor.reporting.health.sentences import SteppedAtEvent
 
-    what = SteppedAtEvent(name, step.description, step.size, step.u, step.unit, step.why_not_decided)
+    what = SteppedAtEvent(
+        name, step.description, step.size, step.u, step.unit, step.why_not_decided, step.drift_in_30_days
+    )
     p_value = f" (p = {output.probability(step.p_value)})" if step.decided else ""
     return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"
 

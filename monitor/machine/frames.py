@@ -4,6 +4,11 @@ A location error of the chain is stated relative to the axis before it in its br
 ISO 230-7:2015 state orientation and position of an axis in the coordinate system of the machine. Both are the same
 only for the axis next to the bed. To first order the machine's are sums of the chain's: rotations add up along the
 branch, and a rotation before an axis shifts it by its lever, the distance of the axes' origins at all zero.
+
+The directions of the machine are those of its linear axes. Where a linear axis is the first to carry the workpiece the
+chain is stated in its frame already. Where a rotary axis is, as on ``w C A b X Y Z t``, a method may have fixed the
+frame to that axis and found where the linear axes lie: the first linear axis from the bed then is a direction of the
+machine, the next one lies in the plane of both, and what turns them against the chain's frame is taken off every axis.
 """
 
 from __future__ import annotations
@@ -61,6 +66,9 @@ def frame_of(parameter: str, chain: Chain) -> FrameOfReference | None:
         return FrameOfReference(FrameKind.OWN_AXIS, joint.name)
     before = _branch_to(chain, term.joint)[:-1]
     if not before:
+        # Beside a rotary axis that the frame was fixed to, where a linear axis lies is relative to that axis.
+        if not joint.turns and _guides(chain):
+            return FrameOfReference(FrameKind.PRECEDING_AXIS, chain.work[0].name)
         return FrameOfReference(FrameKind.MACHINE)
     return FrameOfReference(FrameKind.PRECEDING_AXIS, chain.joints[before[-1]].name)
 
@@ -86,6 +94,22 @@ def machine_frame(parameters: Sequence[str], chain: Chain, unknown: Sequence[str
             units.append(wanted.unit.name)
             rows.append(shares)
     return MachineFrame(tuple(names), tuple(units), np.array(rows).reshape(len(rows), len(terms)))
+
+
+def _guides(chain: Chain) -> dict[int, int]:
+    """The axis, by its index, whose turn about a direction (3 to 5, a component) the machine does not have.
+
+    Empty where the chain's frame is that of a linear axis, or no two linear axes say where the machine is.
+    """
+    if not chain.work or not chain.work[0].turns:
+        return {}
+    tool_first = [*range(len(chain.work), len(chain.joints)), *range(len(chain.work))]
+    linear = [index for index in tool_first if not chain.joints[index].turns]
+    if len(linear) < 2:
+        return {}
+    first, second = linear[:2]
+    main = chain.joints[first].main
+    return {3 + axis: second if axis == main else first for axis in range(3)}
 
 
 def _wanted(parameters: Sequence[Term], lost: Sequence[Term], chain: Chain) -> list[Term]:
@@ -124,15 +148,19 @@ def _places(term: Term, joint: Joint) -> bool:
 def _share(term: Term, of: Term, chain: Chain) -> float:
     """By how much the location error ``of`` in the machine frame grows with the parameter ``term``, in display
     units."""
-    if term.stage != LOCATION or term.joint not in _branch_to(chain, of.joint):
+    if term.stage != LOCATION:
         return 0.0
+    carries = term.joint in _branch_to(chain, of.joint)
+    guide = _guides(chain).get(term.component)
+    turns_frame = guide is not None and term.joint in _branch_to(chain, guide)
     if term.is_rotation == of.is_rotation:
-        return 1.0 if term.component == of.component else 0.0
+        return float(carries) - float(turns_frame) if term.component == of.component else 0.0
     if of.is_rotation:
         return 0.0
     turned = np.zeros(3)
     turned[term.component - COMPONENTS.index("A")] = 1.0
-    lever = _origin(chain, of.joint) - _origin(chain, term.joint)
+    origin = _origin(chain, of.joint)
+    lever = float(carries) * (origin - _origin(chain, term.joint)) - float(turns_frame) * origin
     shift = float(np.cross(turned, lever)[of.component])
     # µm by µrad: a lever of 1 mm shifts by 1e-3 µm a µrad.
     return shift * term.unit.factor / MICROMETRE.factor

@@ -157,7 +157,8 @@ class InstrumentShare:
 
     ``name`` as people call it, its ``setups``, ``numbers`` read and ``chi_square`` of their weighted residuals.
     ``variance`` (k,) is its part of the variance in the joint fit; ``alone`` (k,) and ``alone_variance`` (k,) are the
-    estimate of its readings by themselves, NaN where they do not determine a parameter.
+    estimate of its readings by themselves, NaN where they do not determine a parameter. ``alone_freedom`` (k,) are the
+    degrees of freedom of that variance, infinite where the readings scatter no more than stated.
     """
 
     name: str
@@ -167,6 +168,7 @@ class InstrumentShare:
     variance: Array
     alone: Array
     alone_variance: Array
+    alone_freedom: Array
 
 
 class SharesOf(Protocol):

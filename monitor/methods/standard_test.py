@@ -99,13 +99,27 @@ class PartFeature:
 
 
 @dataclass(frozen=True)
+class PartPath:
+    """A path on a part that is neither line nor circle: points ``measured`` (n, 3) mm, the tool's point at ``nominal``
+    (n, 3) mm and unit vectors ``axes`` (n, 3) along the tool's axis, in the frame of the instrument and in the order of
+    cutting. Without ``has_heights`` the third number was not measured and equals the nominal one."""
+
+    name: str
+    measured: Array
+    nominal: Array
+    axes: Array
+    has_heights: bool
+
+
+@dataclass(frozen=True)
 class PartTest:
-    """A part that the machine cut in one ``run``, measured by the instrument of ``setup``: ``features`` in the order of
-    cutting, ``u_reading`` mm of one coordinate."""
+    """A part that the machine cut in one ``run``, measured by the instrument of ``setup``: ``features`` and ``paths``
+    in the order of cutting, ``u_reading`` mm of one coordinate."""
 
     setup: str
     run: int
     features: tuple[PartFeature, ...]
+    paths: tuple[PartPath, ...]
     u_reading: float
 
 

@@ -145,6 +145,7 @@ class Undecided(StrEnum):
     ONE_DAY_EACH = "one_day_each"
     DAYS_MAY_DO = "days_may_do"
     FEW_DAYS = "few_days"
+    DRIFT_MAY_DO = "drift_may_do"
 
     def __str__(self) -> str:
         """The words behind the name of the parameter."""
@@ -163,5 +164,9 @@ _UNDECIDED = {
     Undecided.FEW_DAYS: (
         "not decided: too few days on a side to tell a step of one of many parameters from days that differ; measure "
         "further days"
+    ),
+    Undecided.DRIFT_MAY_DO: (
+        "not decided: a drift that goes on through the event, or a machine that moves as much between campaigns "
+        "without one, may do as much; further campaigns on each side decide it"
     ),
 }

@@ -18,7 +18,7 @@ _ABOUT = dict(zip("ABC", _FRAME, strict=True))
 _ALONG = {**dict(zip("XYZ", _FRAME, strict=True)), **dict(zip("UVW", _FRAME, strict=True)), **_ABOUT}
 
 
-def plain_name(symbol: str, topology: str = "", parameters: Collection[str] = ()) -> str:
+def plain_name(symbol: str, topology: str, parameters: Collection[str]) -> str:
     """Name the parameter ``symbol`` in shop-floor words; its table description where there are none.
 
     An orientation of an axis is stated relative to the axis before it in its branch of the ``topology``, and rotations

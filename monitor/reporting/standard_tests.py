@@ -62,6 +62,10 @@ _PART_FIGURES: Mapping[str, str] = {
     "circularity_zone": "circularity, minimum zone",
     "concentricity": "concentricity to {datum}, diameter of the zone",
     "position": "position beside the first circle along {datum}, diameter of the zone",
+    "profile": "profile of the line beside the tool's axis, offset free",
+    "profile_zone": "profile of the line beside the tool's axis, offset free, minimum zone",
+    "flatness": "flatness",
+    "flatness_zone": "flatness, minimum zone",
     "half_angle": "half apex angle of the cone with {datum}, less the programmed one",
 }
 
@@ -93,6 +97,19 @@ class NoDatum(Sentence):
 
     def __str__(self) -> str:
         return "no straight side was measured: no circle has a position beside the others"
+
+
+@dataclass(frozen=True)
+class NoProfile(Sentence):
+    """Paths of a part that are neither lines, circles, profiles nor faces."""
+
+    elements: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return (
+            f"{', '.join(self.elements)}: no figure: a profile turns by 30 degrees or more and its wall stands off the "
+            "tool's axis, a face is plane, across that axis and measured in three numbers"
+        )
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from monitor.store.opening import (
     connect,
     damaged,
     is_missing,
+    itself,
     make,
     make_empty,
     prepare_commit,
@@ -62,7 +63,7 @@ class Database:
     ) -> None:
         if threads is not None and threads < 1:
             raise StoreError(f"threads must be at least 1, not {threads}")
-        self.path = str(path)
+        self.path = itself(str(path))
         self.read_only = read_only
         self.actor = actor
         self._threads = threads

@@ -50,6 +50,12 @@ _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
 
+#: What the log is called; how version 2 of it begins, the size and checksum before each further entry, and how the entry
+#: of a checkpoint begins (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99 the
+#: checkpoint, 100 the end of a transaction).
+_LOG = ".wal"
+_LOG_BEGIN, _FRAME, _MARK, _END = b"d\x00be\x00\x02\xff\xff", struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
+
 #: The copy: this line, the SHA-256 of what follows, the headers, and for each block its number and its bytes.
 _BEGIN = b"blocks before a checkpoint, 1\n"
 
@@ -116,6 +122,54 @@ def has_torn_blocks(path: str) -> bool:
         return file is not None and len(_torn(path, file)) > 0
 
 
+def has_foreign_log(path: str) -> bool:
+    """Whether the log beside a file was written for another state than the file has; nobody writes it now.
+
+    DuckDB 1.5 replays a log onto whatever bears the name: onto a copy of last week, too. The copy of the blocks says
+    for which state the log was begun. That state must be the file's, or the one before it, where the log ends with the
+    mark of the checkpoint that brought the file on. Without a copy (other programs, Windows) nothing can be said.
+    """
+    if not os.path.lexists(path + ENDING) or not has_log(path):
+        return False
+    with _alone(path, for_writing=False) as file:
+        copied = None if file is None else _read(path)
+        if file is None or copied is None:
+            return False
+        headers, written_for = os.pread(file, _HEADERS, 0), _state(copied.headers)
+        if _state(headers) == written_for:
+            return False
+        # A log that others began behind that checkpoint is younger than the file.
+        is_older = os.stat(path + _LOG).st_mtime_ns < os.fstat(file).st_mtime_ns
+        return written_for not in _states(headers) or (is_older and not _ends_with_mark(path))
+
+
+def has_log(path: str) -> bool:
+    """Whether a log with anything in it lies beside a file."""
+    with contextlib.suppress(OSError, ValueError):
+        return os.stat(path + _LOG).st_size > 0
+    return False
+
+
+def _ends_with_mark(path: str) -> bool:
+    """Whether a checkpoint is the last that a log tells; so, too, where it is of a form not known here."""
+    try:
+        file = open(path + _LOG, "rb")
+    except OSError:
+        return True
+    with file:
+        if file.read(len(_LOG_BEGIN)) != _LOG_BEGIN:
+            return True
+        last = b""
+        while len(frame := file.read(_FRAME.size)) == _FRAME.size:
+            size, _ = _FRAME.unpack(frame)
+            if size < len(_MARK) or size > os.fstat(file.fileno()).st_size - file.tell():
+                break
+            kind = file.read(len(_MARK))
+            last = last if kind == _END else kind
+            file.seek(size - len(_MARK), os.SEEK_CUR)
+    return last == _MARK
+
+
 def metadata_blocks(file: int) -> tuple[int, ...]:
     """Return the numbers of the blocks of an open file that hold its metadata; empty where its list cannot be read.
 
@@ -166,8 +220,13 @@ class _Numbers:
 
 def _state(headers: bytes) -> tuple[int, ...]:
     """Return what the newer of the two headers that take turns names; one that is torn names nothing."""
+    return max(_states(headers), default=(0,) * 5)
+
+
+def _states(headers: bytes) -> list[tuple[int, ...]]:
+    """Return what the two headers that take turns name, without one that is torn."""
     slots = [headers[begin : begin + _HEADER] for begin in (_HEADER, 2 * _HEADER)]
-    return max((_STATE.unpack_from(slot, _CHECKSUM) for slot in slots if _is_whole(slot)), default=(0,) * 5)
+    return [_STATE.unpack_from(slot, _CHECKSUM) for slot in slots if _is_whole(slot)]
 
 
 def _block_size(headers: bytes) -> int:

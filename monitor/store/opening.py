@@ -16,7 +16,14 @@ import duckdb
 
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
-from monitor.store.kept_blocks import ENDING, has_torn_blocks, keep_blocks, settle_blocks
+from monitor.store.kept_blocks import (
+    ENDING,
+    has_foreign_log,
+    has_log,
+    has_torn_blocks,
+    keep_blocks,
+    settle_blocks,
+)
 from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
@@ -49,7 +56,7 @@ def connect(
     }
     if threads is not None:
         config["threads"] = str(threads)
-    _refuse_what_is_no_file(path)
+    _refuse_what_is_no_file(path, read_only)
     patience = patience or Patience()
     holder: Holder | None = None
 
@@ -83,6 +90,12 @@ def _in_the_way(path: str, read_only: bool, patience: Patience, fault: Exception
 
 def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnection:
     """Open a file whose blocks are whole. Raises UnfinishedLogError, StoreError, duckdb.Error, ValueError."""
+    if has_foreign_log(path):
+        raise StoreError(
+            f"{path}.wal is the log of another state of {path}, which was put in its place meanwhile, as by a copy: "
+            f"replaying it would mix the two. To keep the file as it lies here, move {path}.wal and {path}{ENDING} "
+            "away; to keep what the log holds, put back the file that it was written for"
+        )
     if not read_only:
         settle_blocks(path)
     elif has_torn_blocks(path):
@@ -92,7 +105,7 @@ def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnec
         )
     connection = duckdb.connect(path, read_only=read_only, config=config)
     show_no_progress(connection)
-    if not read_only and _has_log(path):
+    if not read_only and has_log(path):
         # What it replayed is written into the file when it is closed, whether or not anything is added.
         with contextlib.suppress(StoreError):
             keep_blocks(path)
@@ -127,7 +140,25 @@ def make(path: str, patience: Patience) -> None:
         if holder is not None:
             raise busy(path, holder, patience)
         if is_missing(path):
+            refuse_log_left(path)
             _make(path, path + _UNFINISHED)
+
+
+def refuse_log_left(path: str | Path) -> None:
+    """Raise StoreError where a new file would get the name of one that is gone, and whose log is still there.
+
+    DuckDB would replay that log onto the new file.
+    """
+    if has_log(str(path)):
+        raise StoreError(
+            f"{path}.wal holds what was stored last in a database of this name, which is gone, and would be added to the "
+            f"new one: put the database back beside it, or move {path}.wal away first"
+        )
+
+
+def itself(path: str) -> str:
+    """Return the file that a name stands for: log and lock lie beside the file, not beside a link to it."""
+    return os.path.realpath(path) if os.path.islink(path) else path
 
 
 def is_missing(path: str) -> bool:
@@ -225,8 +256,8 @@ def _remove(partial: str) -> None:
         Path(name).unlink(missing_ok=True)
 
 
-def _refuse_what_is_no_file(path: str) -> None:
-    """Refuse a pipe or device, which would be waited for or read for ever."""
+def _refuse_what_is_no_file(path: str, read_only: bool) -> None:
+    """Refuse a pipe or device, which would be waited for or read for ever, and writing a file of several names."""
     try:
         status = os.stat(path)
     except OSError:
@@ -237,12 +268,12 @@ def _refuse_what_is_no_file(path: str) -> None:
         raise StoreError(f"{path} is a folder; name a file")
     if not stat.S_ISREG(status.st_mode):
         raise StoreError(f"{path} is a pipe or device, not a file; name a file")
-
-
-def _has_log(path: str) -> bool:
-    with contextlib.suppress(OSError, ValueError):
-        return os.stat(path + ".wal").st_size > 0
-    return False
+    if not read_only and status.st_nlink > 1:
+        # The log has the name under which the file was opened: after a crash the other name would not see it.
+        raise StoreError(
+            f"{path} has {status.st_nlink} names (hard links), and each would have a log of its own: what is stored under "
+            f"one could be lost to the others. It can be read; to write, remove the other names or make a copy of it"
+        )
 
 
 def _is_open_here(message: str) -> bool:

@@ -82,6 +82,8 @@ class Ticket:
     said: list[str] = field(default_factory=list)
     #: The share of the work that is done as it told last; empty where nothing is told of it.
     shares: list[float] = field(default_factory=list)
+    #: What it does just now where nobody knows how far that is; empty otherwise.
+    doing: list[str] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -206,11 +208,11 @@ class Desk:
                 return ticket
             self._forget_outdated()
             self._count += 1
-            stop, shares = Event(), list[float]()
+            stop, shares, doing = Event(), list[float](), list[str]()
             pool = self._quick if question == "trend" and document.get("parameter") else self._pool
-            future = pool.submit(self._answered, stop, shares, user, question, document, files)
+            future = pool.submit(self._answered, stop, shares, doing, user, question, document, files)
             self._tickets[key] = ticket = Ticket(
-                self._count, question, document, user, future, stop, stamp=key[2], shares=shares
+                self._count, question, document, user, future, stop, stamp=key[2], shares=shares, doing=doing
             )
             # Handed over once: a ticket that its own future names for ever would wait for the garbage collector, which
             # rarely looks at what is old, with an answer of megabytes.
@@ -331,6 +333,7 @@ class Desk:
         self,
         stop: Event,
         shares: list[float],
+        doing: list[str],
         user: User,
         question: str,
         document: Mapping[str, Any],
@@ -340,7 +343,10 @@ class Desk:
         def tell(share: float) -> None:
             shares[:] = [share]
 
-        with stoppable(stop), listening(tell):
+        def say(words: str) -> None:
+            doing[:] = [words] if words else []
+
+        with stoppable(stop), listening(tell, say):
             return self.asker(user, question, document, files)
 
     def under_way(self) -> list[Ticket]:

@@ -165,13 +165,16 @@ def counted(count: int, word: str, plural: str | None = None) -> str:
 
 
 def so_far(ticket: Ticket) -> str:
-    """Say how long something has been computed, what share of it is done, and whether it waits or is being stopped."""
+    """Say how long something has been computed, what share of it is done or what it does, and whether it waits or is
+    being stopped."""
     seconds = f"{counted(int(ticket.seconds), 'second')} so far"
     if ticket.shares and 0.01 <= ticket.shares[-1] < 1.0:
         seconds += f", about {100.0 * ticket.shares[-1]:.0f} % done"
+    # As it is said in another thread, it may be over between two looks.
+    doing = "".join(f"; {words}" for words in ticket.doing)
     if ticket.is_stopping:
         return f"{seconds}, {ticket.taken_back_by} is stopping it"
-    return seconds if ticket.is_running else f"{seconds}, waiting for others"
+    return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:

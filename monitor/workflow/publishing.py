@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from monitor.exceptions import InputError
+from monitor.progress import told
 from monitor.store import Database
 from monitor.store.lake.attaching import check_lake_address
 from monitor.store.lake.publication import publish as publish_to
@@ -43,12 +45,22 @@ class PublishAnswer:
     tries: int
 
 
-def publish(db: Database, request: PublishRequest) -> PublishAnswer:
+def publish(
+    db: Database, request: PublishRequest, away: Callable[[str], None] = lambda fault: None
+) -> PublishAnswer:
     """Add everything that was stored since the last publication; nothing twice, whatever happened before.
 
-    Raises StoreError where the lake cannot be reached or the database has another past than it published.
+    ``away`` is told why a lake that is tried again does not answer. Raises StoreError where the lake cannot be reached
+    or the database has another past than it published.
     """
-    published = publish_to(db, request.to, files=request.files, plant=request.plant)
+    published = publish_to(
+        db,
+        request.to,
+        files=request.files,
+        plant=request.plant,
+        progress=lambda last, end: told(last / end),
+        away=away,
+    )
     return PublishAnswer(
         published.plant,
         published.entries,

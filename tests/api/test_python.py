@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -82,6 +83,11 @@ def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: 
     assert {path.name for path in pictures.save(tmp_path / "drawn")} == set(pictures)
     assert campaign.compare()._repr_html_().count("<svg") == 1
     assert "The model lacks EZC1:const@warmup" in repr(answer)
+    # One effect has more columns than a notebook is wide: a line each, with its whole sentences.
+    assert max(len(line) for line in repr(answer).splitlines()) < 200
+    lines = re.findall(r"<tr>.*?</tr>", answer._repr_html_(), re.DOTALL)
+    assert {len(re.findall("<t[hd]>", line)) for line in lines} == {2}
+    assert answer.missing[0].remedy in answer._repr_html_()
     added = campaign.add("EZC1:const@warmup", "warm")
     before, after = (version.heldout_rms_um for version in added.history)
     assert after < before

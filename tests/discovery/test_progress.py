@@ -8,7 +8,7 @@ import pytest
 
 from monitor.discovery.search.rounds import in_rounds
 from monitor.methods import campaign_method
-from monitor.progress import listening, told, within
+from monitor.progress import listening, saying, told, within
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.explain import explain
@@ -45,6 +45,19 @@ def test_a_part_counts_within_the_whole() -> None:
     with within(0.2, 0.6):
         told(0.5)
     assert len(heard) == 4
+
+
+def test_what_is_done_is_said_until_it_is_over() -> None:
+    said: list[str] = []
+    with listening(lambda share: None, said.append):
+        # A part of the work that tells its share within the whole is heard by the same listener.
+        with within(0.2, 0.6), saying("compiling"):
+            assert said == ["compiling"]
+        with pytest.raises(ValueError, match="broken"), saying("again"):
+            raise ValueError("broken")
+    with saying("to nobody"):
+        pass
+    assert said == ["compiling", "", "again", ""]
 
 
 @pytest.mark.parametrize("rounds", [1, 2, 3])

@@ -9,7 +9,8 @@ import pytest
 
 from monitor.machine import evaluate, frame_of, machine_frame, parse_topology
 from monitor.machine.topology import chain_of_axes
-from monitor.records import ChainAxis, FrameKind
+from monitor.methods.chain.base_effects import base_effects
+from monitor.records import ChainAxis, FrameKind, FrameOfReference
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "conventions.md"
 #: Rounding to whole µm and µrad, and products of two errors: 65 µrad of 60 µrad.
@@ -178,3 +179,63 @@ def test_offsets_between_axes_are_levers_and_agree_with_matrices(simulator):
 def test_a_sum_with_an_unknown_part_is_left_out():
     chain = parse_topology("w C B X b Z Y (C1) t")
     assert machine_frame(["EA0C", "EB0C"], chain, ["EA0B"]).names == ("EB0C",)
+
+
+def _machine_of_linear_axes(frames, first, second):
+    """Columns: the directions of the machine, the first axis along its own letter, the second in the plane of both."""
+    i, j = "XYZ".index(first), "XYZ".index(second)
+    k = 3 - i - j
+    directions = np.zeros((3, 3))
+    directions[:, i] = _direction(frames, first) / np.linalg.norm(_direction(frames, first))
+    across = _direction(frames, second) - directions[:, i] * (_direction(frames, second) @ directions[:, i])
+    directions[:, j] = across / np.linalg.norm(across)
+    # The third completes a right-handed system.
+    directions[:, k] = np.cross(directions[:, (k + 1) % 3], directions[:, (k + 2) % 3])
+    return directions
+
+
+@pytest.mark.parametrize(
+    "topology", ["w C A b X Y Z t", "w C B b Z X Y t", "w C A b Y X Z (C1) t", "w C Z A b X Y t"]
+)
+def test_iso230_1_the_machine_frame_is_that_of_the_linear_axes_where_none_is_the_first_to_carry_the_work(
+    simulator, topology
+):
+    chain = parse_topology(topology)
+    names = [name for name in base_effects(chain) if ":" not in name]
+    values = dict(
+        zip(names, np.random.default_rng(14).uniform(-60.0, 60.0, len(names)).round(1), strict=True)
+    )
+    frame = machine_frame(names, chain)
+    product = dict(zip(frame.names, frame.matrix @ np.array(list(values.values())), strict=True))
+    frames = _frames(simulator, topology, values)
+    directions = _machine_of_linear_axes(frames, *[axis.name for axis in chain.tool if not axis.turns][:2])
+    for name, value in product.items():
+        letter, axis = name[1], name[3:]
+        turned = directions.T @ frames[axis][:3, :3]
+        if letter in "XYZ":
+            expected = (directions.T @ frames[axis][:3, 3])["XYZ".index(letter)] * 1e3
+        else:
+            k = "ABC".index(letter)
+            i, j = (k + 1) % 3, (k + 2) % 3
+            expected = (turned[j, i] - turned[i, j]) / 2.0 * 1e6
+        assert value == pytest.approx(expected, abs=0.02), name
+    # The axis that the chain's frame was fixed to is tilted against the linear axes, which is what they are against it.
+    tilted = [name for name in product if name[3:] == chain.work[0].name and name[1] in "ABC"]
+    assert len(tilted) == 2
+    first_linear = next(axis.name for axis in chain.tool if not axis.turns)
+    fixed = FrameOfReference(FrameKind.PRECEDING_AXIS, chain.work[0].name)
+    assert {frame_of(name, chain) for name in names if name[3:] == first_linear} == {fixed}
+
+
+def test_two_methods_state_one_machine_where_no_linear_axis_carries_the_work():
+    """One machine stated twice: by touches that take the linear axes as the machine, and relative to axis A."""
+    chain = parse_topology("w C A b X Y Z t")
+    of_probing = {"EB0A": 15.0, "EC0A": -35.0, "EA0C": 5.0, "EB0C": 22.0}
+    # The same machine from axis A: every linear axis is turned the other way.
+    of_samba = {"EA0C": 5.0, "EB0C": 22.0} | {f"E{c}0X": -of_probing[f"E{c}0A"] for c in "BC"}
+    rows = []
+    for values in (of_probing, of_samba):
+        frame = machine_frame(tuple(values), chain)
+        rows.append(dict(zip(frame.names, frame.matrix @ np.array(list(values.values())), strict=True)))
+    assert rows[0] == pytest.approx({"EB0A": 15.0, "EC0A": -35.0, "EA0C": 5.0, "EB0C": 37.0})
+    assert {name: rows[1][name] for name in rows[0]} == pytest.approx(rows[0])

@@ -13,6 +13,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Setup
+from tests.simulator import horizontal_centre as centre
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -81,3 +82,34 @@ def test_a_length_that_is_typed_wrong_is_not_taken_up_by_a_centre_off_the_plane(
     assert solve_problem(problem).iterations < 50
     (run,) = campaign_method(wrong).identify(wrong).runs
     assert run.chi_square > 1e3 * run.degrees_of_freedom
+
+
+def horizontal(folder: Path, change: Callable[[Setup], Setup]) -> Campaign:
+    """Laser, ball bar and R-test on a horizontal centre, its setups stated otherwise."""
+    campaign = read_campaign(centre.campaign(folder / "shop", np.random.default_rng(7)))
+    assert isinstance(campaign, Campaign)
+    return with_setups(campaign, change)
+
+
+def test_a_centre_stated_across_the_plane_of_a_swing_moves_no_number(tmp_path: Path) -> None:
+    """By rounding 1e-14 mm was left across the plane, which the fit took for readings: 64 u of EA0Y."""
+
+    def off(setup: Setup) -> Setup:
+        return moved("distance", (15.0, 0.0, 0.0))(setup) if setup.id == "bar-yz" else setup
+
+    right, u = numbers(horizontal(tmp_path / "right", lambda setup: setup))
+    stated, _ = numbers(horizontal(tmp_path / "off", off))
+    assert np.nanmax(np.abs(stated - right) / u) < 0.02
+
+
+def test_a_tool_point_that_the_readings_contradict_is_named_with_the_one_they_fit(tmp_path: Path) -> None:
+    """A head that turns shows the length of its tool; nothing else of the machine does the same."""
+
+    def longer(setup: Setup) -> Setup:
+        return replace(setup, tool_point=(0.0, 0.0, -151.0)) if setup.reading == "vector" else setup
+
+    # The end of the refusal where the fit does not settle.
+    said = campaign_method(campaign := horizontal(tmp_path, longer)).problem_of(campaign).unsettled
+    assert "the readings of setup r-test-A fit tool_point_mm = [0.00, 0.00, -150.00], with 0.0" in said
+    right = horizontal(tmp_path / "right", lambda setup: setup)
+    assert campaign_method(right).problem_of(right).unsettled == ""

@@ -22,6 +22,7 @@ from monitor.reporting.certificate.completeness import IncompleteCertificateErro
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_elements import DCC, SI, DccVersion
 from monitor.reporting.certificate.dsi import unit_of
+from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import (
     Accreditation,
     CertificateRecord,
@@ -273,3 +274,41 @@ def test_factors_of_few_runs_are_told_as_those_of_the_t_distribution(make_record
     assert told(dof=15.0) == told(dof=15.0, trials=10**6) == {"t"}
     assert told(trials=10**6) == {"numerical"}
     assert told(dof=float("nan")) == {"normal"}  # as a stored record says that it is known
+
+
+@pytest.mark.parametrize("release", list(DccVersion))
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_effects_of_the_model_are_results_with_their_own_uncertainty(
+    make_record: Make, release: DccVersion, language: str
+) -> None:
+    etree = pytest.importorskip("lxml.etree", reason="lxml validates XML schemas")
+    made = make_record(13, language=language)
+    assert made.results is not None
+    effects = (
+        ModelEffect("EXX:reversal", "µm", 5.85, 0.098, 6, 2, 11.7, 0.196),
+        ModelEffect("EBZ:poly2"),
+    )
+    results = (dataclasses.replace(made.results[0], effects=effects),)
+    record = dataclasses.replace(made, country="DE", dcc_version=release, results=results)
+    tree = etree.fromstring(dcc_xml(record))
+    schema_of(release).assertValid(tree)
+    spaces = {"d": "https://ptb.de/dcc", "s": "https://ptb.de/si"}
+    stated = [
+        element
+        for element in tree.xpath("//d:result", namespaces=spaces)
+        if "EXX:reversal" in element.xpath("string(d:name)", namespaces=spaces)
+    ]
+    values, k = [], 2.0 if release is DccVersion.V3_2_1 else 1.0
+    for element in stated:
+        (value,) = element.xpath(".//s:real/s:value/text()", namespaces=spaces)
+        (u,) = element.xpath(".//s:uncertainty/text() | .//s:valueStandardMU/text()", namespaces=spaces)
+        assert element.xpath("string(.//s:real/s:unit)", namespaces=spaces) == r"\micro\metre"
+        values.append((float(value), float(u) / k))
+    assert values == [(5.85, 0.098), (11.7, 0.196)]
+    (unknown,) = [
+        element.xpath("string(.)", namespaces=spaces)
+        for element in tree.xpath("//d:result", namespaces=spaces)
+        if "EBZ:poly2" in element.xpath("string(d:name)", namespaces=spaces)
+    ]
+    assert "EBZ:poly2" in unknown
+    assert len(tree.xpath("//d:result", namespaces=spaces)) == 5

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -109,6 +111,39 @@ def test_every_table_of_a_plant_is_published_or_said_not_to_be() -> None:
         tables = {name for (name,) in db.rows("SELECT table_name FROM duckdb_tables()")}
     assert tables == set(SOURCES) | set(OTHERWISE)
     assert not tables & {"plant", "plant_name", "publication", "registering"}  # those of a lake alone
+
+
+def test_while_the_lake_is_away_the_plant_can_write_and_who_waits_is_told(
+    tmp_path: Path, make_campaign: Make, make_identification: Identify, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, campaign = tmp_path / "Ulm.duckdb", make_campaign("week 1")
+    with Database(path) as db:
+        fill(db, campaign, make_identification(campaign))
+    asked = publication._Publisher._last_published
+    faults = ["Connection refused by the store", "Connection refused by the store again"]
+    words = ["event", campaign.machine.id, "moved", "--at", "2026-03-05 07:00", "--quiet", "--wait", "0"]
+
+    def away(self: publication._Publisher, plant_no: int) -> tuple[int, str] | None:
+        if faults:
+            raise duckdb.IOException(faults.pop(0))
+        return asked(self, plant_no)
+
+    def write(pause: float) -> None:
+        command = [sys.executable, "-m", "monitor.cli", *words, "--db", str(path)]
+        wrote.append(subprocess.run(command, capture_output=True, text=True))
+
+    wrote: list[subprocess.CompletedProcess[str]] = []
+    told: list[str] = []
+    monkeypatch.setattr(publication._Publisher, "_last_published", away)
+    monkeypatch.setattr(publication.time, "sleep", write)
+    monkeypatch.setattr(publication, "_SAID_S", 0.0)
+    with Database(path) as db:
+        done = publish(db, f"ducklake:{tmp_path}/lake.ducklake", files=tmp_path / "files", away=told.append)
+    assert [(process.returncode, process.stderr) for process in wrote] == [(0, ""), (0, "")]
+    # Once, and what was written meanwhile is published with the rest.
+    assert told == ["Connection refused by the store"]
+    with Database(path, read_only=True) as db:
+        assert done.last_entry == last_entries(db, 1)[0].entry == done.entries
 
 
 @pytest.mark.slow

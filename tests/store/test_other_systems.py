@@ -86,6 +86,8 @@ import shutil, tempfile
 # As Python has both there.
 tempfile.TemporaryFile = tempfile.NamedTemporaryFile
 shutil._use_fd_functions = False
+if hasattr(shutil, "_rmtree_impl"):
+    shutil._rmtree_impl = shutil._rmtree_unsafe  # from 3.14 on it is chosen when the module is loaded
 sys.addaudithook(as_on_windows)
 from monitor.cli import main
 line, status = [], 0
@@ -97,7 +99,7 @@ for word in (*sys.argv[1:], "then"):
     line = []
 sys.exit(status)
 """
-#: What processes here need of the list: Python's own way to start one, and from 3.14 on to remove a folder.
+#: What processes here need of the list: Python's own way to start one.
 NEEDED_HERE = frozenset(
     {
         "register_at_fork",
@@ -108,7 +110,6 @@ NEEDED_HERE = frozenset(
         "fork",
         "sysconf",
         "uname",
-        "O_NONBLOCK",
     }
 )
 

@@ -96,6 +96,7 @@ def crash(tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: p
     return Crash(tmp_path, make_campaign("one"), monkeypatch)
 
 
+@pytest.mark.slow
 def test_every_part_of_a_catalogues_checkpoint_may_be_cut_off(crash: Crash) -> None:
     parts = list(crash.changed())
     assert len(parts) > 1

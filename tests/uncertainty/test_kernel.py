@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from monitor.machine import chain_of_axes
+from monitor.progress import listening
 from monitor.records import ChainAxis
 from monitor.uncertainty import sensitivity_of
+from monitor.uncertainty.runs import kernel
 from monitor.uncertainty.runs.kernel import LANES, gradient_of
 from monitor.uncertainty.runs.program import compile_program
 
@@ -87,3 +89,23 @@ def test_model_that_the_program_cannot_follow_goes_the_plain_way(make_run):
     assert straight.compiled
     hats = sensitivity_of(make_run(TOPOLOGIES[0], ("EYX:table",)))
     assert not hats.compiled
+
+
+class _Block:
+    """Stands for the compiled block: it has a signature once it was called."""
+
+    def __init__(self):
+        self.signatures = []
+
+    def __call__(self, *arguments):
+        self.signatures.append(arguments)
+
+
+def test_whoever_waits_for_the_compiler_is_told_so_once(monkeypatch):
+    monkeypatch.setattr(kernel, "_block", _Block())
+    said = []
+    with listening(lambda share: None, said.append):
+        kernel.call_block(1)
+        kernel.call_block(2)
+    assert said == [kernel.FIRST_CALL, ""]
+    assert "half a minute the first time on this machine" in said[0]

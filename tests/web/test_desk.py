@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("fastapi", reason="the extra web is not installed")
 
 from monitor.exceptions import BusyError, InputError, NotFoundError
-from monitor.progress import told
+from monitor.progress import saying, told
 from monitor.web import desk as desk_module
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
@@ -201,3 +201,23 @@ def test_what_is_computed_says_how_far_it_is() -> None:
     finally:
         go.set()
         desk.close()
+
+
+def test_a_page_says_what_is_done_where_nobody_knows_how_far_it_is() -> None:
+    begun, end = threading.Event(), threading.Event()
+
+    class Compiling(_Asked):
+        def __call__(self, user: User, question: str, document: Any, files: Any = None) -> int:
+            with saying("the program is being made ready"):
+                begun.set()
+                end.wait(60.0)
+            return 1
+
+    desk = Desk(Compiling())  # type: ignore[arg-type]
+    ticket = desk.ask(ADA, *SUMS)
+    assert begun.wait(60.0)
+    assert re.fullmatch(r"\d+ seconds? so far; the program is being made ready", so_far(ticket))
+    end.set()
+    assert ticket.answer(60.0) == 1
+    assert "made ready" not in so_far(ticket)
+    desk.close()

@@ -18,6 +18,7 @@ from monitor.store import Database, list_campaigns, withdraw_campaign
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from tests.benchmarks.test_fleet import generate
+from tests.web.test_names_on_pages import names_on
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 #: Campaigns of every method of machines; of samba the tests beside this one ask.
@@ -158,6 +159,10 @@ def test_no_page_of_a_campaign_of_any_method_fails(name: str, serve: Any, tmp_pa
         (imported,) = import_folders(db, ImportRequest([EXAMPLES / name])).imported
         machine = list_campaigns(db, campaign=imported.campaign)[0].machine
     served = serve(path, False)
+    pages = []
     for address, names in _addresses(served.client.app._app).items():
         answer = _looked_at(served, address, _query(address, names, machine, imported.campaign))
         assert answer.status_code < 500, address
+        pages.append(answer.text)
+    # Five kinds of chains: each of its parameters has one name on all pages.
+    assert {symbol: words for symbol, words in names_on(pages).items() if len(words) > 1} == {}

@@ -10,15 +10,19 @@ import pytest
 import scipy
 
 from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.store import Database
 from monitor.workflow.certificate.grounds import grounds_against
-from monitor.workflow.instruments.instruments import K, limit_of
+from monitor.workflow.instruments.instruments import K, disagreement, limit_of
 from monitor.workflow.models import resolve
-from tests.simulator import four_instruments as shop
+from tests.simulator import four_instruments as shop, horizontal_centre as centre
+
+#: A horizontal centre whose readings of three times the stated scatter were refused by what the instruments state.
+REFUSED = 0
 
 
 def week(folder: Path, seed: int, sign: float = 1.0, which: str = "both") -> Campaign:
@@ -73,3 +77,57 @@ def test_the_limit_is_that_of_the_largest_of_independent_comparisons() -> None:
     limit = limit_of(11, 1e-3)
     beyond = 1.0 - (1.0 - 2.0 * scipy.stats.norm.sf(K * limit)) ** 11
     assert beyond == pytest.approx(1e-3, rel=1e-3)
+
+
+def scattering(folder: Path, only: str = "", otherwise: tuple[str, float] | None = None) -> Campaign:
+    """Laser, ball bar and R-test on a horizontal centre, each scattering three times as much as it states."""
+    rng, noise = np.random.default_rng(REFUSED), centre.scaled(REFUSED, 3.0)
+    path = centre.campaign(folder / "shop", rng, noise=noise, only=only, otherwise=otherwise)
+    campaign = read_campaign(path)
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+def scatter_of(campaign: Campaign) -> tuple[float, int]:
+    """What the readings of one instrument scatter over what it states, and the degrees of freedom, by its own fit."""
+    solution = solve_problem(campaign_method(campaign).problem_of(campaign))
+    residual, read = solution.last.residual[0], np.any(solution.last.local[0] != 0.0, axis=1)
+    freedom = int(np.count_nonzero(read)) - int(solution.rank[0])
+    return float(np.sqrt(residual @ residual / freedom)), freedom
+
+
+def test_right_instruments_that_scatter_three_times_as_stated_are_no_ground(tmp_path: Path) -> None:
+    """By what they state alone this was refused; E_n is by their own scatter, and Student's t judges it."""
+    campaign = scattering(tmp_path)
+    assert GroundKind.INSTRUMENTS not in grounds(campaign)
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    apart = disagreement(problem, solve_problem(problem), ability, doubtful=1.0)
+    assert apart is not None
+    assert apart.degrees_of_freedom is not None
+    names = {"laser interferometer": "laser", "ball bar": "bar", "R-test": "r-test"}
+    values = []
+    for name in (apart.first, apart.second):
+        alone = scattering(tmp_path / names[name], names[name])
+        scatter, freedom = scatter_of(alone)
+        value, u = gain(alone, apart.parameter)
+        values.append((value, scatter * u, freedom))
+    (first, u_first, nu_first), (second, u_second, nu_second) = values
+    u = math.hypot(u_first, u_second)
+    assert apart.e_n == pytest.approx(abs(first - second) / (2.0 * u), rel=0.03)
+    # JCGM 100:2008, G.2b.
+    freedom = u**4 / (u_first**4 / nu_first + u_second**4 / nu_second)
+    assert apart.degrees_of_freedom == pytest.approx(freedom, rel=0.05)
+    by_t = apart.comparisons * 2.0 * scipy.stats.t.sf(K * apart.e_n, apart.degrees_of_freedom)
+    assert apart.by_chance == pytest.approx(min(1.0, by_t), rel=1e-6)
+    by_statement = 2.0 * apart.comparisons * scipy.stats.norm.sf(K * apart.e_n * 3.0)
+    assert by_statement < 1e-3
+
+
+def test_the_other_sign_is_refused_where_the_readings_scatter_three_times_as_stated(tmp_path: Path) -> None:
+    for setups, factor in (("r-test", -1.0), ("r-test", 1e-3), ("bar", -1.0)):
+        campaign = scattering(tmp_path / f"{setups}{factor}", otherwise=(setups, factor))
+        assert GroundKind.INSTRUMENTS in grounds(campaign), setups
+
+
+def test_the_limit_of_a_scatter_with_few_degrees_of_freedom_is_that_of_student() -> None:
+    assert limit_of(11, 1e-3, 8.0) == pytest.approx(scipy.stats.t.isf(1e-3 / 22.0, 8.0) / K)

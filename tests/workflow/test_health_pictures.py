@@ -77,7 +77,11 @@ def page_of(db: Database, machine: str) -> MachineHealth:
 
 @pytest.mark.parametrize(
     "example",
-    ["hidden-reversal-x", "hidden-b-indexing", pytest.param("hidden-spindle-growth", marks=pytest.mark.slow)],
+    [
+        "hidden-b-indexing",
+        pytest.param("hidden-reversal-x", marks=pytest.mark.slow),
+        pytest.param("hidden-spindle-growth", marks=pytest.mark.slow),
+    ],
 )
 def test_before_the_residual_follows_the_driver_and_after_it_does_not(
     fleet: Database, made: dict, example: str

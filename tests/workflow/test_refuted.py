@@ -99,6 +99,7 @@ def test_the_fleet_names_machines_by_their_latest_campaign(
     assert f"refute the model that the values come from: HU40-T ({REFUTED}); type `monitor explain" in said
 
 
+@pytest.mark.slow
 def test_the_weekly_page_says_it_of_the_whole_campaign(tmp_path: Path) -> None:
     pages = {}
     for example in (REFUTED, RIGHT):

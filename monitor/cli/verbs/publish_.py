@@ -6,6 +6,7 @@ this one ended, and nothing is added twice.
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
@@ -38,7 +39,7 @@ def run(options: Namespace) -> int:
 
     request = PublishRequest(options.to, options.files, options.plant)
     with opened(options) as db, output.working("publishing"):
-        answer = ask(db, publish, request)
+        answer = ask(db, publish, request, away=_tell)
     if options.json:
         output.document(answer)
     elif answer.entries:
@@ -49,3 +50,11 @@ def run(options: Namespace) -> int:
     else:
         output.say(f"{answer.plant}: nothing new; the lake holds it up to entry {answer.last_entry}")
     return 0
+
+
+def _tell(fault: str) -> None:
+    print(
+        f"monitor: the lake does not answer, trying again for some minutes: {fault}",
+        file=sys.stderr,
+        flush=True,
+    )

@@ -8,9 +8,11 @@ from itertools import combinations
 import numpy as np
 
 from monitor.exceptions import MistakenUnitError
-from monitor.machine import Chain, evaluate
+from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.reading import direction_of
+from monitor.methods.instruments.readings.displacement import Displacement
 from monitor.methods.instruments.readings.vector import AtWorkPoint, VectorReading
 from monitor.records import Array
 from monitor.units import UNIT_WORDS, mistaken_for_mm
@@ -24,6 +26,24 @@ CONTRADICTS_TRAVEL, LEAST_CONTRADICTION = 0.02, 1.0
 # hundred away, and the fit follows them: the errors come out as of a machine of another size. A unit is named where it
 # takes away all but a tenth of what is more than this.
 STATED_WITHIN, LEFT_BY_UNIT = 5.0, 0.1
+# A laser's readings are its travel to some hundredths: gains of machines are thousands of times smaller. A travel of
+# less than a millimetre says nothing of that.
+SAME_TRAVEL, LEAST_TRAVEL = 0.02, 1.0
+# A path that leaves its point by more than this, mm, beside what sensors read is no error of a machine; another point
+# of the tool explains it where it takes away all but this part.
+LEAST_POINT, LEFT_BY_POINT = 0.1, 0.2
+# What readings of a travel are where they are not µm of it along n: the factor, and what to look at.
+OTHER_TRAVELS = (
+    (-1.0, "with the other sign: look at the signs of the readings, of `direction` and of the axis"),
+    (1e-3, "in mm: the column is in µm"),
+    (1e3, "in nm: the column is in µm"),
+    (1.0 / 25400.0, "in inches: the column is in µm"),
+    (
+        1.0 / 25.4,
+        "in thousandths of an inch, or the axis is written 25.4 times too large: columns are in µm and mm",
+    ),
+    (25.4, "as if the axis were written in inches: positions are in mm"),
+)
 
 
 def contradiction(parts: Sequence[Part], sigma: Array, vectors: Array, travel: float) -> str | None:
@@ -86,6 +106,78 @@ def _wrong_unit(parts: Iterable[Part]) -> str | None:
     return None
 
 
+def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
+    """What may keep a fit from settling, as the end of a refusal; ``bars`` kept one direction, so that a centre which
+    is stated some millimetres wrong cannot be mended."""
+    suspected = "".join(f"; {what}" for what in (*_other_travels(parts), *_other_tool_points(parts)))
+    return suspected + "".join(
+        f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
+        "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
+        for name in bars
+    )
+
+
+def _other_travels(parts: Iterable[Part]) -> Iterator[str]:
+    """The setups of lasers whose readings are not the travel of the tool point along their direction, in words."""
+    for part in parts:
+        if not isinstance(part.reading, Displacement):
+            continue
+        for index in np.unique(part.rows.run):
+            mine = part.rows.run == index
+            travel = _nominal(part)[mine] @ direction_of(part.reading.setup)
+            travel = travel - travel.mean()
+            read = part.rows.measured[mine, 0] - part.rows.measured[mine, 0].mean()
+            what = _travel_in_words(travel, read)
+            if what is not None:
+                yield f"the readings of setup {part.id} are {what}"
+                break
+
+
+def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
+    """The setups of vectors that fit another tool point than the stated one, in words: a head that turns shows it."""
+    for part in parts:
+        if not isinstance(part.reading, VectorReading) or not _is_sought(part.reading):
+            continue
+        rows, setup = part.rows, part.reading.setup
+        first = (rows.run == rows.run[0]) & np.isfinite(rows.measured).all(axis=1)
+        sides = orientation(rows.chain, rows.positions, np.zeros((len(rows), len(rows.chain.joints), 2, 6)))
+        tool = (np.swapaxes(sides.work, 1, 2) @ sides.tool)[first]
+        measured = rows.measured[first]
+        if setup.frame == "tool":
+            measured = np.einsum("nij,nj->ni", tool, measured)
+        off = _nominal(part)[first] - measured
+        before = off - off.mean(axis=0)
+        by_point = (tool - tool.mean(axis=0)).reshape(-1, 3)
+        move = np.linalg.lstsq(by_point, -before.reshape(-1), rcond=1e-3)[0]
+        left, as_stated = (
+            float(np.sqrt(np.mean(each**2))) for each in (before.reshape(-1) + by_point @ move, before)
+        )
+        if as_stated > LEAST_POINT and left < LEFT_BY_POINT * as_stated:
+            point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
+            yield (
+                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {left:.2g} mm left where the "
+                f"stated one leaves {as_stated:.2g} mm"
+            )
+
+
+def _travel_in_words(travel: Array, read: Array) -> str | None:
+    """What readings (n,) mm of a travel (n,) mm are instead; None where they are it."""
+    size, change = float(np.ptp(travel)), float(np.ptp(read))
+    if size < LEAST_TRAVEL:
+        if change < LEAST_TRAVEL:
+            return None
+        return f"a travel of {change:.3g} mm where its tool point moves {size:.2g} mm along `direction`"
+    slope = float(travel @ read / (travel @ travel))
+    if abs(slope - 1.0) < SAME_TRAVEL:
+        return None
+    for factor, what in OTHER_TRAVELS:
+        if abs(slope / factor - 1.0) < SAME_TRAVEL:
+            return f"its travel {what}"
+    if abs(slope) < 0.1 * SAME_TRAVEL:
+        return "no travel: the whole travel is read, not its error (add the position along `direction`)"
+    return f"{slope:.3g} times its travel along `direction`"
+
+
 def displaced_work_points(parts: Iterable[Part], unknowns: Iterable[Array]) -> Iterator[Displaced]:
     """Stated work points that the unknowns (q,) of a run, in the order of ``parts``, put elsewhere."""
     for part, values in zip(parts, unknowns, strict=True):
@@ -114,10 +206,13 @@ def _units(chain: Chain) -> Iterator[tuple[str, Array, str]]:
 
 def _off(part: Part, scale: Array) -> float:
     """How far (mm, median) a machine without errors is from the stated work point, for positions times ``scale``."""
-    assert isinstance(part.reading, AtWorkPoint)
+    return float(np.median(np.linalg.norm(_nominal(part, scale), axis=1)))
+
+
+def _nominal(part: Part, scale: Array | float = 1.0) -> Array:
+    """The vectors r (n, 3) mm of a machine without errors, for positions times ``scale``."""
     rows, setup = part.rows, part.reading.setup
     count, joints = len(rows), len(rows.chain.joints)
     work, tool = np.tile(setup.work_point, (count, 1)), np.tile(setup.tool_point, (count, 1))
     none = np.zeros((count, joints, 2, 6))
-    r = evaluate(rows.chain, rows.positions * scale, none, work, tool).residual
-    return float(np.median(np.linalg.norm(r, axis=1)))
+    return evaluate(rows.chain, rows.positions * scale, none, work, tool).residual

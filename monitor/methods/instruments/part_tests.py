@@ -2,7 +2,9 @@
 
 A ``point`` whose targets are ``known`` is cut by one tool at places that the axes say; its targets name the elements of
 the part (the sides of a square, a bore, the circles of a cone frustum). An element is a line or a circle where the
-programmed path is one. The tool's radius moves lines in parallel and circles to another radius, so neither matters.
+programmed path is one. The tool's radius moves lines in parallel and circles to another radius, so neither matters. Any
+other path is a profile or a face: there the axis of the tool counts, which is ``tool_direction`` of the setup, else the
+direction of its ``tool_point_mm``, else Z.
 """
 
 from __future__ import annotations
@@ -13,17 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from monitor.machine import orientation
 from monitor.methods.instruments.frames import seen_points
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.point import Point
-from monitor.methods.standard_test import PartFeature, PartTest
+from monitor.methods.standard_test import PartFeature, PartPath, PartTest
 from monitor.records import Array
 
 #: A programmed path that keeps to a line or circle within so much is one, mm: positions are written to 0.1 µm or 1 µm.
 ON_PATH = 5e-3
 #: Points of a line and of a circle below which nothing of its form shows.
 FEWEST_OF_LINE, FEWEST_OF_CIRCLE = 4, 6
+#: Of a path of any form seven numbers are found: where the part lies, and the radius of the cutter.
+FEWEST_OF_PATH = 14
 #: A circle is measured around by half a turn at least.
 SHORTEST_ARC = np.pi
 #: A rotary axis that moves by more than this turns, rad.
@@ -42,51 +47,86 @@ class _Shape:
 
 
 def part_tests(problem: InstrumentProblem) -> Iterator[PartTest]:
-    """Every part that a setup measured, one a run, that has a line or a circle."""
+    """Every part that a setup measured, one a run, that has a line, a circle or another path."""
     for part in problem.parts:
         if not isinstance(part.reading, Point) or not part.reading.holds("targets"):
             continue
         for index in np.unique(part.rows.run):
             mine = np.flatnonzero(part.rows.run == index)
-            features = tuple(_features(part, mine))
-            if features:
+            features, paths = _elements(_cut(part, mine))
+            if features or paths:
                 u = float(np.sqrt(np.mean(problem.sigma[part.at[mine], 0] ** 2)))
-                yield PartTest(part.id, int(problem.runs[index]), features, u)
+                yield PartTest(part.id, int(problem.runs[index]), features, paths, u)
 
 
-def _features(part: Part, mine: npt.NDArray[np.int64]) -> Iterator[PartFeature]:
-    """The lines and circles of the rows ``mine`` (m,), in the order of cutting."""
+@dataclass(frozen=True)
+class _Cut:
+    """Rows (m,) of a part: ``nominal`` and ``measured`` (m, 3) mm and the tool's ``axes`` (m, 3) in the instrument's
+    frame, their ``targets``, and whether rotary axes moved, by ``turned`` (m, r) rad."""
+
+    nominal: Array
+    measured: Array
+    axes: Array
+    targets: npt.NDArray[np.str_]
+    turned: Array
+    has_heights: bool
+
+
+def _cut(part: Part, mine: npt.NDArray[np.int64]) -> _Cut:
+    """The rows ``mine`` (m,) of a setup in one run."""
     assert isinstance(part.reading, Point)
-    read_there, guess = part.rows.measured[mine], part.rows.guess[:, :12]
-    if read_there.shape[1] == 2 and not part.reading.holds("frame"):
-        identity = np.tile(np.concatenate([np.eye(3).reshape(-1), np.zeros(3)]), (len(part.rows), 1))
-        on_work = seen_points(part.rows, identity, np.array(part.reading.places))[mine]
-        nominal = _laid_flat(on_work, _normal(on_work, part.rows.target[mine]), read_there)
+    rows, read_there, guess = part.rows, part.rows.measured[mine], part.rows.guess[:, :12]
+    axes, targets = _tool_axes(part)[mine], rows.target[mine]
+    is_plane = read_there.shape[1] == 2
+    if is_plane and not part.reading.holds("frame"):
+        identity = np.tile(np.concatenate([np.eye(3).reshape(-1), np.zeros(3)]), (len(rows), 1))
+        on_work = seen_points(rows, identity, np.array(part.reading.places))[mine]
+        nominal = _laid_flat(on_work, _normal(on_work, targets), read_there)
+        axes = np.tile(np.eye(3)[2], (len(mine), 1))
     else:
-        nominal = seen_points(part.rows, guess, np.array(part.reading.places))[mine]
+        nominal = seen_points(rows, guess, np.array(part.reading.places))[mine]
+        axes = np.einsum("nji,nj->ni", guess[mine, :9].reshape(-1, 3, 3), axes)
     measured = nominal.copy()
     measured[:, : read_there.shape[1]] = np.where(
         np.isnan(read_there), measured[:, : read_there.shape[1]], read_there
     )
-    targets = part.rows.target[mine]
-    for name in dict.fromkeys(targets.tolist()):
-        at = targets == name
-        shape = _shape(nominal[at])
+    rotary = [joint.kind == "rotary" for joint in rows.chain.joints]
+    has_heights = not is_plane and not np.isnan(read_there).any()
+    return _Cut(nominal, measured, axes, targets, rows.positions[mine][:, rotary], has_heights)
+
+
+def _tool_axes(part: Part) -> Array:
+    """Unit vectors (n, 3) along the tool's axis in the frame of the last work axis, of a machine without errors."""
+    setup, rows = part.reading.setup, part.rows
+    along = np.array(setup.tool_direction or setup.tool_point)
+    along = np.eye(3)[2] if not along.any() else along / np.linalg.norm(along)
+    sides = orientation(rows.chain, rows.positions, np.zeros((len(rows), len(rows.chain.joints), 2, 6)))
+    return np.asarray(np.swapaxes(sides.work, 1, 2) @ sides.tool @ along)
+
+
+def _elements(cut: _Cut) -> tuple[tuple[PartFeature, ...], tuple[PartPath, ...]]:
+    """The lines and circles, and the paths that are neither, in the order of cutting."""
+    features, paths = [], []
+    for name in dict.fromkeys(cut.targets.tolist()):
+        at = cut.targets == name
+        nominal, measured, shape = cut.nominal[at], cut.measured[at], _shape(cut.nominal[at])
         if shape is not None:
-            moved = np.ptp(part.rows.positions[mine[at]], axis=0)
-            turning = bool(
-                moved[[joint.kind == "rotary" for joint in part.rows.chain.joints]].max(initial=0.0) > TURNS
+            turning = bool(np.ptp(cut.turned[at], axis=0).max(initial=0.0) > TURNS)
+            features.append(
+                PartFeature(
+                    str(name),
+                    shape.kind,
+                    measured,
+                    nominal,
+                    shape.centre,
+                    shape.normal,
+                    shape.radius,
+                    turning,
+                )
             )
-            yield PartFeature(
-                str(name),
-                shape.kind,
-                measured[at],
-                nominal[at],
-                shape.centre,
-                shape.normal,
-                shape.radius,
-                turning,
-            )
+        elif len(nominal) >= FEWEST_OF_PATH:
+            paths.append(PartPath(str(name), measured, nominal, cut.axes[at], cut.has_heights))
+    return tuple(features), tuple(paths)
 
 
 def _normal(points: Array, targets: npt.NDArray[np.str_]) -> Array:

@@ -18,7 +18,7 @@ from monitor.methods.chain.least_squares import Linearisation, Solution, elimina
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
-from monitor.methods.instruments.contradiction import contradiction, displaced_work_points
+from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
 from monitor.methods.instruments.first_guess import first_guess, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
@@ -37,6 +37,8 @@ SECOND_ORDER = 5e-3
 LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
+# Derivatives below this part of the largest, in mm or rad over what a reading is known to, are rounding.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -149,12 +151,8 @@ class InstrumentProblem(ChainProblem):
 
     @property
     def unsettled(self) -> str:
-        """Bars that kept one direction: a centre that is stated some millimetres wrong cannot be mended then."""
-        return "".join(
-            f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
-            "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
-            for name in self.bars_of_one_direction
-        )
+        """Lasers that read something else than the travel, and bars that kept one direction."""
+        return unsettled(self.parts, self.bars_of_one_direction)
 
     @property
     def largest_error(self) -> float:
@@ -294,7 +292,9 @@ class InstrumentProblem(ChainProblem):
         whole = replace(self, is_whole=True)
         by_local = whole.linearise(self.start, self.common_start).local
         scale = np.linalg.norm(by_local, axis=1)
-        scale[scale == 0] = 1.0
+        # A centre across the plane of a bar's swing leaves 1e-14 by rounding, or nothing, as its plane lies.
+        is_rounding = scale <= ROUNDING * scale.max(axis=1, keepdims=True)
+        by_local, scale = np.where(is_rounding[:, None, :], 0.0, by_local), np.where(is_rounding, 1.0, scale)
         null_space = eliminate(by_local).null_space
         projector = np.eye(by_local.shape[2]) - np.swapaxes(null_space, 1, 2) @ null_space
         # What is open by itself leaves a column of rounding.

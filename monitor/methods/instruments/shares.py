@@ -4,8 +4,9 @@ The joint estimate is C J' r, linear in the whitened readings r, each of varianc
 the sum of the squares of its row of C J', and the readings of one instrument have their part of that sum (GUM, 5.1.3).
 What an instrument says alone is one Gauss-Newton step from the joint point on its own rows: where instruments disagree
 by five times U, a tenth of u beside the fit of its own campaign. What its rows do not separate on the nominal machine
-is left out of that step, as in ``InstrumentProblem.linearise``. Setups whose ``instrument`` is written the same are
-one instrument.
+is left out of that step, as in ``InstrumentProblem.linearise``. Where its readings, after that step, scatter more than
+it states, their own scatter counts, with its degrees of freedom (JCGM 100:2008, 4.2 and G.4.1); less never makes it
+surer. Setups whose ``instrument`` is written the same are one instrument.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtrc
 
 from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -23,6 +25,10 @@ from monitor.records import Array
 
 #: Of an unknown that an instrument does not show, its rows have this part of the derivatives, or less, by rounding.
 ROUNDING = 1e-7
+#: Readings scatter more than stated where chance makes so much in fewer than this part of instruments. At 5 % one in
+#: twenty right ones is taken for up to a tenth worse than it is, and scatter of 1.5 times what is stated shows in four
+#: of five instruments of twenty readings (chi-square).
+SCATTERS = 0.05
 
 
 def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[InstrumentShare, ...], Array]:
@@ -53,19 +59,37 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
         separated, determined = _separated(nominal[mine], np.linalg.norm(nominal, axis=0))
         by_mine = _inverse(jacobian[mine] @ separated, RANK_TOLERANCE)
         determined = determined[:count] & free
+        remaining = residual[mine] - jacobian[mine] @ (separated @ (by_mine @ residual[mine]))
+        leverage = np.einsum("mp,pm->m", jacobian[mine] @ separated, by_mine)
+        numbers = int(np.count_nonzero(np.any(jacobian[rows] != 0.0, axis=1)))
+        of_rows = slice(0, len(rows))
+        scatter, freedom = _scatter(remaining[of_rows], numbers - float(leverage[of_rows].sum()))
+        by_readings = scatter * np.sum(by_mine[:count, of_rows] ** 2, axis=1)
+        variance = by_readings + np.sum(by_mine[:count, len(rows) :] ** 2, axis=1)
         step = -by_mine[:count] @ residual[mine]
         instruments.append(
             InstrumentShare(
                 name=name,
                 setups=setups,
-                numbers=int(np.count_nonzero(np.any(jacobian[rows] != 0.0, axis=1))),
+                numbers=numbers,
                 chi_square=float(residual[rows] @ residual[rows]),
                 variance=squares[:, rows].sum(axis=1),
                 alone=np.where(determined, joint + step, np.nan),
-                alone_variance=np.where(determined, np.sum(by_mine[:count] ** 2, axis=1), np.nan),
+                alone_variance=np.where(determined, variance, np.nan),
+                # What is known beforehand has no end of them (Welch and Satterthwaite, JCGM 100:2008, G.2b).
+                alone_freedom=freedom * (variance / np.where(by_readings > 0.0, by_readings, np.nan)) ** 2,
             )
         )
     return tuple(instruments), np.asarray(squares[:, extras:].sum(axis=1))
+
+
+def _scatter(remaining: Array, freedom: float) -> tuple[float, float]:
+    """The variance of whitened readings (m,) by themselves and its degrees of freedom; 1, and no end of them, where
+    they do not scatter more than stated."""
+    square = float(remaining @ remaining)
+    if freedom < 1.0 or square <= freedom or chdtrc(freedom, square) >= SCATTERS:
+        return 1.0, float("inf")
+    return square / freedom, freedom
 
 
 def _instruments(problem: InstrumentProblem) -> dict[str, tuple[str, ...]]:

@@ -6,18 +6,22 @@ from datetime import date
 from xml.etree import ElementTree as ET
 
 from monitor.reporting.certificate.behind import behind_sentences
-from monitor.reporting.certificate.dcc_elements import add, say, version_of
+from monitor.reporting.certificate.dcc_elements import DccVersion, add, say, version_of
 from monitor.reporting.certificate.dsi import expanded_uncertainty, joint_values, real, standard_uncertainty
+from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord, Condition, NotApplicable
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import printed_map
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.certificate.words import answer
 from monitor.reporting.refused import why_refused
+from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
 #: Coverage factor of the expanded uncertainty that a laboratory states of a temperature (docs of its file).
 _STATED_K = 2.0
+#: Probability of a normal law within two standard deviations.
+_P_OF_STATED_K = 0.9545
 
 
 def geometric_errors(parent: ET.Element, record: CertificateRecord, result: ResultSet, texts: Texts) -> None:
@@ -48,6 +52,32 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
         element = add(results, "result")
         say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
         say(add(element, "data"), "text", why_refused(refusal, texts), texts.language)
+    for effect in result.effects or ():
+        _model_effect(results, effect, version, texts)
+
+
+def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, texts: Texts) -> None:
+    """An effect that was added to the model, with its own standard uncertainty; a play with its reversal value too."""
+    description = describe(effect.name, texts)
+    if effect.value is None or effect.u is None:
+        element = add(parent, "result")
+        say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
+        say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
+        return
+    explained = texts("page.effects_explained", runs=effect.runs, days=effect.days)
+    values = [(description, effect.value, effect.u)]
+    if effect.reversal_value is not None and effect.u_reversal is not None:
+        values.append((texts("page.effect_reversal"), effect.reversal_value, effect.u_reversal))
+    for meaning, value, u in values:
+        element = add(parent, "result")
+        say(element, "name", texts("dcc.effect", name=effect.name, words=meaning), texts.language)
+        say(element, "description", explained, texts.language)
+        quantity = real(add(add(element, "data"), "quantity", ref="basic_measuredValue"), value, effect.unit)
+        if version is DccVersion.V3_2_1:
+            # D-SI 2.1 has no place for a standard uncertainty.
+            expanded_uncertainty(quantity, _STATED_K * u, _STATED_K, _P_OF_STATED_K, version)
+        else:
+            standard_uncertainty(quantity, u)
 
 
 def volumetric_error(

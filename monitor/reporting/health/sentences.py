@@ -37,7 +37,10 @@ class ParameterChanged(Sentence):
 
 @dataclass(frozen=True)
 class SteppedAtEvent(Sentence):
-    """A parameter differs before and after an event; ``undecided`` says why this may be no step."""
+    """A parameter differs before and after an event; ``undecided`` says why this may be no step.
+
+    ``drift`` is what its machine drifts by in 30 days beside the step, in the same unit.
+    """
 
     parameter: str
     event: str
@@ -45,10 +48,13 @@ class SteppedAtEvent(Sentence):
     u: float
     unit: str
     undecided: Undecided | None
+    drift: float | None = None
 
     def __str__(self) -> str:
         size, u = in_words(self.size, self.u, sign=True)
         event, u = f"the event '{self.event}'", f"u = {u} {self.unit}"
+        if self.drift is not None:
+            u += f"; beside a drift of {self.drift:+.3g} {self.unit} in 30 days"
         if self.undecided is None:
             return f"{self.parameter} stepped by {size} {self.unit} at {event} ({u})"
         by_runs = " by the runs alone" if self.undecided is Undecided.ONE_DAY_EACH else ""

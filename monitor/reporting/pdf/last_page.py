@@ -34,11 +34,11 @@ def ends_early(document: Document) -> bool:
 def closeness_saves(document: Document) -> bool:
     """Return whether what the pages hold may fit on one fewer when it is set closer."""
     filled = sum(_end_of(page._page_box.children[0]) / page.height - _MARGIN for page in document.pages)
-    return filled * (1.0 - _CLOSER) <= (len(document.pages) - 1) * (_ROOM - _LEFT)
+    return bool(filled * (1.0 - _CLOSER) <= (len(document.pages) - 1) * (_ROOM - _LEFT))
 
 
 def _end_of(box: Any) -> float:
-    """Return where the text of a box ends; the box itself reaches to the foot of a page on whose next one it goes on."""
+    """Return where the text of a box ends; a box that goes on on the next page reaches to the foot of this one."""
     inside = [child for child in getattr(box, "children", ()) if child.element_tag != "html"]
     if not inside or type(box).__name__ in _UNBROKEN:
         return float(box.position_y + box.margin_height())

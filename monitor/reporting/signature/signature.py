@@ -28,8 +28,8 @@ class SignatureFinding:
     ``stamped_at`` is when a time stamp authority saw it; None without a time stamp that fits the signature.
     ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such. ``long_term`` is the
     material for later validation, None without any; what it lacks is no fault of the signature. ``judged_until`` is
-    when the file ceases to prove by itself who signed it, None for a signature that is not good: the end of the signer's
-    certificate, or that of the time stamp's where the material suffices.
+    when the file ceases to prove by itself who signed it, None for a signature that is not good: the end of the
+    signer's certificate, or that of the time stamp's where the material suffices.
     """
 
     good: bool | None

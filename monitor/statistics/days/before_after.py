@@ -109,6 +109,11 @@ class BeforeAfter:
         """Return the largest p-value of the difference by what the days do not exclude; 0 without rivals."""
         return max((rival.p_value(self.difference) for rival in self.rivals), default=0.0)
 
+    def limit(self, level: float) -> float:
+        """Return what a difference has to exceed at a ``level`` of false calls, with all that the days leave open."""
+        pairs = [(self.u, self.dof), *((rival.u, rival.dof) for rival in self.rivals)]
+        return max(-float(scipy.special.stdtrit(dof, level / 2.0)) * u for u, dof in pairs)
+
     @property
     def e_n(self) -> float | None:
         """The difference in units of its expanded uncertainty; None where nothing is decided."""

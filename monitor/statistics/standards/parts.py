@@ -36,6 +36,10 @@ class FormKind(StrEnum):
     CONCENTRICITY = "concentricity"
     POSITION = "position"
     HALF_ANGLE = "half_angle"
+    PROFILE = "profile"
+    PROFILE_ZONE = "profile_zone"
+    FLATNESS = "flatness"
+    FLATNESS_ZONE = "flatness_zone"
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,8 @@ def part_figures(
     ``u_reading`` mm is the standard uncertainty of one coordinate; u is the standard deviation of a figure over parts
     measured again. Widths grow with noise, and u does not correct that.
     """
+    if not elements:
+        return ()
     plane = _plane(elements)
     elements = _levelled(elements, plane)
     values = list(_figures(elements, [each.measured for each in elements], plane))
@@ -306,14 +312,21 @@ class Form:
     deviation: Array
 
 
-def forms(elements: Sequence[Element]) -> tuple[Form, ...]:
-    """The forms of the elements of one part, in their order."""
-    plane = _plane(elements)
-    elements = _levelled(elements, plane)
+def plan_of(elements: Sequence[Element], axis: Array) -> Array:
+    """Two directions (3, 2) in the plane of a part; across ``axis`` (3,) where it has no elements."""
+    plane = _plane(elements) if elements else axis
     first = np.eye(3)[int(np.abs(plane).argmin())]
     first = first - (first @ plane) * plane
     first = first / np.linalg.norm(first)
-    flat = np.column_stack([first, np.cross(plane, first)])
+    return np.column_stack([first, np.cross(plane, first)])
+
+
+def forms(elements: Sequence[Element], flat: Array) -> tuple[Form, ...]:
+    """The forms of the elements of one part, in their order, seen along two directions (3, 2)."""
+    if not elements:
+        return ()
+    plane = _plane(elements)
+    elements = _levelled(elements, plane)
     drawn = []
     for element in elements:
         if element.is_circle:

@@ -16,7 +16,7 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.kept_blocks import ENDING
-from monitor.store.opening import sync_folder
+from monitor.store.opening import refuse_log_left, sync_folder
 
 _MANIFEST_END = ".manifest.json"
 #: What the name of a backup ends with until it is whole.
@@ -148,11 +148,12 @@ def remove_partial(partial: Path) -> None:
 
 
 def refuse_existing(target: Path) -> None:
-    """Raise StoreError where a file is there already, or its folder is not."""
+    """Raise StoreError where a file is there already, or the log of one that was, or its folder is not."""
     if target.exists():
         raise StoreError(f"{target} exists already; name a new file, or move that one away first")
     if not target.absolute().parent.is_dir():
         raise StoreError(f"the folder of {target} does not exist; make it first")
+    refuse_log_left(target)
 
 
 def sync(path: Path) -> None:

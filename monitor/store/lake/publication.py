@@ -54,6 +54,8 @@ PORTION = 200
 _NOTHING_INLINED = "DATA_INLINING_ROW_LIMIT 0"
 #: How often a transaction is begun, and the first and longest pause in between, in s.
 _TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 40, 0.1, 5.0
+#: After how many seconds of trying somebody who waits is told.
+_SAID_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,20 @@ class Published:
     tries: int
 
 
+@dataclass(frozen=True)
+class _Portion:
+    """Entries of an audit from ``first`` to ``last``, of which ``end`` is the last that is there, with its hash.
+
+    ``rows`` were added; None where another process did, or where nothing is new (``first`` is beyond ``end``).
+    """
+
+    first: int
+    last: int
+    end: int
+    sha256: str
+    rows: int | None
+
+
 def publish(
     db: Database,
     address: str,
@@ -76,12 +92,14 @@ def publish(
     files: str | Path | None = None,
     plant: str | None = None,
     progress: Callable[[int, int], None] = lambda last, end: None,
+    away: Callable[[str], None] = lambda fault: None,
 ) -> Published:
     """Publish everything that a database stored since it last published; ``files`` is the folder or the
     address in an object store (``s3://bucket/folder``) of a new lake.
 
     ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
-    the last entry that was published and the last that is there. The database is closed. Raises StoreError, InputError.
+    the last entry that was published and the last that is there, ``away`` with the lake's fault where one transaction
+    is tried for long. The database is closed. Raises StoreError, InputError.
     """
     if db.path == ":memory:" or is_lake(db.path):
         raise StoreError(f"{db.path} is no database file of a plant; name one with --db")
@@ -89,15 +107,24 @@ def publish(
     db.rows("SELECT max(entry) FROM audit")
     # DuckDB's lock belongs to the process: a second opening of the file would end that of the first.
     db.close()
-    with contextlib.closing(_Publisher(db.path, db.patience(), address, files)) as publisher:
+    with contextlib.closing(_Publisher(db.path, db.patience(), address, files, away)) as publisher:
         return publisher.publish(plant or Path(db.path).stem, progress)
 
 
 class _Publisher:
-    """A connection that has the lake, and the file of the plant for as long as it is read."""
+    """A connection that has the lake, and the file of the plant for as long as it is read: not while the lake is away,
+    so that the plant's own work goes on."""
 
-    def __init__(self, path: str, patience: Patience, address: str, files: str | Path | None) -> None:
+    def __init__(
+        self,
+        path: str,
+        patience: Patience,
+        address: str,
+        files: str | Path | None,
+        away: Callable[[str], None],
+    ) -> None:
         self._path, self._patience, self._address, self._files = path, patience, address, files
+        self._away = away
         self._catalogue = catalogue_file(address)
         self._connection = connection_with_extensions()
         self._attached = False
@@ -110,23 +137,19 @@ class _Publisher:
     def publish(self, name: str, progress: Callable[[int, int], None]) -> Published:
         """Publish portion by portion; the file is let go in between, so that those who write get their turn."""
         self._again(self._make)
-        with self._origin():
-            plant_no, name = self._again(lambda: self._registered(name))
+        plant_no, name = self._again(lambda: self._registered(name))
         entries = rows = 0
         while True:
-            with self._origin():
-                first, end, sha256 = self._span(plant_no)
-                if first > end:
-                    return Published(name, entries, rows, end, sha256, self._tries)
-                last = min(first + PORTION - 1, end)
-                added = self._publish_portion(plant_no, name, first, last)
-            if added is not None:
-                entries, rows = entries + last - first + 1, rows + added
-            progress(last, end)
+            portion = self._again(lambda: self._publish_portion(plant_no, name))
+            if portion.first > portion.end:
+                return Published(name, entries, rows, portion.end, portion.sha256, self._tries)
+            if portion.rows is not None:
+                entries, rows = entries + portion.last - portion.first + 1, rows + portion.rows
+            progress(portion.last, portion.end)
 
     def _again(self, attempt: Callable[[], Result]) -> Result:
         """Return what an attempt returns, made anew with growing pauses where the lake refused or was away."""
-        pause = _FIRST_PAUSE_S
+        pause, begin, is_said = _FIRST_PAUSE_S, time.monotonic(), False
         for remaining in reversed(range(_TRIES)):
             self._tries += 1
             try:
@@ -142,6 +165,9 @@ class _Publisher:
                         f"nothing more could be published to {self._address}: {' '.join(str(fault).split())}; what was "
                         "published stays, and the next `monitor publish` goes on behind it"
                     ) from fault
+                if not is_said and time.monotonic() - begin > _SAID_S:
+                    is_said = True
+                    self._away(" ".join(str(fault).split()))
             # No randomness of a result: only when two processes try again.
             time.sleep(random.uniform(pause / 3, pause))
             pause = min(1.5 * pause, _LONGEST_PAUSE_S)
@@ -208,7 +234,8 @@ class _Publisher:
 
     def _registered(self, name: str) -> tuple[int, str]:
         """Return number and name of the plant, registered where it never published."""
-        first = self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = 1")
+        with self._origin():
+            first = self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = 1")
         if not first:
             raise StoreError(f"{self._path} holds nothing that could be published")
         registered = registered_plant(self._connection, first[0][0])
@@ -217,20 +244,33 @@ class _Publisher:
         with self._transaction():
             return register_plant(self._connection, name, first[0][0]), name
 
-    def _span(self, plant_no: int) -> tuple[int, int, str]:
-        """Return the first entry to publish, the last of the audit and its hash. Raises StoreError for another past."""
-        ((end, sha256),) = self._rows("SELECT max(entry), max_by(entry_sha256, entry) FROM origin.audit")
-        published = self._again(lambda: self._last_published(plant_no))
-        if published is None:
-            return 1, end, sha256
-        entry, expected = published
+    def _publish_portion(self, plant_no: int, name: str) -> _Portion:
+        """Add the next entries with all that they record. Raises StoreError for a plant of another past."""
+        with self._origin():
+            ((end, sha256),) = self._rows("SELECT max(entry), max_by(entry_sha256, entry) FROM origin.audit")
+            published = self._last_published(plant_no)
+            first = 1 if published is None else published[0] + 1
+            if published is not None:
+                self._check_past(*published)
+            last = min(first + PORTION - 1, end)
+            rows = None
+            if first <= end:
+                select_portion(self._connection, "origin", first, last)
+                ((largest,),) = self._rows("SELECT max(number) FROM portion")
+                if largest > LARGEST_OWN:
+                    raise StoreError(f"a lake takes numbers of a plant up to {LARGEST_OWN}, not {largest}")
+                self._register_names(plant_no, name)
+                rows = self._insert(plant_no, first, last)
+            return _Portion(first, last, end, sha256, rows)
+
+    def _check_past(self, entry: int, expected: str) -> None:
+        """Raise StoreError where the entry that the lake holds last has another hash in the plant's audit."""
         if self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = ?", entry) != [(expected,)]:
             raise StoreError(
                 f"{self._path} has another past than it published: entry {entry} of its audit, the last that the lake "
                 "holds, is missing or has another hash. The file was put back to an earlier state, or rewritten: "
                 "publish the newer file, or make a new lake from the plants"
             )
-        return entry + 1, end, sha256
 
     def _last_published(self, plant_no: int) -> tuple[int, str] | None:
         """Return number and hash of the last entry that the lake holds of a plant."""
@@ -239,15 +279,6 @@ class _Publisher:
             plant_no,
         )
         return rows[0] if rows else None
-
-    def _publish_portion(self, plant_no: int, name: str, first: int, last: int) -> int | None:
-        """Add the entries from first to last with all that they record; rows, None where another process did."""
-        select_portion(self._connection, "origin", first, last)
-        ((largest,),) = self._rows("SELECT max(number) FROM portion")
-        if largest > LARGEST_OWN:
-            raise StoreError(f"a lake takes numbers of a plant up to {LARGEST_OWN}, not {largest}")
-        self._again(lambda: self._register_names(plant_no, name))
-        return self._again(lambda: self._insert(plant_no, first, last))
 
     def _register_names(self, plant_no: int, name: str) -> None:
         if unregistered_names(self._connection, plant_no):

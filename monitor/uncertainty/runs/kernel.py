@@ -10,11 +10,10 @@ its steps. So a class costs the same for one unknown or for thirty.
 
 from __future__ import annotations
 
-import contextlib
-
 import numba
 import numpy as np
 
+from monitor.progress import saying
 from monitor.records import Array
 from monitor.uncertainty.runs.program import (
     SHIFT_READING,
@@ -27,6 +26,10 @@ from monitor.uncertainty.workers.interrupts import interrupts_kept
 
 #: Trials that are computed together, so that what they need stays in the first-level cache.
 LANES = 64
+#: What whoever waits for the first call of a process is told.
+FIRST_CALL = (
+    "the program of the trials is being made ready, which takes half a minute the first time on this machine"
+)
 # Rows of the work space, each of LANES numbers: frame (9), origin (3), readings' directions (9), force (3),
 # moment (3), force times reading (9), readings (3), target (3), residual force (3), direction (3), amount,
 # component, sine, cosine.
@@ -561,7 +564,10 @@ def _block(theta, x, gradient, held, segments, steps, entries, walk, probings, d
 
 def call_block(*arguments: object) -> None:
     """Call the compiled block; the first call compiles it or loads it from the cache, and then Ctrl-C waits."""
-    with contextlib.nullcontext() if _block.signatures else interrupts_kept():
+    if _block.signatures:
+        _block(*arguments)
+        return
+    with saying(FIRST_CALL), interrupts_kept():
         _block(*arguments)
 
 

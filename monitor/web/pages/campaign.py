@@ -52,18 +52,22 @@ def routes() -> APIRouter:
         asked = {"campaign": name, "by": by}
         statistics, why_no_statistics, waiting = desk.ask(user, "statistics", asked).outcome()
         trials = bool(request.query_params.get("trials"))
-        regions, why_no_regions = None, ""
+        regions, region, why_no_regions = None, None, ""
         if first or second:
-            question, document = _regions_asked(name, first, second, run, trials=trials)
-            regions, why_no_regions, computed = desk.ask(user, question, document).outcome()
-            waiting = waiting or computed
+            try:
+                question, document = _regions_asked(name, first, second, run, trials=trials)
+                regions, why_no_regions, computed = desk.ask(user, question, document).outcome()
+                waiting = waiting or computed
+                region = None if regions is None else _region(regions, first, second)
+            except InputError as error:
+                regions, why_no_regions = None, str(error)
         return page(
             request, "campaign.html",
             row=row, runs=runs, conditions=_conditions(runs), by=by, run=run,
             statistics=statistics, why_no_statistics=why_no_statistics,
             charts=[] if statistics is None else _charts(statistics),
             regions=regions, why_no_regions=why_no_regions, first=first, second=second,
-            region=None if regions is None else _region(regions, first, second),
+            region=region,
             trials=trials, waiting=waiting,
         )  # fmt: skip
 

@@ -17,8 +17,10 @@ from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.desk import Desk, Ticket
+from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
 from monitor.web.pages.fleet import ASKED as FLEET
+from monitor.web.pages.refused import RefusedForm, led_back_to_the_form, refused_form
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 
@@ -42,6 +44,7 @@ def routes() -> APIRouter:
     def machine(
         request: Request, name: str, parameter: str = "", since: str = "", until: str = "",
         colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "", every: bool = False,
+        refused: str = "",
     ) -> Response:  # fmt: skip
         """Show a machine; one parameter, one period; with ``every`` the table of all parameters at once."""
         ask, user = request.app.state.asker, request.state.user
@@ -76,6 +79,7 @@ def routes() -> APIRouter:
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
+            refused=refused_form(request, refused),
         )  # fmt: skip
 
     @router.get("/machine/values.csv")
@@ -95,7 +99,14 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             machine = form.text("machine")
             document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
-        await asked_once(request, form, "event", document)
+        try:
+            await asked_once(request, form, "event", document)
+        except NotFoundError:
+            raise
+        except InputError as error:
+            # A time in the future, or of no calendar: what happened need not be written once more.
+            refused = RefusedForm(refusal_of(error), form.texts)
+            return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fastapi import APIRouter, Request
+from starlette.datastructures import QueryParams
 from starlette.responses import Response
 
 from monitor.exceptions import InputError
@@ -27,27 +28,44 @@ def routes() -> APIRouter:
         """Weigh the plan of a campaign, and the one that the form asks for."""
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
-        from monitor.workflow.plan.request import PlanRequest
 
-        query = request.query_params
-        document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
-        document |= _size(query) | _wanted(query)
-        keep = [whole_number("keep", number) for number in query.getlist("keep")]
-        if keep:
-            document["keep"] = keep
-        if separate:
-            document["separate"] = PlanRequest.two_effects(separate)
-        ticket = request.app.state.desk.ask(request.state.user, "plan", document)
-        answer, refusal, waiting = ticket.outcome()
+        query, user, desk = request.query_params, request.state.user, request.app.state.desk
+        present: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
+        document, wrong = present, ""
+        try:
+            document = present | _asked(query)
+        except InputError as error:
+            wrong = str(error)
+        answer, refusal, waiting = desk.ask(user, "plan", document).outcome()
+        if refusal and document != present:
+            # What was asked for is refused: the present plan is shown, with the boxes as they were filled in.
+            wrong, document = refusal, present
+            answer, refusal, waiting = desk.ask(user, "plan", present).outcome()
+        # A campaign without runs, a curve, has no plan, so that no answer comes.
+        runs = None if answer is None else request.app.state.asker(user, "runs", {"campaign": campaign})
         return page(
             request, "plan.html",
-            campaign=campaign, model=model, answer=answer, refusal=refusal, asked=document, separate=separate,
+            campaign=campaign, topology="" if runs is None else runs.topology, model=model, answer=answer,
+            refusal=wrong or refusal, asked=document, typed=query, separate=separate,
             is_of_angles=isinstance(answer, AnglePlanAnswer), is_of_tests=isinstance(answer, InstrumentPlanAnswer),
             waiting=waiting,
             chart=plan_chart(answer) if isinstance(answer, BallPlanAnswer) and answer.proposed else None,
         )  # fmt: skip
 
     return router
+
+
+def _asked(query: QueryParams) -> dict[str, Any]:
+    """What the forms ask of a plan. Raises InputError for what a box cannot hold."""
+    from monitor.workflow.plan.request import PlanRequest
+
+    asked: dict[str, Any] = _size(query) | _wanted(query)
+    keep = [whole_number("keep", number) for number in query.getlist("keep")]
+    if keep:
+        asked["keep"] = keep
+    if query.get("separate"):
+        asked["separate"] = PlanRequest.two_effects(query["separate"])
+    return asked
 
 
 def _size(query: Mapping[str, str]) -> dict[str, int]:

@@ -1,8 +1,10 @@
-"""Why a form was refused, at an address of its own, with the way back to the form."""
+"""Why a form was refused: at an address of its own with the way back to the form, or at the form as filled in."""
 
 from __future__ import annotations
 
-from urllib.parse import urlsplit
+from collections.abc import Mapping
+from dataclasses import dataclass
+from urllib.parse import parse_qsl, urlsplit
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
@@ -15,6 +17,14 @@ from monitor.web.rendering import link, refusal_page
 #: Statuses of what somebody can mend in the form; 403 and what is larger than allowed are answered at once.
 MENDED_IN_THE_FORM = frozenset({400, 404, 422})
 GONE = Refusal(404, "why this was refused is not held any more; nothing was stored: send the form again")
+
+
+@dataclass(frozen=True)
+class RefusedForm:
+    """A form that was refused, with the texts that it held."""
+
+    refusal: Refusal
+    texts: Mapping[str, str]
 
 
 def routes() -> APIRouter:
@@ -40,6 +50,26 @@ def leads_to_its_refusal(request: Request, refusal: Refusal) -> bool:
     is_form = request.method == "POST" and not request.url.path.startswith(ROOT)
     user = getattr(request.state, "user", None)
     return is_form and user is not None and refusal.status in MENDED_IN_THE_FORM
+
+
+def led_back_to_the_form(
+    request: Request, form: RefusedForm, page: str, query: Mapping[str, str], fragment: str
+) -> Response:
+    """Hold a form; return the way to its ``page``, as it was looked at, which shows it with the refusal.
+
+    ``query`` is what the page needs at least.
+    """
+    source = urlsplit(request.headers.get("referer", ""))
+    looked_at = dict(parse_qsl(source.query)) if source.path == page else {}
+    key = request.app.state.outcomes.hold(request.state.user.name, form)
+    address = link(page, **{**looked_at, **query, "refused": key})
+    return RedirectResponse(f"{address}#{fragment}", status_code=303)
+
+
+def refused_form(request: Request, key: str) -> RefusedForm | None:
+    """Return the form that a page has to show again; None where there is none, or it is not held any more."""
+    held = request.app.state.outcomes.outcome_of(request.state.user.name, key) if key else None
+    return held if isinstance(held, RefusedForm) else None
 
 
 def led_to_its_refusal(request: Request, refusal: Refusal) -> Response:

@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, Response
 from monitor.web.forms import Typed, own_address, read_form, typed_of
 from monitor.web.gate import DOCUMENT_BYTES, session_cookie
 from monitor.web.rendering import again_page, page
-from monitor.web.sessions import COOKIE, Sessions
+from monitor.web.sessions import Sessions
 
 _log = logging.getLogger("monitor.web")
 
@@ -63,7 +63,8 @@ def routes() -> APIRouter:
         async with read_form(request):
             request.app.state.sessions.end(request.state.session)
         answer = RedirectResponse("/login", status_code=303)
-        answer.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
+        encrypted = request.app.state.settings.is_encrypted
+        answer.headers["Set-Cookie"] = f"{session_cookie('', encrypted=encrypted)}; Max-Age=0"
         return answer
 
     return router

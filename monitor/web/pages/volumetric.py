@@ -37,8 +37,8 @@ def routes() -> APIRouter:
         answer, refusal, waiting = ticket.outcome()
         return page(
             request, "map.html",
-            campaign=campaign, runs=runs.runs, run=run, minus=minus, pose=pose, points=points or "5",
-            absolute=absolute, choices=POINTS, answer=answer, refusal=refusal,
+            campaign=campaign, topology=runs.topology, runs=runs.runs, run=run, minus=minus, pose=pose,
+            points=points or "5", absolute=absolute, choices=POINTS, answer=answer, refusal=refusal,
             waiting=waiting,
             vectors=None if answer is None else vectors_chart(answer),
             slices=[] if answer is None else slice_charts(answer),

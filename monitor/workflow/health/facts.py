@@ -152,6 +152,7 @@ def _stepped(step: EventStep) -> SteppedAtEvent:
         step.u,
         step.unit,
         step.undecided,
+        step.drift,
     )
 
 

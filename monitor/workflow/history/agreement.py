@@ -19,9 +19,25 @@ from monitor.documents import OMITTED, WORDED
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Undecided
 from monitor.statistics.days.before_after import OtherDays, before_after
+from monitor.statistics.days.beside_drift import Verdict, beside_drift
+from monitor.statistics.days.stepped_line import campaigns_of
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
+from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import day_numbers
+
+#: Level of false calls of one parameter at one event.
+LEVEL = 0.05
+#: A drift is stated over so many days.
+DAYS_OF_DRIFT = 30.0
+#: Whether both sides agree, and why that is not decided.
+_AGREE: dict[Verdict, tuple[bool | None, Undecided | None]] = {
+    Verdict.STEPPED: (False, None),
+    Verdict.NOT_SEEN: (True, None),
+    Verdict.DAYS: (None, Undecided.DAYS_MAY_DO),
+    Verdict.DRIFT: (None, Undecided.DRIFT_MAY_DO),
+    Verdict.UNKNOWN: (None, Undecided.ONE_DAY_EACH),
+}
 
 
 class PairKind(Enum):
@@ -42,7 +58,9 @@ class ParameterAgreement:
     ``e_n`` are None where nothing is known of the days, and ``why_not_decided`` says what would decide it: ``expanded``
     is then of runs alone. ``expanded`` and ``e_n`` are for independent days of one scatter; ``agree`` is None, too,
     where the difference is larger than ``expanded`` and no larger than ``expanded_cautious``, for days that follow each
-    other, sides that scatter differently, or campaigns that differ by more than their days.
+    other, sides that scatter differently, or campaigns that differ by more than their days. Where enough campaigns say
+    what the machine does between events (``beside_drift``) they judge the difference less ``expected_of_drift``, and
+    ``e_n`` and ``expanded`` are of that; ``drift_in_30_days`` is stated where a drift is seen.
     """
 
     unit: str
@@ -61,13 +79,16 @@ class ParameterAgreement:
     other_campaigns: int | None = field(default=None, metadata=OMITTED)
     why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
     expanded_cautious: float | None = field(default=None, metadata=OMITTED)
+    expected_of_drift: float | None = field(default=None, metadata=OMITTED)
+    drift_in_30_days: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AgreementPair:
     """Two results with E_n of every parameter that both have; ``disagree`` names those beyond their uncertainties.
 
-    Two ``methods``; or one ``method`` before and after an ``event``.
+    Two ``methods``, of which the second was measured ``days_apart`` after the first (before it where negative); or one
+    ``method`` before and after an ``event``.
     """
 
     kind: PairKind
@@ -76,6 +97,7 @@ class AgreementPair:
     description: str | None = field(default=None, metadata=OMITTED)
     method: str | None = field(default=None, metadata=OMITTED)
     campaigns: tuple[str, str]
+    days_apart: float | None = field(default=None, metadata=OMITTED)
     parameters: Mapping[str, ParameterAgreement]
     disagree: tuple[str, ...]
 
@@ -114,16 +136,17 @@ def agreement(
 
 def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Iterator[_Comparison]:
     latest: dict[str, str] = {}
-    for campaign, method in zip(history.campaign.tolist(), history.measured_by.tolist(), strict=True):
-        latest[method] = campaign  # runs are in the order of time
-    for first, second in combinations(latest, 2):
+    seconds, last = history.seconds, {}
+    runs = zip(history.campaign.tolist(), history.measured_by.tolist(), seconds.tolist(), strict=True)
+    for campaign, method, second in runs:
+        latest[method], last[method] = campaign, second  # runs are in the order of time
+    for first, other in combinations(latest, 2):
         yield _Comparison(
             AgreementPair(
-                kind=PairKind.METHODS, methods=(first, second), campaigns=(latest[first], latest[second]),
-                parameters={}, disagree=(),
+                kind=PairKind.METHODS, methods=(first, other), campaigns=(latest[first], latest[other]),
+                days_apart=(last[other] - last[first]) / SECONDS_PER_DAY, parameters={}, disagree=(),
             )
         )  # fmt: skip
-    seconds = history.seconds
     moments = np.sort([event.at.timestamp() for event in events])
     for event in events:
         for method in latest:
@@ -176,19 +199,34 @@ def _across_event(
     if not before.any() or not after.any():
         return None
     values, stretch = history.values[:, column], comparison.stretch
-    others = None
-    if stretch is not None:
-        rest = np.isfinite(values) & (stretch >= 0) & ~np.isin(days, days[before | after])
-        others = OtherDays(values[rest], days[rest], stretch[rest], history.campaign[rest])
+    assert stretch is not None
+    finite = np.isfinite(values) & (stretch >= 0)
+    rest = finite & ~np.isin(days, days[before | after])
+    others = OtherDays(values[rest], days[rest], stretch[rest], history.campaign[rest])
     try:
         result = before_after(values[before], values[after], days[before], days[after], others)
     except DataError:
         return None
-    lack = Undecided.DAYS_MAY_DO if result.decided else Undecided.ONE_DAY_EACH
+    campaigns = campaigns_of(
+        values[finite], days[finite], history.seconds[finite] / SECONDS_PER_DAY, stretch[finite],
+        history.campaign[finite],
+    )  # fmt: skip
+    last = int(np.flatnonzero(campaigns.piece <= stretch[before][0])[-1])
+    judged = beside_drift(result, campaigns, last, last + 1, levels=False)
+    agree, lack = _AGREE[judged.verdict(LEVEL)]
+    line = judged.line
+    if line is None:
+        return ParameterAgreement(
+            unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
+            result.k, result.e_n, agree, result.dof, result.between, result.other_days, result.other_campaigns, lack,
+            result.cautious,
+        )  # fmt: skip
+    expanded = line.k * line.u
     return ParameterAgreement(
-        unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
-        result.k, result.e_n, result.agree, result.dof, result.between, result.other_days, result.other_campaigns,
-        lack if result.agree is None else None, result.cautious,
+        unit, result.before, result.u_before, result.after, result.u_after, result.difference, expanded, line.k,
+        line.step / expanded, agree, float(line.dof), result.between, 0, line.campaigns - 2, lack,
+        line.k * float(np.hypot(line.u, np.sqrt(judged.widest))), line.expected,
+        line.rate * DAYS_OF_DRIFT if line.drifts else None,
     )  # fmt: skip
 
 

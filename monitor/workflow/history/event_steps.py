@@ -1,12 +1,13 @@
 """Steps of the parameters at recorded events: what an event changed, in size, as trend and report say it.
 
 The search for changes splits the history at an event and looks within the pieces, so that a step at the event itself is
-never found again. Here it is stated: the mean of the piece after the event less that of the piece before.
+never found again. Here it is stated: the mean of the piece after the event less that of the piece before, or, where
+enough campaigns say what the machine does between events, the step between the lines of its drift.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,9 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Undecided
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
+from monitor.statistics.days.beside_drift import BesideDrift, Verdict, beside_drift
 from monitor.statistics.days.rival_scatter import Allowance
+from monitor.statistics.days.stepped_line import campaigns_of
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast
@@ -32,6 +35,10 @@ EVENT_FALSE_ALARM = 0.05
 REFUTED = 2.0
 #: Days of a side that say little of how days differ: what they show of one parameter is named, not called.
 FEW = 2
+#: A drift is stated over so many days.
+DAYS_OF_DRIFT = 30.0
+#: Why a step that a verdict leaves open is not decided.
+_UNDECIDED = {Verdict.DAYS: Undecided.DAYS_MAY_DO, Verdict.DRIFT: Undecided.DRIFT_MAY_DO}
 #: A side may hold many campaigns: how they differ is in the scatter of its days.
 ALLOWANCE = Allowance(refuted=REFUTED, campaigns=0.0)
 
@@ -45,6 +52,8 @@ class EventStep:
     is not ``decided``, for one day a side may differ as much where nothing happened. Nor is it where independent days
     do not explain it and days that follow each other, or that scatter more on one side (``rival_scatter``), do; nor
     where one or two days of a side say too little of how days differ for a step among many parameters (``few_days``).
+    Where campaigns say what the machine does between events, ``size`` is beyond its drift (``beside_drift``), which is
+    ``drift`` in 30 days where one is seen.
     """
 
     parameter: str
@@ -55,27 +64,23 @@ class EventStep:
     u: float
     p_value: float
     by_days: bool
-    decided: bool = True
-    few_days: bool = False
+    undecided: Undecided | None = None
+    drift: float | None = None
 
     @property
-    def undecided(self) -> Undecided | None:
-        """Why it may be no step; None where it is decided."""
-        if self.decided:
-            return None
-        if self.few_days:
-            return Undecided.FEW_DAYS
-        return Undecided.DAYS_MAY_DO if self.by_days else Undecided.ONE_DAY_EACH
+    def decided(self) -> bool:
+        """Whether it is a step."""
+        return self.undecided is None
 
 
 @dataclass(frozen=True)
 class _Compared:
-    """Both sides of an event compared by the means of their days (None: too few), by their runs, and the p-value of
-    days that follow each other or scatter differently on both sides; ``days``: of the side with fewer."""
+    """Both sides of an event compared by their days and campaigns, and by their runs (None: too few); ``days``: of the
+    side with fewer."""
 
     step: EventStep
     by_runs: tuple[float, float] | None
-    rivals: float
+    judged: BesideDrift
     days: int
 
 
@@ -99,21 +104,26 @@ def event_steps(
 
 
 def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
-    """The step as it may be stated, None where it may not: by days at ``level``; by runs where no days can.
+    """The step as it may be stated, None where it may not: by days and campaigns at ``level``; by runs where these
+    cannot.
 
     What one or two days of a side show at the level ``alone`` of a single parameter, and runs at ``level``, is named.
     """
-    step = pair.step
-    if step.by_days and step.p_value < level:
-        return replace(step, decided=pair.rivals < level)
-    if step.by_days:
-        by_runs = 1.0 if pair.by_runs is None else pair.by_runs[1]
-        is_named = pair.days <= FEW and step.p_value < alone and by_runs < level
-        return replace(step, decided=False, few_days=True) if is_named else None
-    if pair.by_runs is None or pair.by_runs[1] >= level:
+    step, verdict = pair.step, pair.judged.verdict(level)
+    days = pair.judged.days
+    if verdict is Verdict.DRIFT and days is not None:
+        step = replace(step, size=days.difference, u=days.u, p_value=days.p_value())
+    if verdict in _UNDECIDED:
+        return replace(step, undecided=_UNDECIDED[verdict])
+    if verdict is Verdict.STEPPED:
+        return step
+    if pair.by_runs is None or pair.by_runs[1] >= level or pair.judged.line is not None:
         return None
+    if verdict is Verdict.NOT_SEEN:
+        is_named = pair.days <= FEW and step.p_value < alone
+        return replace(step, undecided=Undecided.FEW_DAYS) if is_named else None
     u, p_value = pair.by_runs
-    return replace(step, u=u, p_value=p_value, by_days=False, decided=False)
+    return replace(step, u=u, p_value=p_value, by_days=False, undecided=Undecided.ONE_DAY_EACH)
 
 
 def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) -> list[_Compared]:
@@ -132,14 +142,42 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         others = (steady.t < earlier) | (steady.t >= later)
         days = _by_days(before, after, steady.part(others), pieces[others])
         runs = _student(before.values, after.values)
-        if runs is None and days is None:
+        judged = _beside_drift(days, steady, pieces, first, moments)
+        if runs is None and days is None and judged.line is None:
             continue
-        size = days.difference if days is not None else _difference_of_days(before, after)
-        u, p_value = (days.u, _p_value(size, days.u, days.dof)) if days is not None else runs or (np.nan, 1.0)
-        step = EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None)
-        rivals = 1.0 if days is None else max(p_value, days.p_value_of_rivals())
-        pairs[first] = _Compared(step, runs, rivals, min(before.day_count, after.day_count))
+        numbers = _step(judged, runs, _difference_of_days(before, after))
+        line = judged.line
+        drift = line.rate * DAYS_OF_DRIFT if line is not None and line.drifts else None
+        step = EventStep(steady.name, steady.unit, event, at, *numbers, drift=drift)
+        pairs[first] = _Compared(step, runs, judged, min(before.day_count, after.day_count))
     return list(pairs.values())
+
+
+def _beside_drift(
+    days: BeforeAfter | None,
+    steady: Series,
+    pieces: npt.NDArray[np.intp],
+    first: int,
+    moments: Collection[float],
+) -> BesideDrift:
+    """The pieces before and from the run ``first`` on, judged by days and campaigns; ``moments``: times of events."""
+    if steady.campaign is None or not 0 < first < len(pieces):
+        return BesideDrift(days, None, 0.0, 0.0, 0)
+    eras = np.searchsorted(np.sort(list(moments)), steady.t, side="right")
+    campaigns = campaigns_of(steady.values, steady.days, steady.t, pieces, steady.campaign, eras)
+    last = int(np.flatnonzero(campaigns.piece <= pieces[first - 1])[-1])
+    return beside_drift(days, campaigns, last, last + 1, levels=True)
+
+
+def _step(
+    judged: BesideDrift, runs: tuple[float, float] | None, difference: float
+) -> tuple[float, float, float, bool]:
+    """Size, u, p-value of a step, and whether they are by days: by campaigns, by days, by runs."""
+    if judged.line is not None:
+        return judged.line.step, judged.line.u, judged.line.p_value(), True
+    if judged.days is not None:
+        return judged.days.difference, judged.days.u, judged.days.p_value(), True
+    return difference, *(runs or (np.nan, 1.0)), False
 
 
 def _p_value(size: float, u: float, dof: float) -> float:

@@ -25,7 +25,8 @@ class Series:
     ``values`` and ``u`` (n,) in ``unit``, ``t`` (n,) in days since 1970 (UTC), ``days`` (n,) numbers of the machine's
     days, ``hour`` (n,) of the shop's clock, ``warm_up`` (n,) whether the machine was warming up; ``offset`` of the
     shop's clock from UTC, that of the machine's last run. ``temperature`` (n,) is that of the machine or its shop in °C
-    as far as recorded (NaN: not), under the name ``thermometer``.
+    as far as recorded (NaN: not), under the name ``thermometer``. ``campaign`` (n,) numbers the campaigns of the runs;
+    None where nobody says them.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Series:
     offset: timedelta
     temperature: Array | None = None
     thermometer: str | None = None
+    campaign: npt.NDArray[np.intp] | None = None
 
     def part(self, mask: npt.NDArray[np.bool_]) -> Series:
         """The runs of a mask (n,)."""
@@ -47,7 +49,7 @@ class Series:
         return Series(
             self.name, self.unit, self.values[mask], self.u[mask], self.t[mask], self.days[mask], self.hour[mask],
             self.warm_up[mask], self.offset, None if self.temperature is None else self.temperature[mask],
-            self.thermometer,
+            self.thermometer, None if self.campaign is None else self.campaign[mask],
         )  # fmt: skip
 
     @cached_property
@@ -109,12 +111,13 @@ def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDA
     hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
     thermometer, temperature = _temperature(history)
+    campaign = np.unique(history.campaign, return_inverse=True)[1].ravel()
     series = {}
     for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         mask = np.isfinite(history.values[:, j])
         whole = Series(
             name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset,
-            temperature, thermometer,
+            temperature, thermometer, campaign,
         )  # fmt: skip
         if mask.any():
             series[name] = (whole.part(mask), mask)

@@ -21,27 +21,30 @@ class InstrumentFit:
 
 @dataclass(frozen=True)
 class AloneValue:
-    """What the readings of one instrument say of a parameter by themselves."""
+    """What the readings of one instrument say of a parameter by themselves; ``u`` is by their own scatter, with its
+    ``degrees_of_freedom``, where that is more than stated."""
 
     instrument: str
     value: float
     u: float
+    degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class Agreement:
     """Two instruments that both determine a parameter: E_n (ISO 13528:2022, 9.7) with U = 2 u; above 1 they
-    disagree."""
+    disagree. ``degrees_of_freedom`` are those of its u where one of them scatters more than it states."""
 
     first: str
     second: str
     e_n: float
+    degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """The largest E_n of so many ``comparisons`` between the instruments of a ``run``, where chance alone makes it as
-    large in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound)."""
+    """The E_n that is the least by chance of so many ``comparisons`` between the instruments of a ``run``: chance alone
+    makes one as large in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound)."""
 
     run: int
     parameter: str
@@ -50,6 +53,7 @@ class Disagreement:
     e_n: float
     comparisons: int
     by_chance: float
+    degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class ParameterShares:
 class InstrumentsAnswer:
     """The instruments of one run; ``not_determined`` are parameters that all of them together do not separate.
 
-    ``by_chance`` is how often at most the largest E_n of so many comparisons is as large without fault, None where
+    ``by_chance`` is how often at most the least likely E_n of so many comparisons comes about without fault, None where
     nothing is compared.
     """
 

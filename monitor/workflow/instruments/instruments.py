@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-import scipy
+from scipy.special import stdtr, stdtrit
 
 from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
@@ -70,7 +69,7 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
         ),
         parameters=parameters,
         not_determined=open_ones,
-        by_chance=_by_chance([pair.e_n for shares in parameters for pair in shares.agreement]),
+        by_chance=_by_chance([pair for shares in parameters for pair in shares.agreement]),
     )
 
 
@@ -81,8 +80,8 @@ def disagreement(
     run: int | None = None,
     doubtful: float = DOUBTFUL,
 ) -> Disagreement | None:
-    """The worst E_n between instruments in a run of a fit, the last one without ``run``; None where chance makes it
-    more often than ``doubtful``, or nothing is compared.
+    """The E_n between instruments that is the least by chance in a run of a fit, the last one without ``run``; None
+    where chance makes it more often than ``doubtful``, or nothing is compared.
 
     Nothing is fitted anew: what an instrument says alone is one step from the joint point.
     """
@@ -92,11 +91,14 @@ def disagreement(
     of_all, beforehand = ability.shares(problem, solution, run)
     parameters, _ = _parameters(problem, solution, run, of_all, beforehand)
     pairs = [(shares.parameter, pair) for shares in parameters for pair in shares.agreement]
-    by_chance = _by_chance([pair.e_n for _, pair in pairs])
+    by_chance = _by_chance([pair for _, pair in pairs])
     if by_chance is None or by_chance > doubtful:
         return None
-    parameter, worst = max(pairs, key=lambda compared: compared[1].e_n)
-    return Disagreement(run, parameter, worst.first, worst.second, worst.e_n, len(pairs), by_chance)
+    # Of several that are too rare for a number the largest.
+    parameter, worst = min(pairs, key=lambda compared: (_p(compared[1]), -compared[1].e_n))
+    return Disagreement(
+        run, parameter, worst.first, worst.second, worst.e_n, len(pairs), by_chance, worst.degrees_of_freedom
+    )
 
 
 def _parameters(
@@ -121,15 +123,22 @@ def _parameters(
     return tuple(parameters), tuple(open_ones)
 
 
-def limit_of(comparisons: int, doubtful: float) -> float:
-    """The E_n that the largest of so many comparisons exceeds by chance so often at most, as ``_by_chance`` has it."""
-    return float(scipy.special.erfcinv(doubtful / comparisons)) * math.sqrt(2.0) / K
+def limit_of(comparisons: int, doubtful: float, degrees_of_freedom: float | None = None) -> float:
+    """The E_n that one of so many comparisons exceeds by chance so often at most, as ``_by_chance`` has it."""
+    freedom = np.inf if degrees_of_freedom is None else degrees_of_freedom
+    return -float(stdtrit(freedom, 0.5 * doubtful / comparisons)) / K
 
 
-def _by_chance(e_n: list[float]) -> float | None:
-    """How often at most the largest of such comparisons is as large without fault: Bonferroni's bound for normal
-    differences, each with U = 2 u; None without comparisons."""
-    return min(1.0, len(e_n) * math.erfc(K * max(e_n) / math.sqrt(2.0))) if e_n else None
+def _by_chance(pairs: list[Agreement]) -> float | None:
+    """How often at most the least likely of such comparisons comes about without fault: Bonferroni's bound; None
+    without comparisons."""
+    return min(1.0, len(pairs) * min(map(_p, pairs))) if pairs else None
+
+
+def _p(pair: Agreement) -> float:
+    """How often chance makes an E_n as large: a normal difference with U = 2 u, Student's t where u is by scatter."""
+    freedom = np.inf if pair.degrees_of_freedom is None else pair.degrees_of_freedom
+    return 2.0 * float(stdtr(freedom, -K * pair.e_n))
 
 
 def _parameter(
@@ -140,19 +149,15 @@ def _parameter(
     u = float(np.sqrt(sum(part**2 for part in parts.values()) + beforehand))
     alone = tuple(
         AloneValue(
-            share.name, show(float(share.alone[number])), show(float(np.sqrt(share.alone_variance[number])))
+            share.name,
+            show(float(share.alone[number])),
+            show(float(np.sqrt(share.alone_variance[number]))),
+            float(share.alone_freedom[number]) if np.isfinite(share.alone_freedom[number]) else None,
         )
         for share in of_all
         if np.isfinite(share.alone[number])
     )
-    agreement = tuple(
-        Agreement(
-            first.instrument,
-            second.instrument,
-            abs(first.value - second.value) / (K * float(np.hypot(first.u, second.u))),
-        )
-        for first, second in combinations(alone, 2)
-    )
+    agreement = tuple(_agreement(first, second) for first, second in combinations(alone, 2))
     return ParameterShares(
         name,
         unit.name,
@@ -163,3 +168,15 @@ def _parameter(
         alone,
         agreement,
     )
+
+
+def _agreement(first: AloneValue, second: AloneValue) -> Agreement:
+    """E_n of two instruments, with the degrees of freedom of its u (JCGM 100:2008, G.2b)."""
+    u = float(np.hypot(first.u, second.u))
+    parts = sum(
+        alone.u**4 / alone.degrees_of_freedom
+        for alone in (first, second)
+        if alone.degrees_of_freedom is not None
+    )
+    e_n = abs(first.value - second.value) / (K * u)
+    return Agreement(first.instrument, second.instrument, e_n, u**4 / parts if parts else None)

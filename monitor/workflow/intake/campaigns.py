@@ -51,9 +51,13 @@ class RunsRequest:
 
 @dataclass(frozen=True)
 class RunsAnswer:
-    """The runs of a campaign with their conditions, and what was noticed at its import."""
+    """The runs of a campaign with their conditions, and what was noticed at its import.
+
+    ``topology`` is the chain of its machine, by which plain names say to what an orientation is an angle.
+    """
 
     campaign: str
+    topology: str
     runs: tuple[RunRow, ...]
     notes: tuple[str, ...]
 
@@ -71,5 +75,7 @@ def campaigns(db: Database, request: CampaignsRequest = _ALL) -> CampaignsAnswer
 
 def runs(db: Database, request: RunsRequest) -> RunsAnswer:
     """List the runs of a campaign. Raises NotFoundError, DataError for a curve, which has none."""
-    load_campaign(db, request.campaign)
-    return RunsAnswer(request.campaign, list_runs(db, request.campaign), campaign_notes(db, request.campaign))
+    topology = load_campaign(db, request.campaign).machine.topology
+    return RunsAnswer(
+        request.campaign, topology, list_runs(db, request.campaign), campaign_notes(db, request.campaign)
+    )

@@ -47,7 +47,7 @@ class PlanRequest:
         if len(set(self.keep)) < len(self.keep) or any(number < 1 for number in self.keep):
             raise InputError("the indexations to keep are numbers from 1 on, each once")
         if self.separate is not None and self.separate[0] == self.separate[1]:
-            raise InputError(f"--separate {','.join(self.separate)}: name two different effects")
+            raise InputError(f"'{','.join(self.separate)}': name two different effects")
 
     @staticmethod
     def two_effects(text: str) -> tuple[str, str]:
@@ -60,7 +60,5 @@ class PlanRequest:
             else:
                 parts[-1] += letter
         if len(parts) != 2 or not all(part.strip() for part in parts):
-            raise InputError(
-                f"--separate {text}: name two effects with a comma, for example EBZ:poly2,EZZ:poly2"
-            )
+            raise InputError(f"'{text}': name two effects with a comma, for example EBZ:poly2,EZZ:poly2")
         return parts[0].strip(), parts[1].strip()

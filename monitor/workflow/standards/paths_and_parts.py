@@ -8,9 +8,16 @@ import numpy as np
 
 from monitor.documents import Said
 from monitor.methods.standard_test import InterpolationTest, PartTest
-from monitor.reporting.standard_tests import NoDatum, OneSenseOfTurning, followed_figure, part_figure
+from monitor.reporting.standard_tests import (
+    NoDatum,
+    NoProfile,
+    OneSenseOfTurning,
+    followed_figure,
+    part_figure,
+)
 from monitor.statistics.standards.interpolation import followed
-from monitor.statistics.standards.parts import Element, FormKind, forms, part_figures
+from monitor.statistics.standards.parts import Element, FormKind, forms, part_figures, plan_of
+from monitor.statistics.standards.profiles import Profile, profile_of
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import save_figure
 from monitor.workflow.standards.answer import StandardFigure, StandardTest
@@ -46,7 +53,10 @@ def interpolation_answer(test: InterpolationTest, rng: np.random.Generator) -> S
 
 def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
     """Forms, orientations and places of the elements of a part."""
-    of_part = part_figures(_elements(test), u_reading=test.u_reading, rng=rng)
+    of_part = list(part_figures(_elements(test), u_reading=test.u_reading, rng=rng))
+    profiles = _profiles(test)
+    for name, profile in profiles.items():
+        of_part += profile.figures(name, test.u_reading, rng)
     figures = []
     for figure in of_part:
         unit = MICRORADIAN if figure.kind is FormKind.HALF_ANGLE else MICROMETRE
@@ -63,8 +73,21 @@ def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
     coaxial = sum(figure.kind is FormKind.CONCENTRICITY for figure in of_part)
     has_side = circles < len(test.features)
     notes: tuple[Said, ...] = (NoDatum(),) if circles > 1 + coaxial and not has_side else ()
-    names = ", ".join(feature.name for feature in test.features)
+    without = tuple(path.name for path in test.paths if path.name not in profiles)
+    notes = (*notes, *((NoProfile(without),) if without else ()))
+    names = ", ".join([*(feature.name for feature in test.features), *(path.name for path in test.paths)])
     return StandardTest(test.setup, test.run, "part", names, MICROMETRE.name, tuple(figures), (), notes)
+
+
+def _profiles(test: PartTest) -> dict[str, Profile]:
+    """The profiles and faces of a part by the names of their paths, without those that show none."""
+    fitted = {path.name: profile_of(path.measured, path.nominal, path.axes) for path in test.paths}
+    with_heights = {path.name for path in test.paths if path.has_heights}
+    return {
+        name: profile
+        for name, profile in fitted.items()
+        if profile is not None and (not profile.is_face or name in with_heights)
+    }
 
 
 def interpolation_files(test: InterpolationTest, answer: StandardTest, folder: Path) -> list[str]:
@@ -88,10 +111,18 @@ def part_files(test: PartTest, folder: Path) -> list[str]:
     """Draw the outline of a part with magnified deviations; return the names of the files."""
     from monitor.reporting.figures.standards import part_figure as drawn
 
-    figure = drawn(
-        [(form.name, form.places, form.across, form.deviation) for form in forms(_elements(test))],
-        title=f"{test.setup}, run {test.run}",
-    )
+    elements, profiles = _elements(test), _profiles(test)
+    if not elements and not profiles:
+        return []
+    flat = plan_of(elements, test.paths[0].axes[0] if test.paths else np.zeros(3))
+    shapes = [(form.name, form.places, form.across, form.deviation) for form in forms(elements, flat)]
+    for path in test.paths:
+        if path.name in profiles and not profiles[path.name].is_face:
+            profile = profiles[path.name]
+            shapes.append((path.name, path.nominal @ flat, profile.outward @ flat, profile.deviation))
+    if not shapes:
+        return []
+    figure = drawn(shapes, title=f"{test.setup}, run {test.run}")
     return save_figure(figure, folder, f"{test.setup}-{test.run}-part")
 
 

@@ -113,7 +113,8 @@ class StepAtEvent:
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
     then it is not ``decided`` whether it is a step, nor where days that follow each other explain it, nor where one or
-    two days on a side say too little: ``why_not_decided`` says which.
+    two days on a side say too little, or a drift may do as much: ``why_not_decided`` says which. A step on a machine
+    that is seen to drift is what is beyond ``drift_in_30_days``.
     """
 
     at: str
@@ -126,6 +127,7 @@ class StepAtEvent:
     scatter_of: str
     decided: bool
     why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
+    drift_in_30_days: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

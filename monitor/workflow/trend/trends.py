@@ -324,7 +324,7 @@ def _with_event_steps(
                 StepAtEvent(
                     step.event.at.astimezone(UTC).isoformat(), step.event.kind, step.event.description, step.size,
                     step.u, step.unit, step.p_value, "days" if step.by_days else "runs", step.decided,
-                    step.undecided,
+                    step.undecided, step.drift,
                 )
                 for step in steps
                 if step.parameter == name

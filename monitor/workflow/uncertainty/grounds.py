@@ -45,8 +45,7 @@ LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
 #: mm. An axis of a machine given by letters lies where the machine file's coordinates put it, to some tenths. Largest
 #: in the examples: 0.11. Of a chain with lengths `identify` compares each with its own.
 LARGEST_OFFSET = 5.0
-#: Chance makes the largest E_n between instruments in at most so many right campaigns, of readings that scatter as they
-#: are stated; three times as much is refused more often (3 of 8). As for a model that is refuted.
+#: Chance makes such an E_n between instruments in at most so many right campaigns. As for a model that is refuted.
 DISAGREE = 1e-3
 
 
@@ -166,7 +165,7 @@ def _instruments(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Gr
     apart = disagreement(robust.fit.problem, robust.fit.solution, ability, run, DISAGREE)
     if apart is not None:
         subject = f"{apart.parameter}: {apart.first}, {apart.second}"
-        limit = limit_of(apart.comparisons, DISAGREE)
+        limit = limit_of(apart.comparisons, DISAGREE, apart.degrees_of_freedom)
         yield Ground(GroundKind.INSTRUMENTS, run, subject, apart.e_n, limit)
 
 

@@ -1,0 +1,220 @@
+"""How far do two sides of an event lie apart beyond the drift of the machine?
+
+What a machine drifts by is no scatter: between two campaigns it is expected, and what is beyond it is the step. The
+means of the campaigns lie on lines, one for each piece of the history between events, all of one rate; about the lines
+they scatter independently, or wander from campaign to campaign (a random walk whose steps grow with the time between),
+or both. Few campaigns do not show which: of all mixtures that their restricted likelihood leaves open the one is taken
+under which the step is least sure. For each mixture the test is generalised least squares with Student's law, which is
+exact. Fewer campaigns than ``ENOUGH`` degrees of freedom need say nothing of both drift and scatter: of them
+``moves`` says whether the machine also moves where no event is. Compare the days alone with ``before_after``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.records import Array
+from monitor.statistics.days.rival_scatter import factor
+from monitor.statistics.sums import label_groups
+
+#: Variance of what a machine wanders by between neighbouring campaigns, in that of their independent scatter.
+MIXTURES = (0.0, 0.1, 0.3, 1.0, 3.0, 30.0)
+#: A mixture is left out where the logarithm of its likelihood is so far below the highest.
+REFUTED = 2.0
+#: So many campaigns of each side, those next to the event, are on its line: a drift of years is no line.
+NEAREST = 24
+#: Degrees of freedom beside the lines from which on these judge a step.
+ENOUGH = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Campaigns:
+    """Campaigns (c,) in the order of time: their ``mean``, ``t`` in days, and ``piece``, the number of the stretch
+    between two events or changes that they lie in; ``days`` (c,) are the means of the days of each.
+
+    ``era`` (c,) numbers the stretches between events alone: what the machine does within one, it does without an event.
+    A campaign that an event cuts in two is two.
+    """
+
+    mean: Array
+    t: Array
+    piece: npt.NDArray[np.intp]
+    era: npt.NDArray[np.intp]
+    days: tuple[Array, ...]
+
+    @property
+    def of_day(self) -> tuple[float, int]:
+        """Variance of the mean of a day within its campaign, with its degrees of freedom."""
+        dof = sum(len(days) - 1 for days in self.days)
+        squares = sum(float(((days - days.mean()) ** 2).sum()) for days in self.days)
+        return (squares / dof if dof else 0.0), dof
+
+
+def campaigns_of(
+    values: Array,
+    days: npt.ArrayLike,
+    t: Array,
+    piece: npt.NDArray[np.intp],
+    campaign: npt.ArrayLike,
+    era: npt.NDArray[np.intp] | None = None,
+) -> Campaigns:
+    """Return the means of the means of days of each campaign, from runs (n,) with the labels of theirs; without ``era``
+    the pieces are between events alone."""
+    labels = [label_groups(names, len(values))[1] for names in (campaign, days)]
+    parts, part = np.unique(np.column_stack([piece, labels[0]]), axis=0, return_inverse=True)
+    day, of_day = np.unique(np.column_stack([part.ravel(), labels[1]]), axis=0, return_inverse=True)
+    runs = np.bincount(of_day.ravel())
+    by_day, day_at = (
+        np.bincount(of_day.ravel(), column - column[0]) / runs + column[0] for column in (values, t)
+    )
+    days_in = [day[:, 0] == number for number in range(len(parts))]
+    mean, at = (np.array([column[inside].mean() for inside in days_in]) for column in (by_day, day_at))
+    first = np.unique(part.ravel(), return_index=True)[1]
+    era = parts[:, 0] if era is None else era[first]
+    order = np.lexsort((at, parts[:, 0]))
+    return Campaigns(
+        mean[order], at[order], parts[order, 0], era[order], tuple(by_day[days_in[index]] for index in order)
+    )
+
+
+@dataclass(frozen=True)
+class SteppedLine:
+    """``step`` of one side against the other beyond the drift, with ``u`` and ``dof``, and ``rate`` a day of the drift
+    with ``u_rate``, by the mixture under which the step is least sure.
+
+    ``expected`` is what the drift makes of the compared means, ``wander`` the mixture, ``campaigns`` how many are on
+    the lines.
+    """
+
+    step: float
+    u: float
+    dof: int
+    expected: float
+    rate: float
+    u_rate: float
+    wander: float
+    campaigns: int
+
+    def p_value(self, besides: float = 0.0) -> float:
+        """The probability of a step as large as this one where there is none; with a variance ``besides``, of a side
+        that scatters more than the others."""
+        return float(2.0 * scipy.special.stdtr(self.dof, -abs(self.step) / np.sqrt(self.u**2 + besides)))
+
+    @property
+    def k(self) -> float:
+        """The coverage factor for 95 %."""
+        return factor(self.dof)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the rate is larger than its expanded uncertainty for 95 %."""
+        return abs(self.rate) > self.k * self.u_rate
+
+
+def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> SteppedLine | None:
+    """Return the step between the campaigns ``before`` and ``after`` (indices), the last and the first of two pieces.
+
+    With ``levels`` it is that of the two lines, otherwise that of these two campaigns alone. None where the campaigns
+    leave fewer than ``ENOUGH`` degrees of freedom beside the lines, or do not differ.
+    """
+    inside = _near(campaigns, before, after)
+    before, after = int(inside[:before].sum()), int(inside[:after].sum())
+    y, t, piece = campaigns.mean[inside], campaigns.t[inside], campaigns.piece[inside]
+    dof = len(y) - len(np.unique(piece)) - 1
+    if dof < ENOUGH or np.ptp(y) == 0.0:
+        return None
+    y = y - y[before]
+    results, likelihoods = [], []
+    for form in _forms(tuple(t.tolist()), tuple(piece.tolist()), before, after, levels):
+        white = form.whiten @ y
+        squares = float(white @ white - np.sum((form.basis.T @ white) ** 2))
+        # Points on a line to the last digit have no scatter at all.
+        variance = max(squares / dof, float(np.ptp(y)) ** 2 * 1e-24)
+        likelihoods.append(-0.5 * dof * np.log(variance) - form.logs)
+        rate = float(form.rate @ y)
+        scatter = float(np.sqrt(variance))
+        results.append(
+            SteppedLine(
+                float(form.step @ y), scatter * form.spread, dof, rate * float(t[after] - t[before]), rate,
+                scatter * form.spread_rate, form.wander, len(y),
+            )
+        )  # fmt: skip
+    highest = max(likelihoods)
+    open_ = [line for line, value in zip(results, likelihoods, strict=True) if value >= highest - REFUTED]
+    return min(open_, key=lambda line: abs(line.step) / line.u)
+
+
+def moves(campaigns: Campaigns, before: int, after: int) -> tuple[float, int]:
+    """Return the largest difference of two campaigns that follow each other in one era, and how many there are.
+
+    Those nearer to each other than the two sides count for as much more time as lies between the sides.
+    """
+    inside = _near(campaigns, before, after)
+    gap = float(campaigns.t[after] - campaigns.t[before])
+    together = (
+        inside[1:] & inside[:-1] & (np.diff(campaigns.era) == 0) & (np.diff(campaigns.t) > 0.0)
+    ).nonzero()[0]
+    if not len(together):
+        return 0.0, 0
+    longer = np.maximum(1.0, gap / np.diff(campaigns.t)[together])
+    return float(np.max(np.abs(np.diff(campaigns.mean)[together]) * longer)), len(together)
+
+
+def _near(campaigns: Campaigns, before: int, after: int) -> npt.NDArray[np.bool_]:
+    """The campaigns (c,) on the lines: the nearest before and after the event, whatever pieces they lie in."""
+    index = np.arange(len(campaigns.mean))
+    return np.asarray((index > before - NEAREST) & (index < after + NEAREST))
+
+
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """What generalised least squares makes of the means (c,) under the mixture ``wander``.
+
+    ``whiten`` (c, c) makes them independent, ``basis`` (c, p) spans what the lines explain of the whitened. ``step``
+    and ``rate`` (c,) are sums over the means, ``spread`` and ``spread_rate`` their standard deviations in scatters of a
+    campaign; ``logs`` is what the likelihood loses.
+    """
+
+    wander: float
+    whiten: Array
+    basis: Array
+    step: Array
+    rate: Array
+    spread: float
+    spread_rate: float
+    logs: float
+
+
+@lru_cache(maxsize=128)
+def _forms(
+    t: tuple[float, ...], piece: tuple[int, ...], before: int, after: int, levels: bool
+) -> tuple[_Form, ...]:
+    """The forms of all mixtures for campaigns at times in pieces; the parameters of a machine share them."""
+    at, of = np.array(t), np.unique(piece, return_inverse=True)[1]
+    gaps = np.diff(at)[np.diff(at) > 0.0]
+    unit = float(np.median(gaps)) if len(gaps) else 1.0
+    gap = float(at[after] - at[before])
+    design = np.column_stack([np.eye(int(of.max()) + 1)[of], (at - at[before]) / unit])
+    walked = (np.minimum.outer(at, at) - at.min()) / unit
+    forms = []
+    for wander in MIXTURES:
+        half = np.linalg.cholesky(np.eye(len(at)) + wander * walked)
+        whiten = scipy.linalg.solve_triangular(half, np.eye(len(at)), lower=True)
+        basis, upper = np.linalg.qr(whiten @ design)
+        rows = whiten.T @ basis @ np.linalg.inv(upper).T
+        rate = rows[:, -1] / unit
+        if levels:
+            step = rows[:, of[after]] - rows[:, of[before]]
+        else:
+            step = -gap * rate
+            step[after] += 1.0
+            step[before] -= 1.0
+        spread, spread_rate = (float(np.linalg.norm(half.T @ form)) for form in (step, rate))
+        logs = float(np.log(np.diag(half)).sum() + np.log(np.abs(np.diag(upper))).sum())
+        forms.append(_Form(wander, whiten, basis, step, rate, spread, spread_rate, logs))
+    return tuple(forms)
