@@ -66,9 +66,12 @@ def finished_copy(target: Path) -> Iterator[Path]:
 
 
 def begin_copy(db: Database, partial: Path) -> None:
-    """Give a new file, before anything is in it, the mode of the database: who may read that may read its backup."""
+    """Give a new file, before anything is in it, the mode of the database: who may read that may read its backup.
+
+    Its owner may write it, also where nobody may write the database: DuckDB fills it.
+    """
     mode = 0o600 if db.path == ":memory:" else stat.S_IMODE(os.stat(db.path).st_mode) & 0o666
-    os.chmod(partial, mode)
+    os.chmod(partial, mode | 0o600)
     make_log(str(partial))
 
 
