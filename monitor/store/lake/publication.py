@@ -31,6 +31,7 @@ from monitor.store.lake.attaching import (
     catalogue_file,
     connection_with_extensions,
     is_lake,
+    refuse_other_database,
 )
 from monitor.store.lake.copying import attach_origin, statements
 from monitor.store.lake.extensions import literal
@@ -195,6 +196,7 @@ class _Publisher:
     def _attach(self) -> None:
         options = ["CREATE_IF_NOT_EXISTS false"]
         if self._files is not None:
+            refuse_other_database(self._connection, self._address)
             options = [f"DATA_PATH {literal(address_of_files(str(self._files)))}", "OVERRIDE_DATA_PATH false"]
         attach(self._connection, self._address, *options, _NOTHING_INLINED)
         self._attached = True
