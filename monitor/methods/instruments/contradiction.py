@@ -149,14 +149,14 @@ def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
         before = off - off.mean(axis=0)
         by_point = (tool - tool.mean(axis=0)).reshape(-1, 3)
         move = np.linalg.lstsq(by_point, -before.reshape(-1), rcond=1e-3)[0]
-        left, as_stated = (
+        remaining, as_stated = (
             float(np.sqrt(np.mean(each**2))) for each in (before.reshape(-1) + by_point @ move, before)
         )
-        if as_stated > LEAST_POINT and left < LEFT_BY_POINT * as_stated:
+        if as_stated > LEAST_POINT and remaining < LEFT_BY_POINT * as_stated:
             point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
             yield (
-                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {left:.2g} mm left where the "
-                f"stated one leaves {as_stated:.2g} mm"
+                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where "
+                f"the stated one leaves {as_stated:.2g} mm"
             )
 
 

@@ -31,7 +31,7 @@ from monitor.store.copies.manifest import (
 )
 from monitor.store.database_name import check_database_name
 from monitor.store.entries import rows_recorded, select_portion
-from monitor.store.opening import connect, make_log, sync_folder
+from monitor.store.opening import connect, make_log, refuse_log_apart, sync_folder
 from monitor.store.verification import verify_audit
 
 
@@ -76,6 +76,7 @@ def restore(source: str | Path, target: str | Path, at: datetime | None = None) 
         last_entry, faults = None, tuple[str, ...]()
         if len(chain) > 1 or moment is not None:
             last_entry, faults = _cut_and_verified(partial, moment)
+        refuse_log_apart(partial, target)
         sync(partial)
         os.replace(partial, target)
         sync_folder(target.absolute().parent)
