@@ -66,6 +66,23 @@ COLUMN_UNITS = {
 CONDITION_SUFFIXES = ("degC", "percent", "hPa", "min")
 
 
+_DEGREES = "_degC"
+#: Words of the names of temperatures that say how warm a bar was, those nearest to it first: ``bar_degC`` and
+#: ``scale_bar_1_degC`` stand before ``ambient_degC``, of which ``runs.csv`` speaks; a workpiece stands where it does.
+_NEAREST_TO_BAR = (("bar", "scalebar"), ("artefact", "artifact"), ("ambient",), ("air",), ("workpiece",))
+
+
+def nearness_to_bar(column: str) -> int | None:
+    """Return how near to the scale bar the temperature of a column was measured, 0 the nearest; None for another.
+
+    Words of a name are parted by underscores; numbers behind them do not count (``bar2_degC``).
+    """
+    if not column.endswith(_DEGREES):
+        return None
+    parts = {word.rstrip("0123456789") for word in column.lower().split("_")}
+    return next((rank for rank, names in enumerate(_NEAREST_TO_BAR) if parts.intersection(names)), None)
+
+
 def column_unit(column: str) -> Unit | None:
     """The unit that a column's name ends in, or None: ``column_unit("x_mm")`` is the millimetre."""
     stem, _, suffix = column.rpartition("_")

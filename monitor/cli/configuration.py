@@ -23,6 +23,7 @@ ANGLE_UNITS = ("µrad", "arcsec", "µm/m")
 _TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
 _TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*|[A-Za-z0-9]+:\S+")
+_EFFECT_SIGN = ":"
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.
 # Paths without a leading / are counted from the folder of this file.
@@ -130,10 +131,20 @@ def _tolerances(value: object) -> str | None:
                     f'[tolerances."{name}"] {term}: no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, '
                     "as an effect such as EXX:reversal, or volumetric"
                 )
+            if _EFFECT_SIGN in term and (wrong := _wrong_effect(term)):
+                return f'[tolerances."{name}"] {term}: {wrong}'
             number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
             if not number or not 0.0 < limit < math.inf:
                 return f'[tolerances."{name}"] {term} = {limit!r}: a number above 0 in µm, µrad or µm/m'
     return None
+
+
+def _wrong_effect(name: str) -> str:
+    """Why no machine has such an effect; empty where one may have."""
+    # Loaded here: hardly any configuration limits an effect, and the language takes a tenth of a second.
+    from monitor.workflow.intake.checked_tolerances import wrong_on_any_machine
+
+    return wrong_on_any_machine(name)
 
 
 def _database(value: str, file: Path) -> str:

@@ -159,8 +159,8 @@ def _share(term: Term, of: Term, chain: Chain) -> float:
         return 0.0
     turned = np.zeros(3)
     turned[term.component - COMPONENTS.index("A")] = 1.0
-    place = _origin(chain, of.joint)
-    lever = float(carries) * (place - _origin(chain, term.joint)) - float(turns_frame) * place
+    origin = _origin(chain, of.joint)
+    lever = float(carries) * (origin - _origin(chain, term.joint)) - float(turns_frame) * origin
     shift = float(np.cross(turned, lever)[of.component])
     # µm by µrad: a lever of 1 mm shifts by 1e-3 µm a µrad.
     return shift * term.unit.factor / MICROMETRE.factor

@@ -12,11 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.records import Campaign, Run
-
-_DEGREES = "_degC"
-#: Words of a column's name, those nearest to the bar first: ``bar_degC`` and ``scale_bar_1_degC`` stand before
-#: ``ambient_degC``, of which ``runs.csv`` speaks; a workpiece stands where the bar does.
-_NEAREST_FIRST = (("bar",), ("artefact", "artifact"), ("ambient",), ("air",), ("workpiece",))
+from monitor.units import nearness_to_bar
 
 
 @dataclass(frozen=True)
@@ -35,15 +31,11 @@ def bar_temperature(campaign: Campaign, run: Run) -> BarTemperature | None:
     """
     recorded = {name: value for name, value in run.conditions.items() if np.isfinite(value)}
     recorded |= dict(_of_touches(campaign, run.run))
-    for rank in _NEAREST_FIRST:
-        columns = sorted(
-            name
-            for name in recorded
-            if name.endswith(_DEGREES) and set(rank).intersection(name.lower().split("_"))
-        )
-        if columns:
-            return BarTemperature(float(np.mean([recorded[name] for name in columns])), tuple(columns))
-    return None
+    ranks = {name: rank for name in recorded if (rank := nearness_to_bar(name)) is not None}
+    if not ranks:
+        return None
+    columns = sorted(name for name, rank in ranks.items() if rank == min(ranks.values()))
+    return BarTemperature(float(np.mean([recorded[name] for name in columns])), tuple(columns))
 
 
 def _of_touches(campaign: Campaign, number: int) -> Iterator[tuple[str, float]]:

@@ -16,7 +16,7 @@ import numpy as np
 from monitor.readers.axes_doubts import mistaken_axes
 from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
-from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS
+from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
 SHORTEST_TRAVEL = 5.0
@@ -37,8 +37,6 @@ AIR_RANGE = (-40.0, 60.0)
 APART = timedelta(hours=12)
 #: Clocks of machines and of this computer differ by less.
 CLOCKS = timedelta(hours=1)
-#: What a recorded temperature that says how long the bar was is called.
-AIR_NAMES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
 #: Diameters of calibrated balls in mm.
 BALL_RANGE = (0.1, 300.0)
 
@@ -278,11 +276,7 @@ def implausible_temperatures(campaign: Campaign, run: int) -> dict[str, float]:
     result = {}
     for name, values in recorded.items():
         finite = values[np.isfinite(values)]
-        if (
-            not len(finite)
-            or not name.endswith("_degC")
-            or not any(word in name.lower() for word in AIR_NAMES)
-        ):
+        if not len(finite) or nearness_to_bar(name) is None:
             continue
         farthest = float(finite[np.abs(finite - sum(AIR_RANGE) / 2.0).argmax()])
         if not AIR_RANGE[0] <= farthest <= AIR_RANGE[1]:

@@ -6,9 +6,11 @@ are numbered, ``authorised_by.0.name``. What does not apply is said in a box of 
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import date
 from typing import Any
 
 from monitor.exceptions import InputError
@@ -131,7 +133,10 @@ def box_of(key: str) -> list[str]:
 
 
 def laboratory_file(texts: Mapping[str, str]) -> str:
-    """Return the laboratory's file (TOML) that says what the form says. Raises InputError for a number that is none."""
+    """Return the laboratory's file (TOML) that says what the form says.
+
+    Raises InputError for a number or a day that is none.
+    """
     lines: list[str] = []
     for section, keys in SECTIONS.items():
         for prefix in _prefixes(section):
@@ -155,15 +160,23 @@ def _answer(key_of_file: str, name: str, texts: Mapping[str, str]) -> str | None
     if key_of_file in _LINES:
         return f"[{', '.join(_quoted(line.strip()) for line in text.splitlines() if line.strip())}]"
     if key_of_file in _DAYS:
-        parts = text.split("-")
-        if [len(part) for part in parts] == [4, 2, 2] and all(part.isdecimal() for part in parts):
-            return text
+        return _day(name, text)
     if key_of_file in _NUMBERS:
         try:
             return repr(float(text.replace(",", ".")))
         except ValueError as error:
-            raise InputError(f"{key_of_file}: '{text}' is no number") from error
+            raise InputError(f"{name} is a number, such as 20.5, not '{text}'") from error
     return _quoted(text)
+
+
+def _day(name: str, text: str) -> str:
+    """A day of the calendar as TOML has it; 2.3.2026 is one too, as the German form has it. Raises InputError."""
+    german = re.fullmatch(r"([0-9]{1,2})\. ?([0-9]{1,2})\. ?([0-9]{4})", text)
+    try:
+        day = date(int(german[3]), int(german[2]), int(german[1])) if german else date.fromisoformat(text)
+    except ValueError as error:
+        raise InputError(f"{name} is a day, such as 2026-03-02 or 02.03.2026, not '{text}'") from error
+    return day.isoformat()
 
 
 def _quoted(text: str) -> str:

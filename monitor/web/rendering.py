@@ -67,6 +67,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["without_option"] = words.without_option
     environment.globals |= {
         "version": __version__,
         "link": link,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
@@ -175,6 +176,11 @@ def so_far(ticket: Ticket) -> str:
     if ticket.is_stopping:
         return f"{seconds}, {ticket.taken_back_by} is stopping it"
     return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"
+
+
+def without_option(text: str) -> str:
+    """Return a refusal without the dashes of the option that it begins with: the box of a page has its name."""
+    return re.sub(r"^--([a-z-]+ )", r"\1", text)
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:

@@ -62,6 +62,19 @@ function takeTimes(canvas) {
   });
 }
 
+// In a narrow picture the names of the axes would be cut off at its sides: it is looked at from farther away, and moved
+// towards the scale of colours; fewer numbers on the axes do not lie over each other.
+function fitted(layout, canvas) {
+  const camera = layout.scene?.camera;
+  if (!camera || canvas.clientWidth >= 480) {
+    return layout;
+  }
+  const eye = Object.fromEntries(Object.entries(camera.eye).map(([axis, at]) => [axis, 1.5 * at]));
+  const center = { ...camera.center, x: camera.center.x - 0.04, y: camera.center.y - 0.035 };
+  const axes = Object.fromEntries(["xaxis", "yaxis", "zaxis"].map((axis) => [axis, { nticks: 5, ...layout.scene[axis] }]));
+  return { ...layout, scene: { ...layout.scene, ...axes, camera: { ...camera, eye, center } } };
+}
+
 function draw(figure) {
   const chart = JSON.parse(figure.querySelector("script.figure").textContent);
   const canvas = figure.querySelector(".canvas");
@@ -69,7 +82,7 @@ function draw(figure) {
     drawScene(canvas, chart);
   } else {
     canvas.style.height = chart.layout.height + "px"; // what the style sheet has no rule for
-    Plotly.react(canvas, coloured(chart.data), coloured(chart.layout), SETTINGS).then(() => {
+    Plotly.react(canvas, coloured(chart.data), fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
       canvas.dataset.drawn = "1";
       if (figure.dataset.key === "trend") {
         takeTimes(canvas);
@@ -148,7 +161,7 @@ function drawScene(canvas, chart) {
     data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + effect.effect, colour("orange"), true));
     data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + effect.effect, colour("teal"), "legendonly"));
   }
-  return Plotly.react(canvas, data, coloured(chart.layout), SETTINGS).then(() => {
+  return Plotly.react(canvas, data, fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
     canvas.dataset.drawn = "1";
     if (effect !== null && scene.swung !== effect) {
       scene.swung = effect;

@@ -29,9 +29,9 @@ DAYS, RUNS, SPACING = 2, 2, 30.0
 #: Standard deviation of the mean of a campaign by its days and runs.
 OF_MEAN = float(np.sqrt((1.0 + 1.0 / RUNS) / DAYS))
 LAYOUTS = ((2, 1), (2, 2), (3, 2), (3, 3), (4, 4), (7, 1), (2, 6), (8, 8))
-#: Of so many machines of a cell the share that is not decided is counted: the days take most of the time. They have no
-#: part in what is called where campaigns judge.
-ASKED_WHOLE = 50
+#: Where so many campaigns and more are measured they judge, and the days have no part in what is called: these take
+#: nearly all of the time, and only say what is not decided.
+CAMPAIGNS_JUDGE = 5
 STEPS = (5.0, 10.0, 20.0)
 
 
@@ -80,11 +80,11 @@ def following(draws: np.ndarray, correlation: float) -> np.ndarray:
 
 
 def machine(
-    rng: np.random.Generator, law: Law, layout: tuple[int, int], step: float
+    rng: np.random.Generator, law: Law, layout: tuple[int, int], start: np.ndarray, step: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (c, d, r) and times (c, d, r) in days; ``step`` in standard deviations of the mean of a campaign."""
+    """Values (c, d, r) and times (c, d, r) in days, of campaigns that begin at ``start`` (c,); ``step`` in standard
+    deviations of the mean of a campaign."""
     count = sum(layout)
-    start = np.arange(count) * SPACING + rng.uniform(-4.0, 4.0, count)
     level = law.rate * start / SPACING + np.cumsum(law.walk * rng.normal(size=count))
     level = level + law.camp * following(rng.normal(size=count), law.follow)
     draws = rng.normal(size=(count, DAYS))
@@ -150,11 +150,13 @@ def interval(calls: int, count: int) -> str:
     return f"{100.0 * calls / count:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
-def shares(verdicts: list[Verdict]) -> str:
-    """The shares that are called and, of those that were asked whole, not decided."""
-    open_ = [verdict in (Verdict.DAYS, Verdict.DRIFT) for verdict in verdicts[:ASKED_WHOLE]]
+def shares(verdicts: list[Verdict], whole: bool) -> str:
+    """The share that is called and, where the days were asked too, that is not decided."""
     called = interval(verdicts.count(Verdict.STEPPED), len(verdicts))
-    return f"{called} | {100.0 * sum(open_) / len(open_):.0f}"
+    if not whole:
+        return f"{called} | -"
+    open_ = sum(verdict in (Verdict.DAYS, Verdict.DRIFT) for verdict in verdicts)
+    return f"{called} | {100.0 * open_ / len(verdicts):.0f}"
 
 
 def main() -> None:
@@ -163,6 +165,7 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=400)
     parser.add_argument("--seed", type=int, default=14)
     parser.add_argument("--layouts", type=int, nargs="*", help="numbers of LAYOUTS, from 0; all without it")
+    parser.add_argument("--whole", action="store_true", help="ask the days everywhere: ten times as long")
     options = parser.parse_args()
     print(
         "| campaigns before, after | machine | pair: called, % | not decided | step: called, % | not decided |"
@@ -180,9 +183,10 @@ def main() -> None:
         for cell, (name, law, step) in enumerate(cells):
             rng = np.random.default_rng([options.seed, number, cell])
             kinds: tuple[list[Verdict], list[Verdict]] = ([], [])
-            for index in range(options.machines):
-                values, t = machine(rng, law, layout, step)
-                whole = index < ASKED_WHOLE or sum(layout) < 5
+            whole = options.whole or sum(layout) < CAMPAIGNS_JUDGE
+            start = np.arange(sum(layout)) * SPACING + rng.uniform(-4.0, 4.0, sum(layout))
+            for _ in range(options.machines):
+                values, t = machine(rng, law, layout, start, step)
                 verdicts = (
                     (of_pair(values, t, layout[0]), of_event(values, t, layout[0]))
                     if whole
@@ -190,7 +194,10 @@ def main() -> None:
                 )
                 for kind, verdict in zip(kinds, verdicts, strict=True):
                     kind.append(verdict)
-            print(f"| {layout[0]}, {layout[1]} | {name} | {' | '.join(map(shares, kinds))} |", flush=True)
+            print(
+                f"| {layout[0]}, {layout[1]} | {name} | {' | '.join(shares(kind, whole) for kind in kinds)} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

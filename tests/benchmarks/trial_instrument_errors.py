@@ -3,6 +3,7 @@
 ``python tests/benchmarks/trial_instrument_errors.py --seeds 20 --empty 100``: every seed is a machine of its own,
 measured in one run by six instruments (``tests/simulator/instrument_errors.py``, no code shared with the package). An
 error counts as named where it is the first finding, or among those that the readings do not rule out in its stead.
+``--times``: errors of other sizes.
 ``--without`` searches without the errors of instruments: the rate of false effects that there was before.
 """
 
@@ -40,12 +41,12 @@ SIZES = {
 }
 
 
-def named(seed: int, error: str = "") -> tuple[list[str], tuple[str, ...]]:
+def named(seed: int, error: str = "", times: float = 1.0) -> tuple[list[str], tuple[str, ...]]:
     """The findings, the most convincing first, and the rivals of the first."""
     rng = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as folder:
         campaign = read_campaign(
-            week(Path(folder) / "week", rng, truth_of(rng), error, SIZES.get(error, 0.0))
+            week(Path(folder) / "week", rng, truth_of(rng), error, times * SIZES.get(error, 0.0))
         )
     problem = campaign_method(campaign).problem_of(campaign)
     answer = explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
@@ -66,24 +67,29 @@ def main() -> None:
     parser.add_argument("--empty", type=int, default=0)
     parser.add_argument("--empty-first", type=int, default=10_000, help="the first seed without an error")
     parser.add_argument("--only", default="")
+    parser.add_argument("--times", type=float, default=1.0, help="the sizes of the errors, in those of SIZES")
     parser.add_argument("--without", action="store_true")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     begin = time.process_time()
     seeds = range(options.first, options.first + options.seeds)
     for error in (error for error in ERRORS if options.only in error and options.seeds):
-        first = beside = other = 0
+        first = beside = other = silent = 0
         for seed in seeds:
-            findings, rivals = named(seed, error)
+            findings, rivals = named(seed, error, options.times)
             first += findings[:1] == [error]
             beside += findings[:1] != [error] and error in rivals
             other += len(findings) > 1
+            silent += not findings
             if options.verbose or not (findings[:1] == [error] or error in rivals):
                 print(f"  seed {seed}: {findings} rivals {rivals[:6]}", flush=True)
+        wrong = len(seeds) - first - beside - silent
         print(
-            f"{error}, {SIZES[error]:g}: named {_rate(first + beside, len(seeds))}, of these first {first}; "
-            f"further findings in {other}; {time.process_time() - begin:.0f} s", flush=True,
-        )  # fmt: skip
+            f"{error}, {options.times * SIZES[error]:g}: named {_rate(first + beside, len(seeds))}, of these first "
+            f"{first}; nothing said in {silent}, something else alone in {wrong}, further findings in {other}; "
+            f"{time.process_time() - begin:.0f} s",
+            flush=True,
+        )
     false = 0
     with (
         mock.patch("monitor.methods.instruments.problem.of_instruments", return_value=())

@@ -117,7 +117,7 @@ def main() -> None:
     cases = {name: (keys, options.seeds) for name, keys in RIGHT.items()}
     cases |= {name: ({"otherwise": how}, max(1, options.seeds // 5)) for name, how in WRONG.items()}
     for name, (keys, count) in cases.items():
-        if options.only not in name:
+        if options.only not in f"{name},":
             continue
         answers = [judged(seed, **keys) for seed in range(options.first, options.first + count)]
         refused = [kinds for kinds, _ in answers if kinds]

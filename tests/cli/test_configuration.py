@@ -147,6 +147,12 @@ def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(type
         ("[tolerances.x]\nEC0Y = inf", "EC0Y = inf: a number above 0"),
         ("[tolerances.x]\nsquareness = 1", "squareness: no name of a term"),
         ("[tolerance.x]\nEC0Y = 1", "did you mean 'tolerances'?"),
+        (
+            '[tolerances.x]\n"EXX:reversl" = 5',
+            "EXX:reversl: there is no shape 'reversl'; did you mean 'reversal'?",
+        ),
+        ('[tolerances.x]\n"EXX:lag@warmupp" = 5', "no driver '@warmupp'; did you mean 'warmup'?"),
+        ('[tolerances.x]\n"size:poly1" = 5', "is no geometric error"),
     ],
 )
 def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> None:
@@ -157,7 +163,15 @@ def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> 
 
 
 def test_a_machine_type_may_limit_an_effect(typed: Any) -> None:
-    configured('[tolerances."*"]\n"EXX:reversal" = 5.0\n')
+    # Of machines with any axes: a second X, a joint of a robot, a pitch that looks like a coefficient.
+    names = (
+        "EXX:reversal",
+        "EXX1:windup40mm",
+        "EBB:harmonic2.cos",
+        "ECJ1:harmonic1.cos",
+        "EXX:cyclic2.5mm.cos",
+    )
+    configured('[tolerances."*"]\n' + "".join(f'"{name}" = 5.0\n' for name in names))
     assert typed("config", "check").status == 0
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from monitor.methods.bar_temperature import BarTemperature, bar_temperature
 from monitor.methods.samba.method import METHOD as samba
+from monitor.readers.doubts import implausible_temperatures
 from monitor.records import Array, Campaign
 
 STEEL, WARM, AIR = 11.5e-6, 27.0, 21.5
@@ -79,3 +80,22 @@ def test_what_only_sounds_like_a_bar_is_none(warm: Campaign) -> None:
     assert bar_temperature(other, other.runs[0]) is None
     two = recorded(warm, bar_2_degC=26.0, bar_1_degC=25.0, ambient_degC=AIR)
     assert bar_temperature(two, two.runs[0]) == BarTemperature(25.5, ("bar_1_degC", "bar_2_degC"))
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("bar_degC", True),
+        ("scalebar2_degC", True),
+        ("air_degC", True),
+        ("drawbar_degC", False),
+        ("repair_degC", False),
+    ],
+)
+def test_import_and_the_bars_length_take_the_same_columns_for_temperatures_of_the_bar(
+    warm: Campaign, column: str, said: bool
+) -> None:
+    """`import` once asked a drawbar of 80 °C, by the letters of its name, whether it was a bar."""
+    one = recorded(warm, **{column: 80.0})
+    assert (bar_temperature(one, one.runs[0]) is not None) is said
+    assert (column in implausible_temperatures(one, one.runs[0].run)) is said

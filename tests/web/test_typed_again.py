@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import html
 import re
+import tomllib
+from datetime import date
 from typing import Any
 
 import pytest
 
+from monitor.web.laboratory_form import laboratory_file
 from tests.web.test_pages import looked_at
 
 CAMPAIGN = "hidden-spindle-growth"
@@ -43,7 +46,9 @@ def test_an_event_of_an_impossible_moment_is_mended_in_its_form(local: Any, at: 
     address, _, fragment = sent.headers["location"].partition("#")
     assert fragment == "event"
     for _ in range(2):
-        page = local.client.get(address).text
+        answer = local.client.get(address)
+        assert answer.status_code == 400
+        page = answer.text
         assert says in page
         assert {name: _boxes(page)[name] for name in texts} == texts
         assert "<h2>EB0C: squareness of axis C to X</h2>" in page
@@ -87,3 +92,41 @@ def test_a_pair_of_one_parameter_is_refused_above_the_form(local: Any) -> None:
     assert "<h2>Do the days differ?</h2>" in page
     assert page.count('<option value="EB0C" selected>') == 2
     assert "whole number" in looked_at(local, f"/campaign?name={CAMPAIGN}&first=EB0C&second=EA0B&run=1,5")
+
+
+@pytest.mark.parametrize("button", ["issue", "preview", "keep"])
+@pytest.mark.parametrize(
+    ("box", "text", "says"),
+    [
+        ("temperature.machine_degC", "20,5x", "is a number, such as 20.5"),
+        ("item.received_on", "31.02.2026", "is a day, such as 2026-03-02 or 02.03.2026"),
+        ("standards.1.issued_on", "March", "is a day, such as 2026-03-02 or 02.03.2026"),
+    ],
+)
+def test_a_box_of_a_certificate_that_cannot_be_read_is_marked(
+    local: Any, button: str, box: str, text: str, says: str
+) -> None:
+    """Keeping the answers as a file was refused on a page of its own, and all boxes were empty."""
+    texts = {"campaign": CAMPAIGN, "run": "20", "customer.name": "Mill & Sons, 1/2 Road", box: text}
+    page = local.sent("/certificate/new", data={"proof": local.proof(), "button": button, **texts})
+    assert page.status_code == 400
+    marked = re.findall(r'<input name="([^"]+)"[^>]* aria-invalid="true"', page.text)
+    # Where an item may not apply, the box of the reason is marked with it.
+    assert marked in ([box], [box, f"na:{box}"])
+    assert says in html.unescape(page.text)
+    boxes = _boxes(page.text)
+    assert (boxes[box], boxes["customer.name"]) == (text, texts["customer.name"])
+
+
+@pytest.mark.parametrize("text", ["02.03.2026", "2. 3. 2026", "2026-03-02"])
+def test_a_day_is_read_as_the_german_form_has_it_too(text: str) -> None:
+    assert tomllib.loads(laboratory_file({"item.received_on": text})) == {
+        "item": {"received_on": date(2026, 3, 2)}
+    }
+
+
+def test_a_page_names_no_option_of_the_command_line(local: Any) -> None:
+    """It said --week."""
+    assert "--week" not in looked_at(local, "/reports?week=2026-W99")
+    assert "week 2026-W99: write a year and a week of it" in looked_at(local, "/reports?week=2026-W99")
+    assert "last -1: how many entries" in local.client.get("/audit?last=-1").text

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from monitor.exceptions import MistakenUnitError
-from monitor.machine import Chain, evaluate
+from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import direction_of
@@ -29,6 +29,9 @@ STATED_WITHIN, LEFT_BY_UNIT = 5.0, 0.1
 # A laser's readings are its travel to some hundredths: gains of machines are thousands of times smaller. A travel of
 # less than a millimetre says nothing of that.
 SAME_TRAVEL, LEAST_TRAVEL = 0.02, 1.0
+# A path that leaves its point by more than this, mm, beside what sensors read is no error of a machine; another point
+# of the tool explains it where it takes away all but this part.
+LEAST_POINT, LEFT_BY_POINT = 0.1, 0.2
 # What readings of a travel are where they are not µm of it along n: the factor, and what to look at.
 OTHER_TRAVELS = (
     (-1.0, "with the other sign: look at the signs of the readings, of `direction` and of the axis"),
@@ -103,11 +106,11 @@ def _wrong_unit(parts: Iterable[Part]) -> str | None:
     return None
 
 
-def unsettled(parts: Iterable[Part], bars: Iterable[str]) -> str:
+def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
     """What may keep a fit from settling, as the end of a refusal; ``bars`` kept one direction, so that a centre which
     is stated some millimetres wrong cannot be mended."""
-    travels = "".join(f"; {what}" for what in _other_travels(parts))
-    return travels + "".join(
+    suspected = "".join(f"; {what}" for what in (*_other_travels(parts), *_other_tool_points(parts)))
+    return suspected + "".join(
         f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
         "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
         for name in bars
@@ -128,6 +131,33 @@ def _other_travels(parts: Iterable[Part]) -> Iterator[str]:
             if what is not None:
                 yield f"the readings of setup {part.id} are {what}"
                 break
+
+
+def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
+    """The setups of vectors that fit another tool point than the stated one, in words: a head that turns shows it."""
+    for part in parts:
+        if not isinstance(part.reading, VectorReading) or not _is_sought(part.reading):
+            continue
+        rows, setup = part.rows, part.reading.setup
+        first = (rows.run == rows.run[0]) & np.isfinite(rows.measured).all(axis=1)
+        sides = orientation(rows.chain, rows.positions, np.zeros((len(rows), len(rows.chain.joints), 2, 6)))
+        tool = (np.swapaxes(sides.work, 1, 2) @ sides.tool)[first]
+        measured = rows.measured[first]
+        if setup.frame == "tool":
+            measured = np.einsum("nij,nj->ni", tool, measured)
+        off = _nominal(part)[first] - measured
+        before = off - off.mean(axis=0)
+        by_point = (tool - tool.mean(axis=0)).reshape(-1, 3)
+        move = np.linalg.lstsq(by_point, -before.reshape(-1), rcond=1e-3)[0]
+        remaining, as_stated = (
+            float(np.sqrt(np.mean(each**2))) for each in (before.reshape(-1) + by_point @ move, before)
+        )
+        if as_stated > LEAST_POINT and remaining < LEFT_BY_POINT * as_stated:
+            point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
+            yield (
+                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where "
+                f"the stated one leaves {as_stated:.2g} mm"
+            )
 
 
 def _travel_in_words(travel: Array, read: Array) -> str | None:

@@ -37,6 +37,8 @@ SECOND_ORDER = 5e-3
 LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
+# Derivatives below this part of the largest, in mm or rad over what a reading is known to, are rounding.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -290,7 +292,9 @@ class InstrumentProblem(ChainProblem):
         whole = replace(self, is_whole=True)
         by_local = whole.linearise(self.start, self.common_start).local
         scale = np.linalg.norm(by_local, axis=1)
-        scale[scale == 0] = 1.0
+        # A centre across the plane of a bar's swing leaves 1e-14 by rounding, or nothing, as its plane lies.
+        is_rounding = scale <= ROUNDING * scale.max(axis=1, keepdims=True)
+        by_local, scale = np.where(is_rounding[:, None, :], 0.0, by_local), np.where(is_rounding, 1.0, scale)
         null_space = eliminate(by_local).null_space
         projector = np.eye(by_local.shape[2]) - np.swapaxes(null_space, 1, 2) @ null_space
         # What is open by itself leaves a column of rounding.

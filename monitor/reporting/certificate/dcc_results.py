@@ -58,14 +58,14 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
 
 def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, texts: Texts) -> None:
     """An effect that was added to the model, with its own standard uncertainty; a play with its reversal value too."""
-    words = describe(effect.name, texts)
+    description = describe(effect.name, texts)
     if effect.value is None or effect.u is None:
         element = add(parent, "result")
-        say(element, "name", texts("dcc.effect", name=effect.name, words=words), texts.language)
+        say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
         say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
         return
     explained = texts("page.effects_explained", runs=effect.runs, days=effect.days)
-    values = [(words, effect.value, effect.u)]
+    values = [(description, effect.value, effect.u)]
     if effect.reversal_value is not None and effect.u_reversal is not None:
         values.append((texts("page.effect_reversal"), effect.reversal_value, effect.u_reversal))
     for meaning, value, u in values:

@@ -80,22 +80,20 @@ def beside_drift(
     """
     line = stepped_line(campaigns, before, after, levels=levels)
     widest = 0.0 if line is None else _widest(campaigns, line, before, after, levels)
-    return BesideDrift(days, line, widest, *moves(campaigns, before, after))
+    return BesideDrift(days, line, widest, *moves(campaigns, before, after, levels=levels))
 
 
 def _widest(campaigns: Campaigns, line: SteppedLine, before: int, after: int, levels: bool) -> float:
     """The variance that a side adds if its days or campaigns scatter as widely as they may."""
     about = campaigns.mean - line.rate * campaigns.t
     index = np.arange(len(about))
-    sides = [np.array([before]), np.array([after])]
-    if levels:
-        near = (index > before - NEAREST) & (index < after + NEAREST)
-        sides = [index[near & (campaigns.piece == campaigns.piece[end])] for end in (before, after)]
+    near = (index > before - NEAREST) & (index < after + NEAREST)
+    sides = [index[near & (campaigns.piece == campaigns.piece[end])] for end in (before, after)]
     squares = sum(float(((about[side] - about[side].mean()) ** 2).sum()) for side in sides)
     of_campaign = squares / max(sum(len(side) - 1 for side in sides), 1)
     # That one side scatters more is allowed for, not that both do.
     return max(
-        wider_side([about[side]], of_campaign)
+        wider_side([about[side]], of_campaign) * (1 if levels else len(side))
         if len(side) > 1 and of_campaign > 0.0
         else _of_one(campaigns, int(side[0]), line.u**2 / 2.0)
         for side in sides

@@ -99,8 +99,8 @@ def publish(
     address in an object store (``s3://bucket/folder``) of a new lake.
 
     ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
-    the last entry that was published and the last that is there, ``away`` with the lake's fault where one transaction
-    is tried for long. The database is closed. Raises StoreError, InputError.
+    the last entry that was published and the last that is there, ``away`` with the fault for which a transaction is
+    tried again for long. The database is closed. Raises StoreError, InputError.
     """
     if db.path == ":memory:" or is_lake(db.path):
         raise StoreError(f"{db.path} is no database file of a plant; name one with --db")

@@ -70,8 +70,11 @@ def routes() -> APIRouter:
             button = filled.texts.get("button", "")
             texts = dict(filled.texts)
             if button == "keep":
-                return attachment(FILE_NAME, laboratory_file(texts).encode("utf-8"))
-            if button == "fill":
+                try:
+                    return attachment(FILE_NAME, laboratory_file(texts).encode("utf-8"))
+                except InputError as error:
+                    outcome = _refused(error, "")
+            elif button == "fill":
                 texts, outcome = _with_file(texts, filled)
             else:
                 outcome = await run_in_threadpool(_pressed_once, request, filled, texts)
@@ -183,7 +186,7 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
 
 def _refused(error: MonitorError, folder: str) -> _Outcome:
     """The refusal in words, and at every box that it names what is missing there."""
-    refusal = refusal_of(error, {f"{folder}/": ""})
+    refusal = refusal_of(error, {f"{folder}/": ""} if folder else {})
     lines = [line.strip() for line in refusal.error.splitlines()]
     faults: dict[str, str] = {}
     if isinstance(error, IncompleteCertificateError):
@@ -193,10 +196,18 @@ def _refused(error: MonitorError, folder: str) -> _Outcome:
         lines = [lines[0], *map(str, error.missing)]
     else:
         for line in lines:
-            named = re.match(r"(\w+)\.(\w+) ", line)
-            for box in box_of(f"[{named[1]}] {named[2]}") if named else ():
+            for box in _boxes_named(line):
                 faults.setdefault(box, line)
     return _Outcome(
         refusal=Refusal(refusal.status, lines[0], tuple(lines[1:])), faults=faults,
         grounds="--accept" in refusal.error,
     )  # fmt: skip
+
+
+def _boxes_named(line: str) -> list[str]:
+    """The boxes that a line of a refusal begins with: ``standards.1.issued_on`` is one, ``customer.contact`` a key."""
+    numbered = re.match(r"(\w+\.\d+\.\w+) ", line)
+    if numbered:
+        return [numbered[1]]
+    named = re.match(r"(\w+)\.(\w+) ", line)
+    return box_of(f"[{named[1]}] {named[2]}") if named else []

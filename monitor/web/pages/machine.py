@@ -70,8 +70,9 @@ def routes() -> APIRouter:
         campaigns = ask(user, "campaigns", {"machine": name}).campaigns
         trend = trends.shown(shown)
         all_trends = trends.of_all() if every else trends.of_all_already()
+        form = refused_form(request, refused)
         return page(
-            request, "machine.html",
+            request, "machine.html", status=form.refusal.status if form else 200,
             name=name, parameter=shown, parameters=names, topology=values.topology, values=values, trend=trend,
             statement=None if trend is None else trend.parameters.get(shown),
             every=all_trends if shown else None, waiting=trends.waiting,
@@ -79,7 +80,7 @@ def routes() -> APIRouter:
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
-            refused=refused_form(request, refused),
+            refused=form,
         )  # fmt: skip
 
     @router.get("/machine/values.csv")

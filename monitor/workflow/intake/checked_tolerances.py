@@ -1,4 +1,7 @@
-"""Refuses a campaign with a limit of an effect that its machine cannot have: it would never be asked for."""
+"""Refuses a limit of an effect that a machine cannot have: it would never be asked for.
+
+A campaign states its machine. A machine type of the configuration does not: what no machine can have is refused.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from monitor.exceptions import CampaignError, EffectError, Fault
 from monitor.readers import line_of_tolerance
-from monitor.readers.machine_file import EFFECT_SIGN, not_of_effect
+from monitor.readers.machine_file import EFFECT_SIGN, TERM, not_of_effect
 from monitor.records import Campaign
 
 if TYPE_CHECKING:
@@ -14,6 +17,9 @@ if TYPE_CHECKING:
     from monitor.machine import Chain
 
 _FILE = "campaign.toml"
+#: Axes that the effects of a machine type may be of, beside the one that a term names.
+_USUAL_AXES = ("X", "Y", "Z", "A", "B", "C")
+_DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 #: Stands between an effect and which of its coefficients a parameter is: ``EBB:harmonic2.cos``.
 _COEFFICIENT_SIGN = "."
 
@@ -41,14 +47,39 @@ def check_tolerances(campaign: Campaign) -> None:
         raise CampaignError(campaign.name, faults)
 
 
-def _wrong(name: str, chain: Chain, context: Context) -> str:
-    """Why no effect has a parameter of this name; empty where one has. A pitch may have the sign of a coefficient."""
+def wrong_on_any_machine(name: str) -> str:
+    """Return why no machine has an effect with a parameter of this name; empty where one may have.
+
+    Its axis is taken to be there, its coefficients, which depend on the campaign, as they are written.
+    """
+    from monitor.machine import chain_of_axes
+    from monitor.records import ChainAxis
+
+    term = TERM.fullmatch(name.partition(EFFECT_SIGN)[0])
+    named = () if term is None else (term[3],)
+    axes = []
+    for axis in dict.fromkeys((*_USUAL_AXES, *named)):
+        letter = axis[0].upper()
+        # An axis of a robot is named freely: it turns.
+        direction = _DIRECTIONS[("XYZ" if letter in "XYZ" else "ABC").find(letter)]
+        axes.append(ChainAxis(axis, "linear" if letter in "XYZ" else "rotary", "tool", direction))
+    return _wrong(name, chain_of_axes(axes), None)
+
+
+def _wrong(name: str, chain: Chain, context: Context | None) -> str:
+    """Why no effect has a parameter of this name; empty where one has. A pitch may have the sign of a coefficient.
+
+    Without a ``context`` nobody knows the coefficients of an effect.
+    """
     from monitor.effects import parse_effect
 
     message = ""
     for text in dict.fromkeys((name, name.rpartition(_COEFFICIENT_SIGN)[0] or name)):
         try:
-            parameters = parse_effect(text, chain).parameters(context)
+            effect = parse_effect(text, chain)
+            if context is None:
+                return ""
+            parameters = effect.parameters(context)
         except EffectError as error:
             message = str(error)
             continue
