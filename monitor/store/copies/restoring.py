@@ -201,7 +201,8 @@ def _cut(db: Database, moment: datetime) -> None:
             f"--at {moment:%Y-%m-%d %H:%M:%S} UTC: files were archived at {archived_at:%Y-%m-%d %H:%M:%S} UTC, and "
             "this backup no longer has them; name a backup that was made before that"
         )
-    ((last_made_at,),) = db.rows("SELECT made_at FROM audit WHERE entry = ?", [first - 1])
+    # The latest, not that of the last entry: a clock may have been set back in between.
+    ((last_made_at,),) = db.rows("SELECT max(made_at) FROM audit WHERE entry < ?", [first])
     ((catalog,),) = db.rows("SELECT current_database()")
     with db.connected() as connection:
         select_portion(connection, quoted(catalog), first, end)
