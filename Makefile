@@ -79,6 +79,7 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_ties.py 20
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_event_oracle.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_event_drift.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_mounts.py --seeds 30
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_instruments.py --seeds 300

@@ -28,6 +28,8 @@ _HASH = re.compile(r"\b[0-9a-f]{64}\b")
 #: A space between a number and its unit, and on both sides of a sign between a symbol and its number.
 _NUMBER_AND_UNIT = re.compile(r"(?<=[0-9]) (?=(?:%|°C|K|mm|[µn]m(?:/m)?|[µm]?rad(?:/m)?|arcsec)(?![\w]))")
 _SYMBOL_AND_NUMBER = re.compile(r"(?<=\b[A-Za-z]) ([=±<>]) (?=[−+-]?[0-9])")
+#: A sign before a number, which stands by itself: ± 20, > 99.9 (in markup &gt; 99.9).
+_SIGN_AND_NUMBER = re.compile(r"(?<![^ (])([±<>]|&[lg]t;) (?=[0-9])")
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
 
 
@@ -71,9 +73,10 @@ def with_subscripts(text: str) -> Markup:
 
 
 def with_bound_units(text: str) -> str:
-    """A sentence, or markup, in which no line ends between a number and its unit or a symbol and its number."""
+    """A sentence, or markup, in which no line ends between a number and its unit, its sign, or its symbol."""
     bound = _NUMBER_AND_UNIT.sub("\N{NO-BREAK SPACE}", text)
     bound = _SYMBOL_AND_NUMBER.sub("\N{NO-BREAK SPACE}\\1\N{NO-BREAK SPACE}", bound)
+    bound = _SIGN_AND_NUMBER.sub("\\1\N{NO-BREAK SPACE}", bound)
     return Markup(bound) if isinstance(text, Markup) else bound
 
 

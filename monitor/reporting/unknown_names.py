@@ -25,14 +25,16 @@ _OF_SETUP = re.compile(
 def unknown_words(name: str, texts: Texts) -> str:
     """Return the name of an unknown in the language of ``texts``; one of another form as it is."""
     if (of_target := _OF_TARGET.fullmatch(name)) is None:
-        own = _OF_SETUP.fullmatch(name)
-        return name if own is None else f"{own['setup'] or ''}{_word(own['kind'], texts)}{own['part'] or ''}"
-    words = f"{of_target['setup'] or ''}{_word(of_target['kind'], texts)} {of_target['name']}"
+        of_setup = _OF_SETUP.fullmatch(name)
+        if of_setup is None:
+            return name
+        return f"{of_setup['setup'] or ''}{_word(of_setup['kind'], texts)}{of_setup['part'] or ''}"
+    target = f"{of_target['setup'] or ''}{_word(of_target['kind'], texts)} {of_target['name']}"
     part = of_target["part"]
     if part is None:
-        return words
+        return target
     kind, _, axis = part.partition(" ")
-    return " ".join(filter(None, (words, kind if len(kind) == 1 else _word(kind, texts), axis)))
+    return " ".join(filter(None, (target, kind if len(kind) == 1 else _word(kind, texts), axis)))
 
 
 def _word(kind: str, texts: Texts) -> str:

@@ -11,7 +11,9 @@ which version, and when its machine was first registered.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from monitor.store.connection import Database
 
@@ -55,11 +57,31 @@ def earlier_hashes(db: Database, subject: str, number: int | str, content_sha256
     return _hash(db, _ROWS.get(subject, ()), number, content_sha256), content_sha256
 
 
+def hashes_of_fewer_books(
+    db: Database, subject: str, number: int | str, content_sha256: str
+) -> Iterator[str]:
+    """Yield the hashes with the first so many of the rows of before, by their numbers.
+
+    What was there before is told by times, and a clock that was ahead makes what came later look earlier: a migration
+    applied once it was right again. Each row that is counted still has to be as it was.
+    """
+    of_before = [db.rows(query, [number]) for query in _ROWS_OF_BEFORE.get(subject, ())]
+    if not of_before or not content_sha256:
+        return
+    of_its_own = [row for query in _ROWS.get(subject, ()) for row in db.rows(query, [number])]
+    for counts in itertools.product(*(range(len(rows) + 1) for rows in of_before)):
+        first = [row for rows, count in zip(of_before, counts, strict=True) for row in rows[:count]]
+        yield _hash_of_rows(content_sha256, [*of_its_own, *first])
+
+
 def _hash(db: Database, queries: Sequence[str], number: int | str, content_sha256: str) -> str:
     if not queries or not content_sha256:
         return content_sha256
+    return _hash_of_rows(content_sha256, [row for query in queries for row in db.rows(query, [number])])
+
+
+def _hash_of_rows(content_sha256: str, rows: Sequence[tuple[Any, ...]]) -> str:
     digest = hashlib.sha256(content_sha256.encode())
-    for query in queries:
-        for row in db.rows(query, [number]):
-            digest.update(repr(row).encode())
+    for row in rows:
+        digest.update(repr(row).encode())
     return digest.hexdigest()

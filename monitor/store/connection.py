@@ -313,7 +313,7 @@ class Database:
                     _roll_back(connection)
                     raise
                 finally:
-                    connection.execute(f"DETACH {name}")
+                    _detach(connection, path, name)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -387,6 +387,14 @@ class Database:
 
     def forget_campaigns(self) -> None:
         """Let every name be that of another campaign from here on: after a withdrawal, and for a new question."""
+
+
+def _detach(connection: duckdb.DuckDBPyConnection, path: Path, name: str) -> None:
+    """Close an attached file. Raises StoreError naming it where what it holds could not be written."""
+    try:
+        connection.execute(f"DETACH {name}")
+    except duckdb.IOException as fault:
+        raise StoreError(f"{path} could not be written, as on a full disk: {fault}") from fault
 
 
 def _roll_back(connection: duckdb.DuckDBPyConnection) -> None:

@@ -50,9 +50,9 @@ _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
 
-#: What the log is called; how version 2 of it begins, the size and checksum before each further entry, and how the entry
-#: of a checkpoint begins (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99 the
-#: checkpoint, 100 the end of a transaction).
+#: What the log is called; how version 2 of it begins, the size and checksum before each further entry, and how the
+#: entries of a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the
+#: version, 99 a checkpoint, 100 the end).
 _LOG = ".wal"
 _LOG_BEGIN, _FRAME, _MARK, _END = b"d\x00be\x00\x02\xff\xff", struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
 
@@ -152,11 +152,7 @@ def has_log(path: str) -> bool:
 
 def _ends_with_mark(path: str) -> bool:
     """Whether a checkpoint is the last that a log tells; so, too, where it is of a form not known here."""
-    try:
-        file = open(path + _LOG, "rb")
-    except OSError:
-        return True
-    with file:
+    with open(path + _LOG, "rb") as file:
         if file.read(len(_LOG_BEGIN)) != _LOG_BEGIN:
             return True
         last = b""

@@ -151,8 +151,20 @@ def refuse_log_left(path: str | Path) -> None:
     """
     if has_log(str(path)):
         raise StoreError(
-            f"{path}.wal holds what was stored last in a database of this name, which is gone, and would be added to the "
-            f"new one: put the database back beside it, or move {path}.wal away first"
+            f"{path}.wal holds what was stored last in a database of this name, which is gone, and would be added to "
+            f"the new one: put the database back beside it, or move {path}.wal away first"
+        )
+
+
+def refuse_log_apart(partial: str | Path, target: str | Path) -> None:
+    """Raise StoreError where part of a new file still lies in its log when it was closed, before it gets its name.
+
+    DuckDB closes a file on a full disk without a word; the log does not follow the file to its name.
+    """
+    if has_log(str(partial)):
+        raise StoreError(
+            f"{target} could not be written: a part of it could not be moved from its log into the file, as on a full "
+            "disk; nothing was kept"
         )
 
 
@@ -181,6 +193,7 @@ def _make(path: str, partial: str) -> None:
             migrations.migrate(connection, migrations.available())
         finally:
             connection.close()
+        refuse_log_apart(partial, path)
         os.replace(partial, path)
         sync_folder(Path(path).absolute().parent)
     except (OSError, StoreError) as fault:
@@ -271,8 +284,8 @@ def _refuse_what_is_no_file(path: str, read_only: bool) -> None:
     if not read_only and status.st_nlink > 1:
         # The log has the name under which the file was opened: after a crash the other name would not see it.
         raise StoreError(
-            f"{path} has {status.st_nlink} names (hard links), and each would have a log of its own: what is stored under "
-            f"one could be lost to the others. It can be read; to write, remove the other names or make a copy of it"
+            f"{path} has {status.st_nlink} names (hard links), and each would have a log of its own: what is stored "
+            "under one could be lost to the others. It can be read; to write, remove the other names or make a copy"
         )
 
 

@@ -16,7 +16,7 @@ from monitor.exceptions import MonitorError
 from monitor.store import audit
 from monitor.store.analyses import analysis_contents
 from monitor.store.archiving import archived_hashes
-from monitor.store.bookkeeping import earlier_hashes, with_bookkeeping
+from monitor.store.bookkeeping import earlier_hashes, hashes_of_fewer_books, with_bookkeeping
 from monitor.store.campaigns import stored_content
 from monitor.store.certificates import certificate_faults
 from monitor.store.connection import Database
@@ -135,7 +135,11 @@ _OF_NUMBERS: Mapping[str, Callable[..., str]] = {
 
 def _fits(db: Database, content: _Content, audited: str) -> bool:
     """Whether what is stored of a subject has the hash in the audit."""
-    return audited in content.hashes(db) or audited in content.hashes_of_signed_zeros(db)
+    return (
+        audited in content.hashes(db)
+        or audited in content.hashes_of_signed_zeros(db)
+        or audited in hashes_of_fewer_books(db, content.subject, content.number, content.sha256)
+    )
 
 
 #: Of each subject of the audit: the numbers under which its rows are stored.

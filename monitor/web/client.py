@@ -215,6 +215,9 @@ class Server:
             text = str(content.get("in_full") or content["error"])
         except (ValueError, KeyError, AttributeError):
             return InputError(f"{self.address} answers with status {status}: it is no server of monitor")
+        if status == 503:
+            # Its database was replaced, or it has too much to do: no fault of the software.
+            return InputError(f"{self.address}: {text}")
         if status >= 500:
             return ServerFaultError(f"{self.address}: {text}")
         if status == 401:

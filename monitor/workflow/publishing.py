@@ -50,7 +50,7 @@ def publish(
 ) -> PublishAnswer:
     """Add everything that was stored since the last publication; nothing twice, whatever happened before.
 
-    ``away`` is told why a lake that is tried again does not answer. Raises StoreError where the lake cannot be reached
+    ``away`` is told why a transaction is tried again for long. Raises StoreError where the lake cannot be reached
     or the database has another past than it published.
     """
     published = publish_to(

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from monitor.cli.folder_patterns import in_full
+from monitor.cli.identify_output import _doing_the_same
 from monitor.exceptions import InputError
 from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
 
@@ -130,3 +131,9 @@ def test_the_circles_of_a_ball_bar_say_about_which_centre(typed: Any, tmp_path: 
     assert "circular deviation about its least-squares circle, counter-clockwise" in said
     assert "bi-directional circular deviation about the least-squares circle of both senses" in said
     assert "largest radial deviation about the centre of G, clockwise" in said
+
+
+def test_the_unknowns_of_the_setups_do_the_same_and_one_error_does() -> None:
+    assert _doing_the_same(("the unknowns of the setups",)) == "the unknowns of the setups do the same"
+    assert _doing_the_same(("EC0AZ",)) == "EC0AZ does the same"
+    assert _doing_the_same(("EC0AZ", "the unknowns of the setups")).endswith("together do the same")

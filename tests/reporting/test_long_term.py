@@ -17,6 +17,7 @@ from pypdf import PdfReader
 
 from monitor.exceptions import InputError
 from monitor.reporting.pdf.render import pdf_of
+from tests.reporting import long_term_authority
 from tests.reporting.long_term_authority import Authority
 
 pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
@@ -89,6 +90,23 @@ def test_en_319_102_1_5_6_past_validation_a_stamp_proves_the_signature_until_its
     assert check_signature(plain, root, now + timedelta(days=45)).good is False
     # Nobody named: the material is not judged, and proves nothing.
     assert check_signature(signed).judged_until == _day_of_end("laboratory", folder)
+
+
+def test_a_stamp_that_ends_before_the_signer_shortens_nothing(
+    page: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(long_term_authority._DAYS, "stamps", 10)
+    authority = Authority(tmp_path)
+    try:
+        signed = sign(
+            page, FileKey(tmp_path / "laboratory.p12"), f"{authority.address}/tsa", tmp_path / "root.pem"
+        )
+    finally:
+        authority.close()
+    for days in (0, 15):
+        finding = check_signature(signed, tmp_path / "root.pem", datetime.now(UTC) + timedelta(days=days))
+        assert (finding.good, finding.signer_trusted) == (True, True)
+        assert finding.judged_until == _day_of_end("laboratory", tmp_path)
 
 
 def _day_of_end(name: str, folder: Path) -> datetime:

@@ -99,6 +99,15 @@ def test_no_page_of_a_certificate_is_more_than_half_empty(
     assert len(faults) <= (1 if count == 149 else 0), faults
 
 
+def test_a_certificate_is_set_closer_where_that_saves_its_last_page(make_record: Make) -> None:
+    """Fifteen parameters: the last of four pages ended at 0.30, of three at 0.67."""
+    record = make_record(15)
+    assert record.results is not None
+    pdf = certificate_pdf(replace(record, results=tuple(map(with_budget, record.results))))
+    assert len(pypdf.PdfReader(io.BytesIO(pdf)).pages) == 3
+    assert faults_of(pdf) == []
+
+
 def of_lengths(count: int) -> list[MachineHealth]:
     """So many machines with 1 to 13 parameters, in every state, so that pages end anywhere."""
     machines = []

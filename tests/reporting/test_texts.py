@@ -166,6 +166,9 @@ def test_every_kind_of_reason_has_a_sentence(kind: AdviceKind | ReasonKind) -> N
         ("EB0C (16,4 µrad, U = 4,3 µrad)", "EB0C (16,4~µrad, U~=~4,3~µrad)"),
         ("in tolerance with 95 % until then", "in tolerance with 95~% until then"),
         ("−53 µm/m and 3 runs, 12 mmx", "−53~µm/m and 3 runs, 12 mmx"),
+        ("(U = 4.0, tolerance ± 20.0)", "(U~=~4.0, tolerance ±~20.0)"),
+        ("a probability of > 99.9 % (< 3 runs)", "a probability of >~99.9~% (<~3 runs)"),
+        ("estimate ± U, k_q> 3", "estimate ± U, k_q> 3"),
     ],
 )
 def test_no_line_ends_between_a_number_and_its_unit(text: str, bound: str) -> None:

@@ -24,8 +24,9 @@ def of_means(mean, t, piece):
     """Campaigns of one day each."""
     days = tuple(np.array([value]) for value in mean)
     return Campaigns(
-        np.asarray(mean, float), np.asarray(t, float), np.asarray(piece), np.asarray(piece), days
-    )
+        np.asarray(mean, float), np.asarray(t, float), np.asarray(piece), np.asarray(piece),
+        np.arange(len(mean)), days,
+    )  # fmt: skip
 
 
 def by_statsmodels(y, t, piece, wander, contrast):
@@ -54,6 +55,15 @@ def test_the_step_of_the_lines_is_that_of_statsmodels_under_the_least_sure_mixtu
     assert line.step == pytest.approx(float(worst.effect[0]), rel=1e-9)
     assert line.u == pytest.approx(float(worst.sd.item()), rel=1e-9)
     assert line.p_value() == pytest.approx(float(worst.pvalue), rel=1e-8)
+
+
+@pytest.mark.parametrize("sides", [(4, 4), (3, 3), (5, 1), (6, 2)])
+def test_campaigns_of_one_time_a_side_show_no_rate(sides):
+    """Dates without a time of day, copies: the time is a sum of the sides, and steps of 1e16 came of it."""
+    piece = np.repeat([0, 1], sides)
+    y = np.random.default_rng(5).normal(size=len(piece)) + 9.0 * piece
+    line = stepped_line(of_means(y, 0.3 + 30.1 * piece, piece), sides[0] - 1, sides[0], levels=True)
+    assert line is None
 
 
 def test_of_two_campaigns_alone_the_drift_between_them_is_taken_off():
@@ -94,11 +104,13 @@ def test_fewer_campaigns_than_lines_need_have_none_and_neighbours_say_how_far_th
     campaigns = of_means([0.0, 4.0, 20.0, 21.0], [0.0, 30.0, 90.0, 120.0], [0, 0, 1, 1])
     assert stepped_line(campaigns, 1, 2, levels=True) is None
     # The event lies between campaigns twice as far apart as their neighbours are.
-    assert moves(campaigns, 1, 2) == (8.0, 2)
-    assert moves(of_means([0.0, 4.0], [0.0, 30.0], [0, 1]), 0, 1) == (0.0, 0)
+    assert moves(campaigns, 1, 2, levels=False) == (8.0, 2)
+    assert moves(of_means([0.0, 4.0], [0.0, 30.0], [0, 1]), 0, 1, levels=False) == (0.0, 0)
+    # The middles of both sides are three times as far apart.
+    assert moves(campaigns, 1, 2, levels=True) == (12.0, 2)
     # A change that somebody found is a move without an event.
     found = replace(campaigns, piece=np.array([0, 1, 2, 2]))
-    assert moves(found, 1, 2) == (8.0, 2)
+    assert moves(found, 1, 2, levels=False) == (8.0, 2)
 
 
 def test_means_of_campaigns_are_means_of_means_of_days_and_an_event_cuts_one_in_two():

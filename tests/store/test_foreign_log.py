@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -17,13 +18,15 @@ import pytest
 from monitor.exceptions import StoreError
 from monitor.records import Campaign
 from monitor.store import Database, SharedDatabase, import_campaign, record_event, restore, take_backup
+from monitor.store.copies.increment import take_increment
+from monitor.store.opening import connect
 from monitor.store.verification import verify_audit
 
 _ENDINGS = ("", ".wal", ".blocks")
 
 
 class Shop:
-    """A database with a campaign, one event more in ``after_one`` and two in ``after_two``, killed behind the second."""
+    """A database with a campaign, killed behind its second event; ``before`` has none, ``after_two`` both."""
 
     def __init__(self, folder: Path, campaign: Campaign) -> None:
         self.path, self.machine = folder / "shop.duckdb", campaign.machine.id
@@ -31,7 +34,6 @@ class Shop:
             import_campaign(db, campaign)
         self.before = self.path.read_bytes()
         self.record(1)
-        self.after_one = self.path.read_bytes()
         kept = folder / "kept"
         kept.mkdir()
         with Database(self.path) as db:
@@ -168,3 +170,43 @@ def test_a_link_to_a_file_that_is_not_there_yet_makes_it_there(tmp_path: Path) -
         pass
     assert link.is_symlink()
     assert (tmp_path / "new.duckdb").stat().st_size > 0
+
+
+@pytest.mark.parametrize("dated", [False, True])
+def test_a_restored_file_whose_log_could_not_be_moved_into_it_gets_no_name(
+    tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch, dated: bool
+) -> None:
+    """As on a full disk: DuckDB closes the file without a word, and the rows of the increment lie in the log alone."""
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    with Database(tmp_path / "shop.duckdb") as db:
+        import_campaign(db, make_campaign("one"))
+        take_backup(db, folder / "0.duckdb")
+        import_campaign(db, make_campaign("two"))
+        increment = take_increment(db, folder / "1.duckdb")
+
+    def connect_and_keep_log(*arguments: Any) -> duckdb.DuckDBPyConnection:
+        connection = connect(*arguments)
+        connection.execute("PRAGMA disable_checkpoint_on_shutdown")
+        return connection
+
+    moment = datetime.fromisoformat(increment.made_at).replace(tzinfo=UTC) if dated else None
+    for module in ("monitor.store.connection", "monitor.store.copies.restoring"):
+        monkeypatch.setattr(f"{module}.connect", connect_and_keep_log)
+    with pytest.raises(StoreError, match="could not be moved from its log"):
+        restore(folder, tmp_path / "again.duckdb", moment)
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith("again")] == []
+
+
+def test_a_new_database_whose_log_could_not_be_moved_into_it_gets_no_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made_anew: None
+) -> None:
+    def connect_and_keep_log(*arguments: Any) -> duckdb.DuckDBPyConnection:
+        connection = connect(*arguments)
+        connection.execute("PRAGMA disable_checkpoint_on_shutdown")
+        return connection
+
+    monkeypatch.setattr("monitor.store.opening.connect", connect_and_keep_log)
+    with pytest.raises(StoreError, match="could not be moved from its log"):
+        Database(tmp_path / "new.duckdb")
+    assert list(tmp_path.glob("new.duckdb*")) in ([], [tmp_path / "new.duckdb.lock"])

@@ -279,3 +279,40 @@ def test_a_backup_of_every_release_is_put_back(version: str, tmp_path: Path) -> 
     assert (tmp_path / "back.duckdb").read_bytes() == old.read_bytes()
     with Database(tmp_path / "back.duckdb") as db:
         assert verify_audit(db).faults == ()
+
+
+def test_a_clock_that_was_set_back_hides_no_backup_and_takes_no_machine_away(
+    tmp_path: Path, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten days back behind the first backup, and right again later: the newest is the last of the chain."""
+    moment = datetime(2026, 3, 1, 12, tzinfo=UTC)
+
+    def set_clock(days: float) -> None:
+        now = (moment + timedelta(days=days)).replace(tzinfo=None)
+        for module in ("connection", "audit", "campaigns", "events"):
+            monkeypatch.setattr(f"monitor.store.{module}.utc_now", lambda: now)
+
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    with Database(tmp_path / "shop.duckdb") as db:
+        set_clock(0)
+        import_campaign(db, make_campaign("first"))
+        take_backup(db, folder / "0.duckdb")
+        set_clock(-10)
+        import_campaign(db, make_campaign("second"))
+        take_increment(db, folder / "1.duckdb")
+        set_clock(1)
+        import_campaign(db, make_campaign("third"))
+        take_increment(db, folder / "2.duckdb")
+        set_clock(-9)
+        record_event(db, make_campaign("first").machine.id, moment, "crash", "x")
+        take_increment(db, folder / "3.duckdb")
+    assert [backup.path for backup in list_backups(folder)] == [f"{number}.duckdb" for number in range(4)]
+
+    newest = restore(folder, tmp_path / "newest.duckdb")
+    assert newest.backup.path == "3.duckdb"
+    assert newest.last_entry == 4
+    assert newest.faults == ()
+    between = restore(folder, tmp_path / "between.duckdb", moment + timedelta(days=0.5))
+    assert between.last_entry == 2
+    assert between.faults == ()

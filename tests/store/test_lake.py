@@ -304,8 +304,25 @@ def test_addresses_that_cannot_be() -> None:
         InputError, match="the address of a lake holds a password, which the list of processes shows"
     ):
         PublishRequest("ducklake:postgres:dbname=x password=secret")
+    with pytest.raises(InputError, match="the address of a lake holds a password"):
+        PublishRequest("ducklake:postgres:dbname=x PASSWORD = secret")
     with pytest.raises(InputError, match="--plant 'a@b': a name without @"):
         PublishRequest("ducklake:x", plant="a@b")
+
+
+def test_no_lake_is_made_inside_a_database_of_something_else(
+    tmp_path: Path, make_campaign: Callable[..., Campaign]
+) -> None:
+    """Else the tables of the lake would stand in the database of a plant, which then verifies no more."""
+    path = tmp_path / "plant.duckdb"
+    with Database(path) as db:
+        import_campaign(db, make_campaign("one"))
+    before = path.read_bytes()
+    with Database(tmp_path / "other.duckdb") as db:
+        import_campaign(db, make_campaign("one"))
+        with pytest.raises(InputError, match="is a database of something else"):
+            publish(db, f"ducklake:{path}", files=tmp_path / "files")
+    assert path.read_bytes() == before
 
 
 @pytest.mark.slow

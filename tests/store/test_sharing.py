@@ -106,7 +106,8 @@ def test_the_file_is_let_go_while_nothing_is_asked(path: Path) -> None:
     with SharedDatabase(path) as db:
         save(db)
         deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and _is_open(path):
+        # Between its last two steps the file is closed and looked at once more.
+        while time.monotonic() < deadline and (db._connection is not None or _is_open(path)):
             time.sleep(0.01)
         assert not _is_open(path)
         assert list_campaigns(db) == ()
@@ -218,7 +219,9 @@ def test_a_campaign_that_was_exchanged_meanwhile_takes_no_result_of_the_one_befo
         assert verify_audit(theirs).faults == ()
 
 
-def test_an_unprivileged_reader_needs_neither_a_writable_file_nor_folder(path: Path) -> None:
+def test_an_unprivileged_reader_needs_neither_a_writable_file_nor_folder(
+    path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     """Mode 444 in a folder of mode 555, by a user who is not the owner."""
     if os.geteuid() != 0:
         pytest.skip("only root can become another user")
@@ -232,19 +235,26 @@ def test_an_unprivileged_reader_needs_neither_a_writable_file_nor_folder(path: P
     path.parent.chmod(0o555)
     code = (
         "import os, sys; from monitor.exceptions import StoreError\n"
-        "from monitor.store import Database, SharedDatabase, verify_audit\n"
-        "verify_audit(Database(':memory:')); os.setuid(65534)\n"
+        "from monitor.store import Database, SharedDatabase, take_backup, verify_audit\n"
+        "from monitor.workflow.model.show import list_all_models\n"
+        "with Database(':memory:') as db: verify_audit(db), list_all_models(db)\n"
+        "take_backup(Database(':memory:'), sys.argv[2] + '0'); os.setuid(65534)\n"
         "with SharedDatabase(sys.argv[1]) as db:\n"
         "    print(verify_audit(db).ok)\n"
         "    try:\n"
         "        with db.transaction(): pass\n"
-        "    except StoreError as fault: print(fault)"
+        "    except StoreError as fault: print(fault)\n"
+        "    print(len(list_all_models(db).models), take_backup(db, sys.argv[2]).path)"
     )
+    copies = tmp_path_factory.mktemp("copies")
+    copies.chmod(0o777)
     said = subprocess.run(
-        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=False
-    )
+        [sys.executable, "-c", code, str(path), str(copies / "copy")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert said.stdout.startswith("True\n"), said.stderr
     assert "may not be opened by this user for writing" in said.stdout
+    assert said.stdout.endswith("0 copy\n"), said.stderr
 
 
 def test_an_old_database_is_brought_up_by_the_first_who_may_write(tmp_path: Path) -> None:

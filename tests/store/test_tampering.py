@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -167,4 +168,25 @@ def test_an_entry_of_an_earlier_version_holds_the_books_of_its_own_subject(
         import_campaign(db, make_campaign("one"))
     assert verify_audit(db).faults == ()
     db.execute("UPDATE imported_campaign SET software_version = '0.0.1'")
+    assert verify_audit(db).faults == ("campaign one was altered after it was stored",)
+
+
+@pytest.mark.parametrize("table", ["schema_migration", "registered_machine"])
+def test_what_comes_later_by_a_clock_that_was_put_right_accuses_no_campaign(
+    db: Database, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch, table: str
+) -> None:
+    """The clock was a year ahead at the import: a migration of today looks as if it had been there before."""
+    ahead = (datetime.now(UTC) + timedelta(days=400)).replace(tzinfo=None)
+    with monkeypatch.context() as clock:
+        clock.setattr("monitor.store.campaigns.utc_now", lambda: ahead)
+        import_campaign(db, make_campaign("one"))
+    later = {
+        "schema_migration": "SELECT number + 1, 'later.sql', sha256, '9.0', applied_at + INTERVAL 1 DAY",
+        "registered_machine": "SELECT registration + 1, machine, topology, registered_at - INTERVAL 1 DAY",
+    }[table]
+    db.execute(f"INSERT INTO {table} {later} FROM {table} ORDER BY 1 DESC LIMIT 1")
+    assert verify_audit(db).faults == ()
+    # What was there before is held all the same.
+    first = {"schema_migration": "applied_at", "registered_machine": "registered_at"}[table]
+    db.execute(f"UPDATE {table} SET {first} = {first} - INTERVAL 2 DAY WHERE rowid = 0")
     assert verify_audit(db).faults == ("campaign one was altered after it was stored",)

@@ -361,3 +361,11 @@ def test_a_token_is_not_sent_in_the_clear_nor_when_it_is_none() -> None:
         Server(address_of_server("http://127.0.0.1"), "a\r\nX-Other: b")
     with pytest.raises(InputError, match="cannot be reached"):
         Server(address_of_server("http://127.0.0.1:1")).answer("campaigns")
+
+
+def test_a_server_whose_database_was_replaced_is_no_fault_of_the_software() -> None:
+    refusal = Server("http://127.0.0.1:9", None)._refusal(
+        503, "application/json", b'{"error": "it was replaced"}'
+    )
+    assert isinstance(refusal, InputError)
+    assert "it was replaced" in str(refusal)

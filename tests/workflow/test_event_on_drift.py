@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -94,3 +95,40 @@ def test_a_step_of_one_of_thirteen_is_found_among_those_that_drift():
     machine.values[machine.campaign == "vd7", 4] -= 25.0
     steps = event_steps(machine_past(machine, splitting_events([event(7)])), [event(7)])
     assert [step.parameter for step in steps if step.decided] == [names[4]]
+
+
+@pytest.mark.parametrize(("jump", "calls"), [(1, [True, False]), (2, [False, True])])
+def test_a_campaign_that_two_events_cut_is_judged_at_each_by_its_own_runs(db, jump, calls):
+    """A jump at one was called at the other, too: all of the campaign's runs before the event stood for its last."""
+    machine = history([10.0] * 6)
+    cut = machine.campaign == "vd3"
+    moments = [machine.started_at[index] + timedelta(minutes=30) for index in np.flatnonzero(cut)[[0, 2]]]
+    later = [at > moments[jump - 1] for at in machine.started_at]
+    machine.values[later] += 100.0
+    events = [MachineEvent(at, "repair", f"number {number}") for number, at in enumerate(moments, 1)]
+    pairs = {pair.description: pair.parameters["EC0Y"] for pair in agreement(db, machine, events)}
+    differences = [pairs[f"number {number}"].difference for number in (1, 2)]
+    assert [abs(difference) > 50.0 for difference in differences] == calls
+    assert pairs[f"number {3 - jump}"].agree is not False
+
+
+def test_a_campaign_among_another_is_not_judged_in_its_place(db):
+    """The pair names the campaign of the nearest runs; the one whose mean time is nearest was judged."""
+    machine = history([10.0] * 8)
+    # vd6 begins before vd5 and ends behind it.
+    first, last = np.flatnonzero(machine.campaign == "vd6")[[0, -1]]
+    at = list(machine.started_at)
+    at[first : last + 1] = [START + timedelta(days=day) for day in (146, 146.1, 186, 186.1)]
+    machine = replace(machine, started_at=tuple(at))
+    order = np.argsort([moment.timestamp() for moment in at])
+    machine = replace(
+        machine, campaign=machine.campaign[order], run=machine.run[order], day=machine.day[order],
+        values=machine.values[order], started_at=tuple(at[index] for index in order),
+    )  # fmt: skip
+    machine.values[machine.campaign == "vd5"] += 50.0
+    (pair,) = agreement(db, machine, [MachineEvent(START + timedelta(days=140), "repair", "spindle")])
+    result = pair.parameters["EC0Y"]
+    assert pair.campaigns == ("vd4", "vd6")
+    assert result.e_n * result.expanded + result.expected_of_drift == pytest.approx(
+        result.difference, abs=1e-9
+    )

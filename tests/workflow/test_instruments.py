@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import scipy
 
+from monitor.cli.agreement_output import agreement_line
 from monitor.exceptions import DataError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign
@@ -182,6 +183,13 @@ def test_two_instruments_make_one_history_and_their_step_is_an_e_n(tmp_path: Pat
     assert gain.second == pytest.approx(12.0 + 1e6 * shop.PITCH * 380.0, abs=4.0 * gain.u_second)
     assert set(pair.parameters) == {"EXX", "EYY", "EZZ"}
     assert pair.disagree == ("EXX",)
+    assert pair.days_apart == (moments["ball-bar"] - moments["laser"]).days == 154
+    said = agreement_line(pair)
+    assert "instruments (ball bar) (ball-bar), 154 days apart, disagree in EXX; " in said
+    assert said.endswith("measure with both on one day to tell them apart")
+    same_day = agreement_line(replace(pair, days_apart=0.2))
+    assert "instruments (ball bar) (ball-bar) disagree in EXX; " in same_day
+    assert "apart" not in same_day
     assert gain.e_n is not None
     assert gain.e_n == pytest.approx(gain.difference / np.hypot(2.0 * gain.u_first, 2.0 * gain.u_second))
     assert answer.parameters["EXX"].drift.n == 2

@@ -54,7 +54,7 @@ def run(options: Namespace) -> int:
 
 def _tell(fault: str) -> None:
     print(
-        f"monitor: the lake does not answer, trying again for some minutes: {fault}",
+        f"monitor: the lake has not taken it yet, trying again for some minutes: {fault}",
         file=sys.stderr,
         flush=True,
     )

@@ -11,7 +11,7 @@ from monitor.exceptions import MistakenUnitError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.instruments.part import Part
-from monitor.methods.instruments.reading import direction_of
+from monitor.methods.instruments.reading import Plain, direction_of
 from monitor.methods.instruments.readings.displacement import Displacement
 from monitor.methods.instruments.readings.vector import AtWorkPoint, VectorReading
 from monitor.records import Array
@@ -149,14 +149,14 @@ def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
         before = off - off.mean(axis=0)
         by_point = (tool - tool.mean(axis=0)).reshape(-1, 3)
         move = np.linalg.lstsq(by_point, -before.reshape(-1), rcond=1e-3)[0]
-        left, as_stated = (
+        remaining, as_stated = (
             float(np.sqrt(np.mean(each**2))) for each in (before.reshape(-1) + by_point @ move, before)
         )
-        if as_stated > LEAST_POINT and left < LEFT_BY_POINT * as_stated:
+        if as_stated > LEAST_POINT and remaining < LEFT_BY_POINT * as_stated:
             point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
             yield (
-                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {left:.2g} mm left where the "
-                f"stated one leaves {as_stated:.2g} mm"
+                f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where "
+                f"the stated one leaves {as_stated:.2g} mm"
             )
 
 
@@ -211,6 +211,7 @@ def _off(part: Part, scale: Array) -> float:
 
 def _nominal(part: Part, scale: Array | float = 1.0) -> Array:
     """The vectors r (n, 3) mm of a machine without errors, for positions times ``scale``."""
+    assert isinstance(part.reading, Plain)
     rows, setup = part.rows, part.reading.setup
     count, joints = len(rows), len(rows.chain.joints)
     work, tool = np.tile(setup.work_point, (count, 1)), np.tile(setup.tool_point, (count, 1))

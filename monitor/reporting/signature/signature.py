@@ -29,7 +29,7 @@ class SignatureFinding:
     ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such. ``long_term`` is the
     material for later validation, None without any; what it lacks is no fault of the signature. ``judged_until`` is
     when the file ceases to prove by itself who signed it, None for a signature that is not good: the end of the
-    signer's certificate, or that of the time stamp's where the material suffices.
+    signer's certificate, or that of the time stamp's where the material suffices and it is later.
     """
 
     good: bool | None
@@ -121,8 +121,12 @@ def _proven_at(
 
 
 def _judged_until(material: LongTermMaterial | None, certificate: _Certificate) -> datetime:
-    """Return when the file alone ceases to suffice: at the end of the stamp's certificate, else of the signer's."""
-    return certificate.last if material is None or material.until is None else material.until
+    """Return when the file alone ceases to suffice: with the signer's certificate, or a later one of the stamp."""
+    return (
+        certificate.last
+        if material is None or material.until is None
+        else max(certificate.last, material.until)
+    )
 
 
 @dataclass(frozen=True)

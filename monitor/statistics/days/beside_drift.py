@@ -80,7 +80,7 @@ def beside_drift(
     """
     line = stepped_line(campaigns, before, after, levels=levels)
     widest = 0.0 if line is None else _widest(campaigns, line, before, after, levels)
-    return BesideDrift(days, line, widest, *moves(campaigns, before, after))
+    return BesideDrift(days, line, widest, *moves(campaigns, before, after, levels=levels))
 
 
 def _widest(campaigns: Campaigns, line: SteppedLine, before: int, after: int, levels: bool) -> float:

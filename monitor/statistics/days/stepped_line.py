@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,8 @@ MIXTURES = (0.0, 0.1, 0.3, 1.0, 3.0, 30.0)
 REFUTED = 2.0
 #: So many campaigns of each side, those next to the event, are on its line: a drift of years is no line.
 NEAREST = 24
+#: Campaigns whose mean times differ by less, in days, show no rate.
+SAME_TIME = 1e-3
 #: Degrees of freedom beside the lines from which on these judge a step.
 ENOUGH = 2
 
@@ -35,9 +38,9 @@ ENOUGH = 2
 @dataclass(frozen=True, eq=False)
 class Campaigns:
     """Campaigns (c,) in the order of time: their ``mean``, ``t`` in days, and ``piece``, the number of the stretch
-    between two events or changes that they lie in; ``days`` (c,) are the means of the days of each.
+    between two events or changes that they lie in, with their ``label``; ``days`` (c,) are the means of their days.
 
-    ``era`` (c,) numbers the stretches between events alone: what the machine does within one, it does without an event.
+    ``era`` (c,) numbers the stretches between events alone: what the machine does in one, it does without an event.
     A campaign that an event cuts in two is two.
     """
 
@@ -45,6 +48,7 @@ class Campaigns:
     t: Array
     piece: npt.NDArray[np.intp]
     era: npt.NDArray[np.intp]
+    label: npt.NDArray[Any]
     days: tuple[Array, ...]
 
     @property
@@ -65,21 +69,26 @@ def campaigns_of(
 ) -> Campaigns:
     """Return the means of the means of days of each campaign, from runs (n,) with the labels of theirs; without ``era``
     the pieces are between events alone."""
-    labels = [label_groups(names, len(values))[1] for names in (campaign, days)]
-    parts, part = np.unique(np.column_stack([piece, labels[0]]), axis=0, return_inverse=True)
-    day, of_day = np.unique(np.column_stack([part.ravel(), labels[1]]), axis=0, return_inverse=True)
-    runs = np.bincount(of_day.ravel())
-    by_day, day_at = (
+    labels = np.asarray(campaign)
+    by_campaign, by_day = (label_groups(of, len(values))[1] for of in (labels, days))
+    parts, part = np.unique(np.column_stack([piece, by_campaign]), axis=0, return_inverse=True)
+    # Sorted by part first, so that the days of one follow each other.
+    day, of_day = np.unique(np.column_stack([part.ravel(), by_day]), axis=0, return_inverse=True)
+    runs, count = np.bincount(of_day.ravel()), np.bincount(day[:, 0])
+    mean_of_day, day_at = (
         np.bincount(of_day.ravel(), column - column[0]) / runs + column[0] for column in (values, t)
     )
-    days_in = [day[:, 0] == number for number in range(len(parts))]
-    mean, at = (np.array([column[inside].mean() for inside in days_in]) for column in (by_day, day_at))
+    mean, at = (
+        np.bincount(day[:, 0], column - column[0]) / count + column[0] for column in (mean_of_day, day_at)
+    )
     first = np.unique(part.ravel(), return_index=True)[1]
     era = parts[:, 0] if era is None else era[first]
     order = np.lexsort((at, parts[:, 0]))
+    of_days = np.split(mean_of_day, np.cumsum(count)[:-1])
     return Campaigns(
-        mean[order], at[order], parts[order, 0], era[order], tuple(by_day[days_in[index]] for index in order)
-    )
+        mean[order], at[order], parts[order, 0], era[order], labels[first][order],
+        tuple(of_days[index] for index in order),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -120,13 +129,16 @@ def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool)
     """Return the step between the campaigns ``before`` and ``after`` (indices), the last and the first of two pieces.
 
     With ``levels`` it is that of the two lines, otherwise that of these two campaigns alone. None where the campaigns
-    leave fewer than ``ENOUGH`` degrees of freedom beside the lines, or do not differ.
+    leave fewer than ``ENOUGH`` degrees of freedom beside the lines, do not differ, or show no rate: those of each
+    piece are of one time.
     """
     inside = _near(campaigns, before, after)
     before, after = int(inside[:before].sum()), int(inside[:after].sum())
     y, t, piece = campaigns.mean[inside], campaigns.t[inside], campaigns.piece[inside]
     dof = len(y) - len(np.unique(piece)) - 1
-    if dof < ENOUGH or np.ptp(y) == 0.0:
+    of = np.unique(piece, return_inverse=True)[1]
+    about = t - t[0] - (np.bincount(of, t - t[0]) / np.bincount(of))[of]
+    if dof < ENOUGH or np.ptp(y) == 0.0 or np.ptp(about) < SAME_TIME:
         return None
     y = y - y[before]
     results, likelihoods = [], []
@@ -149,13 +161,18 @@ def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool)
     return min(open_, key=lambda line: abs(line.step) / line.u)
 
 
-def moves(campaigns: Campaigns, before: int, after: int) -> tuple[float, int]:
+def moves(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> tuple[float, int]:
     """Return the largest difference of two campaigns that follow each other in one era, and how many there are.
 
-    Those nearer to each other than the two sides count for as much more time as lies between the sides.
+    Those nearer to each other than the two sides count for as much more time as lies between the sides: between the
+    means of their campaigns with ``levels``, else between the two campaigns.
     """
     inside = _near(campaigns, before, after)
-    gap = float(campaigns.t[after] - campaigns.t[before])
+    ends = [np.array([end]) for end in (before, after)]
+    if levels:
+        ends = [np.flatnonzero(inside & (campaigns.piece == campaigns.piece[end])) for end in (before, after)]
+    first, second = (float(campaigns.t[side].mean()) for side in ends)
+    gap = second - first
     together = (
         inside[1:] & inside[:-1] & (np.diff(campaigns.era) == 0) & (np.diff(campaigns.t) > 0.0)
     ).nonzero()[0]

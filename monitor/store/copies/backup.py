@@ -25,7 +25,7 @@ from monitor.store.copies.manifest import (
     write_manifest,
 )
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import make_log, sync_folder
+from monitor.store.opening import make_log, refuse_log_apart, sync_folder
 
 
 def take_backup(db: Database, target: str | Path) -> Backup:
@@ -54,6 +54,7 @@ def finished_copy(target: Path) -> Iterator[Path]:
     remove_partial(partial)
     try:
         yield partial
+        refuse_log_apart(partial, target)
         # Both are on the disk before either has its name; the file has it last: without a manifest it is no backup.
         os.replace(manifest_of(partial), manifest_of(target))
         os.replace(partial, target)
@@ -65,9 +66,12 @@ def finished_copy(target: Path) -> Iterator[Path]:
 
 
 def begin_copy(db: Database, partial: Path) -> None:
-    """Give a new file, before anything is in it, the mode of the database: who may read that may read its backup."""
+    """Give a new file, before anything is in it, the mode of the database: who may read that may read its backup.
+
+    Its owner may write it, also where nobody may write the database: DuckDB fills it.
+    """
     mode = 0o600 if db.path == ":memory:" else stat.S_IMODE(os.stat(db.path).st_mode) & 0o666
-    os.chmod(partial, mode)
+    os.chmod(partial, mode | 0o600)
     make_log(str(partial))
 
 

@@ -20,7 +20,7 @@ from monitor.exceptions import StoreError
 from monitor.store.connection import Database
 from monitor.store.copies.backup import begin_copy, copy_all
 from monitor.store.copies.manifest import remove_partial, sync
-from monitor.store.opening import busy, sync_folder
+from monitor.store.opening import busy, refuse_log_apart, sync_folder
 from monitor.store.turns import turn_to_write
 
 try:
@@ -62,6 +62,7 @@ def compact(db: Database) -> Compaction:
                     tables = copy_all(original)
                 original.execute("CHECKPOINT")
                 before = os.stat(path)
+            refuse_log_apart(partial, f"{path}, anew,")
             sync(partial)
             with _still(path, Path(db.path + ".wal"), before):
                 _same_owner(partial, before)

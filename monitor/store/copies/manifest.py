@@ -131,13 +131,30 @@ def read_manifest(path: Path) -> Backup:
 
 
 def list_backups(folder: str | Path) -> tuple[Backup, ...]:
-    """The backups in a folder that have a manifest, the oldest first; not what a killed one left unfinished."""
+    """The backups in a folder that have a manifest, the oldest first; not what a killed one left unfinished.
+
+    One that follows another stands behind it, also where the clock was set back in between.
+    """
     backups = [
         read_manifest(path)
         for path in Path(folder).glob(f"*{_MANIFEST_END}")
         if not path.name.endswith(_PARTIAL_END + _MANIFEST_END)
     ]
-    return tuple(sorted(backups, key=lambda backup: (backup.made_at, backup.path)))
+    by_name = {backup.path: backup for backup in backups}
+
+    def order(backup: Backup) -> tuple[str, int, str]:
+        times, entries = [], 0 if backup.span is None else backup.span.last_entry
+        follows: Backup | None = backup
+        # As many steps as there are backups: manifests that follow in a circle are refused where they are read.
+        for _ in backups:
+            if follows is None:
+                break
+            times.append(follows.made_at)
+            previous = None if follows.span is None else follows.span.previous
+            follows = None if previous is None else by_name.get(Path(previous).name)
+        return max(times), entries, backup.path
+
+    return tuple(sorted(backups, key=order))
 
 
 def remove_partial(partial: Path) -> None:

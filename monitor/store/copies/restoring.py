@@ -31,7 +31,7 @@ from monitor.store.copies.manifest import (
 )
 from monitor.store.database_name import check_database_name
 from monitor.store.entries import rows_recorded, select_portion
-from monitor.store.opening import connect, make_log, sync_folder
+from monitor.store.opening import connect, make_log, refuse_log_apart, sync_folder
 from monitor.store.verification import verify_audit
 
 
@@ -76,6 +76,7 @@ def restore(source: str | Path, target: str | Path, at: datetime | None = None) 
         last_entry, faults = None, tuple[str, ...]()
         if len(chain) > 1 or moment is not None:
             last_entry, faults = _cut_and_verified(partial, moment)
+        refuse_log_apart(partial, target)
         sync(partial)
         os.replace(partial, target)
         sync_folder(target.absolute().parent)
@@ -200,7 +201,8 @@ def _cut(db: Database, moment: datetime) -> None:
             f"--at {moment:%Y-%m-%d %H:%M:%S} UTC: files were archived at {archived_at:%Y-%m-%d %H:%M:%S} UTC, and "
             "this backup no longer has them; name a backup that was made before that"
         )
-    ((last_made_at,),) = db.rows("SELECT made_at FROM audit WHERE entry = ?", [first - 1])
+    # The latest, not that of the last entry: a clock may have been set back in between.
+    ((last_made_at,),) = db.rows("SELECT max(made_at) FROM audit WHERE entry < ?", [first])
     ((catalog,),) = db.rows("SELECT current_database()")
     with db.connected() as connection:
         select_portion(connection, quoted(catalog), first, end)

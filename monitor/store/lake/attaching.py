@@ -8,6 +8,7 @@ processes: PostgreSQL's own client library reads ``~/.pgpass`` and ``$PGPASSWORD
 
 from __future__ import annotations
 
+import os
 import re
 
 import duckdb
@@ -40,7 +41,7 @@ def check_lake_address(address: str) -> None:
             f"{address} is no address of a lake; write 'ducklake:postgres:dbname=lake host=db.example.org', or "
             "ducklake:FILE for a lake of one process at a time"
         )
-    if re.search(r"password\s*=|://[^/@\s]*:[^/@\s]*@", address):
+    if re.search(r"password\s*=|://[^/@\s]*:[^/@\s]*@", address, re.IGNORECASE):
         raise InputError(
             "the address of a lake holds a password, which the list of processes shows to everybody; put it into "
             "~/.pgpass or $PGPASSWORD, which PostgreSQL's client reads"
@@ -66,6 +67,26 @@ def connection_with_extensions(threads: int | None = None) -> duckdb.DuckDBPyCon
     for name in _EXTENSIONS:
         load(connection, name)
     return connection
+
+
+def refuse_other_database(connection: duckdb.DuckDBPyConnection, address: str) -> None:
+    """Raise InputError where a new lake would be made inside a database of something else, as that of a plant."""
+    catalogue = catalogue_file(address)
+    if catalogue is None or not os.path.isfile(catalogue) or os.stat(catalogue).st_size == 0:
+        return
+    try:
+        connection.execute(f"ATTACH {literal(catalogue)} AS before (READ_ONLY)")
+    except duckdb.Error:
+        return  # attaching it as a lake says why not
+    tables = connection.execute(
+        "SELECT table_name FROM duckdb_tables() WHERE database_name = 'before'"
+    ).fetchall()
+    connection.execute("DETACH before")
+    if tables and ("ducklake_metadata",) not in tables:
+        raise InputError(
+            f"{catalogue} is a database of something else: the catalogue of a lake has a file of its own, such as "
+            "ducklake:lake.ducklake"
+        )
 
 
 def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -> None:

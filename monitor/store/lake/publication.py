@@ -31,6 +31,7 @@ from monitor.store.lake.attaching import (
     catalogue_file,
     connection_with_extensions,
     is_lake,
+    refuse_other_database,
 )
 from monitor.store.lake.copying import attach_origin, statements
 from monitor.store.lake.extensions import literal
@@ -98,8 +99,8 @@ def publish(
     address in an object store (``s3://bucket/folder``) of a new lake.
 
     ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
-    the last entry that was published and the last that is there, ``away`` with the lake's fault where one transaction
-    is tried for long. The database is closed. Raises StoreError, InputError.
+    the last entry that was published and the last that is there, ``away`` with the fault for which a transaction is
+    tried again for long. The database is closed. Raises StoreError, InputError.
     """
     if db.path == ":memory:" or is_lake(db.path):
         raise StoreError(f"{db.path} is no database file of a plant; name one with --db")
@@ -195,6 +196,7 @@ class _Publisher:
     def _attach(self) -> None:
         options = ["CREATE_IF_NOT_EXISTS false"]
         if self._files is not None:
+            refuse_other_database(self._connection, self._address)
             options = [f"DATA_PATH {literal(address_of_files(str(self._files)))}", "OVERRIDE_DATA_PATH false"]
         attach(self._connection, self._address, *options, _NOTHING_INLINED)
         self._attached = True

@@ -154,13 +154,16 @@ def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Ite
             before = of_method & (seconds < event.at.timestamp())
             after = of_method & (seconds >= event.at.timestamp())
             if before.any() and after.any():
-                # A campaign that the event cuts in two is compared with itself: its runs before, its runs after.
+                stretch = np.where(of_method, np.searchsorted(moments, seconds, side="right"), -1)
+                # A campaign that the event cuts in two is compared with itself: its runs before, its runs after; of
+                # one that several events cut those next to this one.
+                before &= stretch == stretch[before][-1]
+                after &= stretch == stretch[after][0]
                 campaigns = (str(history.campaign[before][-1]), str(history.campaign[after][0]))
                 pair = AgreementPair(
                     kind=PairKind.EVENT, event=event.kind, description=event.description, method=method,
                     campaigns=campaigns, parameters={}, disagree=(),
                 )  # fmt: skip
-                stretch = np.where(of_method, np.searchsorted(moments, seconds, side="right"), -1)
                 yield _Comparison(pair, before, after, stretch)
 
 
@@ -211,8 +214,12 @@ def _across_event(
         values[finite], days[finite], history.seconds[finite] / SECONDS_PER_DAY, stretch[finite],
         history.campaign[finite],
     )  # fmt: skip
-    last = int(np.flatnonzero(campaigns.piece <= stretch[before][0])[-1])
-    judged = beside_drift(result, campaigns, last, last + 1, levels=False)
+    # Campaigns may overlap: by name, not by the order of their means in time.
+    last, first = (
+        int(np.flatnonzero((campaigns.piece == stretch[side][0]) & (campaigns.label == name))[0])
+        for side, name in zip((before, after), comparison.pair.campaigns, strict=True)
+    )
+    judged = beside_drift(result, campaigns, last, first, levels=False)
     agree, lack = _AGREE[judged.verdict(LEVEL)]
     line = judged.line
     if line is None:

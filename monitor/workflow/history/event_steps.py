@@ -20,7 +20,7 @@ from monitor.reporting.lacks import Undecided
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
 from monitor.statistics.days.beside_drift import BesideDrift, Verdict, beside_drift
 from monitor.statistics.days.rival_scatter import Allowance
-from monitor.statistics.days.stepped_line import campaigns_of
+from monitor.statistics.days.stepped_line import Campaigns, campaigns_of
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast
@@ -131,6 +131,7 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
     ends = np.array([-np.inf, *sorted({*moments, *(change.at for change in past.search.changes)}), np.inf])
     # Which days scatter about which mean: the pieces between all ends.
     pieces = np.searchsorted(ends, steady.t, side="right")
+    campaigns = _campaigns(steady, pieces, moments)
     pairs: dict[int, _Compared] = {}
     for at, event in sorted(moments.items()):
         first = int(np.searchsorted(steady.t, at))
@@ -142,7 +143,7 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         others = (steady.t < earlier) | (steady.t >= later)
         days = _by_days(before, after, steady.part(others), pieces[others])
         runs = _student(before.values, after.values)
-        judged = _beside_drift(days, steady, pieces, first, moments)
+        judged = _beside_drift(days, campaigns, int(pieces[first - 1]) if first else None)
         if runs is None and days is None and judged.line is None:
             continue
         numbers = _step(judged, runs, _difference_of_days(before, after))
@@ -153,19 +154,21 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
     return list(pairs.values())
 
 
-def _beside_drift(
-    days: BeforeAfter | None,
-    steady: Series,
-    pieces: npt.NDArray[np.intp],
-    first: int,
-    moments: Collection[float],
-) -> BesideDrift:
-    """The pieces before and from the run ``first`` on, judged by days and campaigns; ``moments``: times of events."""
-    if steady.campaign is None or not 0 < first < len(pieces):
-        return BesideDrift(days, None, 0.0, 0.0, 0)
+def _campaigns(steady: Series, pieces: npt.NDArray[np.intp], moments: Collection[float]) -> Campaigns | None:
+    """The campaigns between events at ``moments`` and changes; None where nobody says them."""
+    if steady.campaign is None:
+        return None
     eras = np.searchsorted(np.sort(list(moments)), steady.t, side="right")
-    campaigns = campaigns_of(steady.values, steady.days, steady.t, pieces, steady.campaign, eras)
-    last = int(np.flatnonzero(campaigns.piece <= pieces[first - 1])[-1])
+    return campaigns_of(steady.values, steady.days, steady.t, pieces, steady.campaign, eras)
+
+
+def _beside_drift(days: BeforeAfter | None, campaigns: Campaigns | None, before: int | None) -> BesideDrift:
+    """The piece ``before`` an event and what follows, judged by days and campaigns; None: an event before all runs."""
+    if campaigns is None or before is None:
+        return BesideDrift(days, None, 0.0, 0.0, 0)
+    last = int(np.flatnonzero(campaigns.piece <= before)[-1])
+    if last + 1 == len(campaigns.mean):
+        return BesideDrift(days, None, 0.0, 0.0, 0)
     return beside_drift(days, campaigns, last, last + 1, levels=True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from monitor.exceptions import BusyError, StoreError
 from monitor.methods import CurveMethod, methods
 from monitor.store import Database, StoredModel, curve_names, list_models
 from monitor.workflow.model.answer import ModelsAnswer, ShowModelAnswer, model_version
@@ -11,11 +12,16 @@ from monitor.workflow.models import resolve
 
 
 def list_all_models(db: Database) -> ModelsAnswer:
-    """All models with their versions; the methods' own are made where they are not there yet."""
+    """All models with their versions; the methods' own are made where they are not there yet and may be stored."""
     curves = bool(curve_names(db))
     for method in methods().values():
         if curves or not isinstance(method, CurveMethod):
-            resolve(db, method.name)
+            try:
+                resolve(db, method.name)
+            except BusyError:
+                raise
+            except StoreError:
+                break  # whoever may only read sees those that were stored
     return ModelsAnswer(tuple(model_version(model) for model in list_models(db)))
 
 
