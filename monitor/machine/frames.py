@@ -66,8 +66,8 @@ def frame_of(parameter: str, chain: Chain) -> FrameOfReference | None:
         return FrameOfReference(FrameKind.OWN_AXIS, joint.name)
     before = _branch_to(chain, term.joint)[:-1]
     if not before:
-        # Beside a rotary axis that the frame was fixed to, where a linear axis lies is relative to that axis.
-        if not joint.turns and _guides(chain):
+        # Beside a rotary axis that the frame was fixed to, where the tool's first axis lies is relative to that axis.
+        if joint.branch != "work" and _guides(chain):
             return FrameOfReference(FrameKind.PRECEDING_AXIS, chain.work[0].name)
         return FrameOfReference(FrameKind.MACHINE)
     return FrameOfReference(FrameKind.PRECEDING_AXIS, chain.joints[before[-1]].name)
@@ -105,10 +105,13 @@ def _guides(chain: Chain) -> dict[int, int]:
         return {}
     tool_first = [*range(len(chain.work), len(chain.joints)), *range(len(chain.work))]
     linear = [index for index in tool_first if not chain.joints[index].turns]
-    if len(linear) < 2:
+    if not linear:
         return {}
-    first, second = linear[:2]
-    main = chain.joints[first].main
+    first, main = linear[0], chain.joints[linear[0]].main
+    # One along the first, as U beside X, does not say how the machine is turned about it.
+    second = next((index for index in linear if chain.joints[index].main != main), None)
+    if second is None:
+        return {}
     return {3 + axis: second if axis == main else first for axis in range(3)}
 
 

@@ -173,7 +173,9 @@ def _day(name: str, text: str) -> str:
     """A day of the calendar as TOML has it; 2.3.2026 is one too, as the German form has it. Raises InputError."""
     german = re.fullmatch(r"([0-9]{1,2})\. ?([0-9]{1,2})\. ?([0-9]{4})", text)
     try:
-        day = date(int(german[3]), int(german[2]), int(german[1])) if german else date.fromisoformat(text)
+        # Of what `fromisoformat` reads the form of the message alone.
+        iso = text if re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text) else ""
+        day = date(int(german[3]), int(german[2]), int(german[1])) if german else date.fromisoformat(iso)
     except ValueError as error:
         raise InputError(f"{name} is a day, such as 2026-03-02 or 02.03.2026, not '{text}'") from error
     return day.isoformat()

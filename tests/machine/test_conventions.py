@@ -195,7 +195,8 @@ def _machine_of_linear_axes(frames, first, second):
 
 
 @pytest.mark.parametrize(
-    "topology", ["w C A b X Y Z t", "w C B b Z X Y t", "w C A b Y X Z (C1) t", "w C Z A b X Y t"]
+    "topology",
+    ["w C A b X Y Z t", "w C B b Z X Y t", "w C A b Y X Z (C1) t", "w C Z A b X Y t"],
 )
 def test_iso230_1_the_machine_frame_is_that_of_the_linear_axes_where_none_is_the_first_to_carry_the_work(
     simulator, topology
@@ -225,6 +226,14 @@ def test_iso230_1_the_machine_frame_is_that_of_the_linear_axes_where_none_is_the
     first_linear = next(axis.name for axis in chain.tool if not axis.turns)
     fixed = FrameOfReference(FrameKind.PRECEDING_AXIS, chain.work[0].name)
     assert {frame_of(name, chain) for name in names if name[3:] == first_linear} == {fixed}
+
+
+def test_an_axis_beside_the_first_does_not_say_how_the_machine_is_turned_about_it():
+    """U or X2 lies along X: the machine has no turn about X of Y, as without it."""
+    names = ("EA0Y", "EA0Z", "EA0C")
+    with_it, without = (machine_frame(names, parse_topology(f"w C A b X {x2}Y Z t")) for x2 in ("X2 ", ""))
+    assert with_it.names == without.names
+    assert with_it.matrix == pytest.approx(without.matrix)
 
 
 def test_two_methods_state_one_machine_where_no_linear_axis_carries_the_work():

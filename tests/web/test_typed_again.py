@@ -101,6 +101,7 @@ def test_a_pair_of_one_parameter_is_refused_above_the_form(local: Any) -> None:
         ("temperature.machine_degC", "20,5x", "is a number, such as 20.5"),
         ("item.received_on", "31.02.2026", "is a day, such as 2026-03-02 or 02.03.2026"),
         ("standards.1.issued_on", "March", "is a day, such as 2026-03-02 or 02.03.2026"),
+        ("standards.1.issued_on", "20260302", "is a day, such as 2026-03-02 or 02.03.2026"),
     ],
 )
 def test_a_box_of_a_certificate_that_cannot_be_read_is_marked(

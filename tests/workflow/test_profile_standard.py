@@ -197,6 +197,25 @@ def test_u_of_a_profile_is_the_scatter_of_parts_measured_again() -> None:
     assert u == pytest.approx(np.std(widths), rel=0.35)
 
 
+@pytest.mark.parametrize("repeated", [0, -1])
+def test_a_point_that_is_measured_twice_at_an_end_takes_no_profile_away(repeated: int) -> None:
+    from monitor.statistics.standards.profiles import profile_of
+
+    places, out, along = s_curve()
+    nominal = np.column_stack([places, np.zeros(len(places))])
+    wall = nominal + (CUTTER + WAVE * np.cos(2.0 * np.pi * WAVES * along))[:, None] * np.column_stack(
+        [out, np.zeros(len(out))]
+    )
+    twice = [0, *range(len(nominal))] if repeated == 0 else [*range(len(nominal)), -1]
+    once, again = (
+        profile_of(wall[rows], nominal[rows], np.tile([0.0, 0.0, 1.0], (len(rows), 1)))
+        for rows in (list(range(len(nominal))), twice)
+    )
+    assert once is not None
+    assert again is not None
+    assert again.width == pytest.approx(once.width, rel=0.02)
+
+
 def test_a_path_that_hardly_turns_and_has_no_straight_line_is_named(tmp_path: Path) -> None:
     bent = np.array([[x, 1e-3 * x**2, 0.0] for x in np.linspace(-40.0, 40.0, 21)])
     (test,) = answer_of(tmp_path, THREE_AXES, rows_of(THREE_AXES, {"bent": bent})).tests

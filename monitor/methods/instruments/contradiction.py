@@ -11,7 +11,7 @@ from monitor.exceptions import MistakenUnitError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.instruments.part import Part
-from monitor.methods.instruments.reading import direction_of
+from monitor.methods.instruments.reading import Plain, direction_of
 from monitor.methods.instruments.readings.displacement import Displacement
 from monitor.methods.instruments.readings.vector import AtWorkPoint, VectorReading
 from monitor.records import Array
@@ -211,6 +211,7 @@ def _off(part: Part, scale: Array) -> float:
 
 def _nominal(part: Part, scale: Array | float = 1.0) -> Array:
     """The vectors r (n, 3) mm of a machine without errors, for positions times ``scale``."""
+    assert isinstance(part.reading, Plain)
     rows, setup = part.rows, part.reading.setup
     count, joints = len(rows), len(rows.chain.joints)
     work, tool = np.tile(setup.work_point, (count, 1)), np.tile(setup.tool_point, (count, 1))

@@ -97,6 +97,7 @@ def _cut(part: Part, mine: npt.NDArray[np.int64]) -> _Cut:
 
 def _tool_axes(part: Part) -> Array:
     """Unit vectors (n, 3) along the tool's axis in the frame of the last work axis, of a machine without errors."""
+    assert isinstance(part.reading, Point)
     setup, rows = part.reading.setup, part.rows
     along = np.array(setup.tool_direction or setup.tool_point)
     along = np.eye(3)[2] if not along.any() else along / np.linalg.norm(along)

@@ -126,9 +126,12 @@ def _profile(outward: Array, about: Array, distance: Array, radius: float) -> Pr
 
 
 def _tangents(path: Array) -> Array:
-    """Directions (n, 3) of a path (n, 3) from its neighbours; a point that is repeated has that of the one before."""
+    """Directions (n, 3) of a path (n, 3) from its neighbours; a point that is repeated has that of the one before, the
+    first that of the next."""
     along = np.gradient(path, axis=0)
     length = np.linalg.norm(along, axis=1)
+    first = int(np.argmax(length >= 1e-9))
+    along[:first], length[:first] = along[first], length[first]
     for row in range(1, len(path)):
         if length[row] < 1e-9:
             along[row], length[row] = along[row - 1], length[row - 1]
