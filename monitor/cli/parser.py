@@ -215,12 +215,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         hint = did_you_mean(head.verb, VERBS)
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    try:
-        # People write options before, between and behind the other words.
-        options = parser.parse_intermixed_args(head.rest)
-    except TypeError:
-        # A verb with verbs of its own cannot be read so.
-        options = parser.parse_args(head.rest)
+    # argparse takes a -- right behind the verb as the end of that.
+    behind = list(arguments[len(arguments) - len(head.rest) - 1 :])
+    options = _read_behind_verb(parser, behind if behind[0] == "--" else head.rest)
     _join(first, head, options)
     if not hasattr(options, "run"):
         options.run = run
@@ -234,6 +231,17 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
     check_path(options.db, may_be_new=needs_none)
     return options
+
+
+def _read_behind_verb(parser: Parser, words: list[str]) -> argparse.Namespace:
+    # What stands behind -- is no option, as the name -x of a campaign: argparse forgets that between its two rounds.
+    if "--" not in words:
+        try:
+            # People write options before, between and behind the other words.
+            return parser.parse_intermixed_args(words)
+        except TypeError:
+            pass  # a verb with verbs of its own cannot be read so
+    return parser.parse_args(words)
 
 
 def _join(first: Parser, head: argparse.Namespace, options: argparse.Namespace) -> None:

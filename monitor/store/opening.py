@@ -266,7 +266,9 @@ def sync_folder(folder: Path) -> None:
 
 def _remove(partial: str) -> None:
     for name in (partial, partial + ".wal", partial + ENDING):
-        Path(name).unlink(missing_ok=True)
+        # What cannot be removed cannot be made either, which is said in words.
+        with contextlib.suppress(OSError):
+            os.unlink(name)
 
 
 def _refuse_what_is_no_file(path: str, read_only: bool) -> None:

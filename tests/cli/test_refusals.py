@@ -244,3 +244,20 @@ def test_a_folder_that_may_not_be_written(typed: Any, db: Path, tmp_path: Path) 
         answer = typed(*arguments, db=db)
         assert (answer.status, answer.out) == (2, "")
         assert "ermission denied" in answer.err
+
+
+def test_what_stands_behind_two_dashes_is_a_name_and_no_option(typed: Any, untouched: Path) -> None:
+    """A campaign may be called so, and has to be withdrawn under its name."""
+    for words in (["runs", "--", "-dash"], ["withdraw", "--reason", "x", "--", "-dash"]):
+        answer = typed("--db", untouched, *words)
+        assert answer.status == 2
+        assert "there is no campaign '-dash'" in answer.err
+
+
+def test_a_name_that_is_too_long_for_a_file_is_no_fault_of_the_software(
+    typed: Any, examples: Path, tmp_path: Path, made_anew: None
+) -> None:
+    for length in (251, 300):
+        answer = typed("import", examples / "load-cell", db=tmp_path / ("x" * length))
+        assert answer.status == 2, answer.err
+        assert "ile name too long" in answer.err
