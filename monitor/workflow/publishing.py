@@ -46,11 +46,11 @@ class PublishAnswer:
 
 
 def publish(
-    db: Database, request: PublishRequest, away: Callable[[str], None] = lambda fault: None
+    db: Database, request: PublishRequest, progress: Callable[[str], None] = lambda fault: None
 ) -> PublishAnswer:
     """Add everything that was stored since the last publication; nothing twice, whatever happened before.
 
-    ``away`` is told why a transaction is tried again for long. Raises StoreError where the lake cannot be reached
+    ``progress`` is told why a transaction is tried again for long. Raises StoreError where the lake cannot be reached
     or the database has another past than it published.
     """
     published = publish_to(
@@ -59,7 +59,7 @@ def publish(
         files=request.files,
         plant=request.plant,
         progress=lambda last, end: told(last / end),
-        away=away,
+        away=progress,
     )
     return PublishAnswer(
         published.plant,

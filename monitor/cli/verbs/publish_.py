@@ -39,7 +39,7 @@ def run(options: Namespace) -> int:
 
     request = PublishRequest(options.to, options.files, options.plant)
     with opened(options) as db, output.working("publishing"):
-        answer = ask(db, publish, request, away=_tell)
+        answer = ask(db, publish, request, progress=_tell)
     if options.json:
         output.document(answer)
     elif answer.entries:
