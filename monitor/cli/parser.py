@@ -233,15 +233,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def _read_behind_verb(parser: Parser, words: list[str]) -> argparse.Namespace:
+def _read_behind_verb(parser: Parser, arguments: list[str]) -> argparse.Namespace:
     # What stands behind -- is no option, as the name -x of a campaign: argparse forgets that between its two rounds.
-    if "--" not in words:
+    if "--" not in arguments:
         try:
             # People write options before, between and behind the other words.
-            return parser.parse_intermixed_args(words)
+            return parser.parse_intermixed_args(arguments)
         except TypeError:
             pass  # a verb with verbs of its own cannot be read so
-    return parser.parse_args(words)
+    return parser.parse_args(arguments)
 
 
 def _join(first: Parser, head: argparse.Namespace, options: argparse.Namespace) -> None:
