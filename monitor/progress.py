@@ -26,13 +26,13 @@ def listening(tell: Callable[[float], None], say: Callable[[str], None] | None =
 
 
 @contextmanager
-def saying(words: str) -> Iterator[None]:
-    """Say what the block does, once and of unknown length; empty words say that it is over."""
+def saying(activity: str) -> Iterator[None]:
+    """Say what the block does, once and of unknown length; an empty text says that it is over."""
     say: Callable[[str], None] | None = getattr(_THREAD, "say", None)
     if say is None:
         yield
         return
-    say(words)
+    say(activity)
     try:
         yield
     finally:

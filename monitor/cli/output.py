@@ -216,8 +216,8 @@ def working(activity: str) -> Iterator[None]:
             )  # fmt: skip
             progress.update(task, total=1.0, completed=share)
 
-        def say(words: str) -> None:
-            progress.update(task, description=f"{activity}; {words}" if words else activity)
+        def say(doing: str) -> None:
+            progress.update(task, description=f"{activity}; {doing}" if doing else activity)
 
         with listening(tell, say):
             yield

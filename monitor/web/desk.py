@@ -343,8 +343,8 @@ class Desk:
         def tell(share: float) -> None:
             shares[:] = [share]
 
-        def say(words: str) -> None:
-            doing[:] = [words] if words else []
+        def say(activity: str) -> None:
+            doing[:] = [activity] if activity else []
 
         with stoppable(stop), listening(tell, say):
             return self.asker(user, question, document, files)

@@ -172,7 +172,7 @@ def so_far(ticket: Ticket) -> str:
     if ticket.shares and 0.01 <= ticket.shares[-1] < 1.0:
         seconds += f", about {100.0 * ticket.shares[-1]:.0f} % done"
     # As it is said in another thread, it may be over between two looks.
-    doing = "".join(f"; {words}" for words in ticket.doing)
+    doing = "".join(f"; {activity}" for activity in ticket.doing)
     if ticket.is_stopping:
         return f"{seconds}, {ticket.taken_back_by} is stopping it"
     return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"

@@ -78,7 +78,7 @@ def _disagreement(campaign: str, apart: Disagreement) -> None:
     chance = _chance(apart.by_chance)
     output.say(
         f"{apart.parameter} in run {apart.run}: {apart.first} and {apart.second} disagree, E_n = {apart.e_n:.2f}, the "
-        f"largest of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "
+        f"least likely of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "
         f"`monitor contributions {campaign} --run {apart.run}` says what "
         f"each says alone, `monitor explain {campaign}` what may be missing"
     )

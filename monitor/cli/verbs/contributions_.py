@@ -100,7 +100,7 @@ def _say_agreement(answer: InstrumentsAnswer) -> None:
         output.say(f"{parameter}: {pair.first} and {pair.second} disagree, E_n = {pair.e_n:.2f}")
     if apart and answer.by_chance is not None and answer.by_chance > DOUBTFUL:
         output.say(
-            f"of {len(pairs)} comparisons the largest comes out so large by chance in up to "
+            f"of {len(pairs)} comparisons the least likely comes out so large by chance in up to "
             f"{100 * answer.by_chance:.0f} % of campaigns without fault: measure again before you look for a cause"
         )
     if not apart:

@@ -44,7 +44,6 @@ def routes() -> APIRouter:
     def machine(
         request: Request, name: str, parameter: str = "", since: str = "", until: str = "",
         colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "", every: bool = False,
-        refused: str = "",
     ) -> Response:  # fmt: skip
         """Show a machine; one parameter, one period; with ``every`` the table of all parameters at once."""
         ask, user = request.app.state.asker, request.state.user
@@ -70,7 +69,7 @@ def routes() -> APIRouter:
         campaigns = ask(user, "campaigns", {"machine": name}).campaigns
         trend = trends.shown(shown)
         all_trends = trends.of_all() if every else trends.of_all_already()
-        form = refused_form(request, refused)
+        form = refused_form(request, request.query_params.get("refused", ""))
         return page(
             request, "machine.html", status=form.refusal.status if form else 200,
             name=name, parameter=shown, parameters=names, topology=values.topology, values=values, trend=trend,
