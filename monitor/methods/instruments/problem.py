@@ -293,7 +293,7 @@ class InstrumentProblem(ChainProblem):
         by_local = whole.linearise(self.start, self.common_start).local
         scale = np.linalg.norm(by_local, axis=1)
         # A centre across the plane of a bar's swing leaves 1e-14 by rounding, or nothing, as its plane lies.
-        is_rounding = scale <= ROUNDING * scale.max(axis=1, keepdims=True)
+        is_rounding = scale <= ROUNDING * scale.max(axis=1, keepdims=True, initial=0.0)
         by_local, scale = np.where(is_rounding[:, None, :], 0.0, by_local), np.where(is_rounding, 1.0, scale)
         null_space = eliminate(by_local).null_space
         projector = np.eye(by_local.shape[2]) - np.swapaxes(null_space, 1, 2) @ null_space
