@@ -13,7 +13,7 @@ _ROW = re.compile(
     r'data-title="Parameter">(?:<a [^>]*>)?([^<]+?)(?:</a>)? <span class="quiet">([^<]+)</span>'
 )
 _OPTION = re.compile(r'<option value="([^"]+)"[^>]*>\1 – ([^<]+)</option>')
-_UNIT = re.compile(r", (µm|mm|µrad|mrad|µm/m|1|µm/K|°)$")
+_UNIT = re.compile(r", (µm|mm|µrad|mrad|1|°)(/[^,]*)?$")
 
 
 def names_on(pages: Iterable[str]) -> dict[str, set[str]]:
