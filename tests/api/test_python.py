@@ -87,7 +87,7 @@ def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: 
     assert max(len(line) for line in repr(answer).splitlines()) < 200
     lines = re.findall(r"<tr>.*?</tr>", answer._repr_html_(), re.DOTALL)
     assert {len(re.findall("<t[hd]>", line)) for line in lines} == {2}
-    assert answer.missing[0].remedy in answer._repr_html_()
+    assert answer.table()["remedy"][0] in answer._repr_html_()
     added = campaign.add("EZC1:const@warmup", "warm")
     before, after = (version.heldout_rms_um for version in added.history)
     assert after < before

@@ -18,9 +18,9 @@ _MARGIN = 0.062
 _ROOM = 1.0 - 2.0 * _MARGIN
 #: Boxes of WeasyPrint that no page breaks, and how many boxes stand side by side at most.
 _UNBROKEN, _BESIDE = ("LineBox", "TableRowBox"), 3
-#: What a closer setting saves of the height of all that is set (a certificate 0.049), and the part of a page that stays
-#: white at its foot, because what follows is not broken.
-_CLOSER, _LEFT = 0.05, 0.03
+#: What a closer setting of a certificate saves of the height of all that is set (0.049), and the part of a page that
+#: stays white at its foot, because what follows is not broken.
+CLOSER, _LEFT = 0.05, 0.03
 #: A page is half full where its text reaches the middle of the sheet.
 _HALF = 0.5
 
@@ -31,10 +31,10 @@ def ends_early(document: Document) -> bool:
     return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < _HALF * last.height
 
 
-def closeness_saves(document: Document) -> bool:
-    """Return whether what the pages hold may fit on one fewer when it is set closer."""
+def closeness_saves(document: Document, saved: float) -> bool:
+    """Return whether what the pages hold may fit on one fewer when a part of its height is ``saved``."""
     filled = sum(_end_of(page._page_box.children[0]) / page.height - _MARGIN for page in document.pages)
-    return bool(filled * (1.0 - _CLOSER) <= (len(document.pages) - 1) * (_ROOM - _LEFT))
+    return bool(filled * (1.0 - saved) <= (len(document.pages) - 1) * (_ROOM - _LEFT))
 
 
 def _end_of(box: Any) -> float:

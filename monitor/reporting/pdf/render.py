@@ -27,7 +27,13 @@ from monitor.reporting.certificate.data import Attached, certificate_files
 from monitor.reporting.certificate.page import certificate_context
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.tables import LETTERS_PT
-from monitor.reporting.pdf.last_page import closeness_saves, ends_early, filling_breaks, with_breaks_before
+from monitor.reporting.pdf.last_page import (
+    CLOSER,
+    closeness_saves,
+    ends_early,
+    filling_breaks,
+    with_breaks_before,
+)
 from monitor.reporting.pdf.layout_engine import (
     HTML,
     Attachment,
@@ -74,12 +80,14 @@ def pdf_of(
     extra_fonts: Sequence[Path] = (),
     attached: Sequence[Attached] = (),
     closer: str | None = None,
+    saved: float | None = None,
 ) -> bytes:
     """Make the PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
 
     ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each. Where the last page would be
     less than half full, ``closer``, the same page in less room, is taken if it saves that page, else the page before
-    ends earlier (``last_page``).
+    ends earlier (``last_page``). Where the part of the height that it saves is said (``saved``), it is tried only where
+    that may do.
 
     Raises InputError where the page asks for anything but our fonts and inline pictures.
     """
@@ -108,7 +116,7 @@ def pdf_of(
 
     try:
         with _reproducible(moment), _uncollected(), font_folders:
-            document = _filled(html, closer, laid_out)
+            document = _filled(html, closer, saved, laid_out)
             pages = len(document.pages)
             pdf = bytes(
                 document.write_pdf(finisher=_each_once, pdf_identifier=identifier.encode("utf-8"), **options)
@@ -121,7 +129,9 @@ def pdf_of(
     return pdf
 
 
-def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) -> Document:
+def _filled(
+    html: str, closer: str | None, saved: float | None, laid_out: Callable[[str], Document]
+) -> Document:
     """A document without a last page that is more than half empty, where a closer setting or another break helps.
 
     One document is held at a time: 25 machines need half a gigabyte.
@@ -130,7 +140,7 @@ def _filled(html: str, closer: str | None, laid_out: Callable[[str], Document]) 
     if not ends_early(document):
         return document
     count, choices = len(document.pages), filling_breaks(document)
-    if closer is not None and closeness_saves(document):
+    if closer is not None and (saved is None or closeness_saves(document, saved)):
         del document
         document = laid_out(closer)
         if len(document.pages) < count and not ends_early(document):
@@ -187,6 +197,7 @@ def certificate_pdf(
         extra_fonts=extra_fonts,
         attached=certificate_files(record, inputs, document),
         closer=html.replace("<body ", '<body class="close" ', 1),
+        saved=CLOSER,
     )
 
 
