@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
+from datetime import date, datetime, time
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 from monitor.api.answer import Answer
 from monitor.exceptions import InputError, did_you_mean
@@ -15,6 +16,8 @@ from monitor.store import Database
 from monitor.workflow.contract import QUESTIONS
 
 Typed = TypeVar("Typed")
+#: How the fields of requests that are moments are annotated.
+_MOMENTS = (datetime, datetime | None)
 #: An option of the command line in a message, such as ``--digits`` or ``-p``.
 _OPTION = re.compile(r"(?<![\w-])--?([a-z][a-z-]*)(?![\w-])")
 
@@ -63,7 +66,29 @@ def request_of(kind: Any, values: dict[str, Any]) -> Any:
             raise InputError(
                 f"there is no option '{name}'; {did_you_mean(name, names)}there are {', '.join(names)}"
             )
-    return kind(**values)
+    hints = get_type_hints(kind)
+    return kind(
+        **{name: _moment(name, value) if hints[name] in _MOMENTS else value for name, value in values.items()}
+    )
+
+
+def _moment(name: str, value: Any) -> Any:
+    """Return a moment with its offset: of a text, a day or a time; without an offset the time of this computer.
+
+    Raises InputError for what is none.
+    """
+    if isinstance(value, str):
+        try:
+            value = datetime.fromisoformat(value.strip())
+        except ValueError as error:
+            raise InputError(
+                f"{name}='{value}': write a day or a time, such as '2026-03-05' or '2026-03-05T07:00:00-05:00'"
+            ) from error
+    elif isinstance(value, date) and not isinstance(value, datetime):
+        value = datetime.combine(value, time())
+    if value is not None and not isinstance(value, datetime):
+        raise InputError(f"{name} is a day or a time, such as '2026-03-05', not {value!r}")
+    return value if value is None or value.tzinfo is not None else value.astimezone()
 
 
 # Of which answer it is says the annotation of the caller alone (``answers.pyi``), hence a variable in the result only.

@@ -11,7 +11,7 @@ import os
 import re
 import tomllib
 import zoneinfo
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,6 +122,8 @@ def _tolerances(value: object) -> str | None:
     example = 'write [tolerances."TYPE"] and below it limits such as EC0Y = 20.0'
     if not isinstance(value, dict) or not all(isinstance(limits, dict) for limits in value.values()):
         return f"tolerances are tables, one a machine type; {example}"
+    if twice := _one_type_twice(value):
+        return twice
     for name, limits in value.items():
         if not limits:
             return f'[tolerances."{name}"] states no limit; {example}'
@@ -136,6 +138,16 @@ def _tolerances(value: object) -> str | None:
             number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
             if not number or not 0.0 < limit < math.inf:
                 return f'[tolerances."{name}"] {term} = {limit!r}: a number above 0 in µm, µrad or µm/m'
+    return None
+
+
+def _one_type_twice(types: Iterable[str]) -> str | None:
+    """What is wrong with machine types of which two are one but for upper and lower case; None where nothing is."""
+    first: dict[str, str] = {}
+    for name in types:
+        if first.setdefault(name.casefold(), name) != name:
+            other = first[name.casefold()]
+            return f'[tolerances."{other}"] and [tolerances."{name}"] are one type; write one of them'
     return None
 
 

@@ -36,9 +36,19 @@ _OF_TRUTHS = ("warm_up",)
 def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | None, str | None]:
     """Return the file that holds the table ``name`` (``runs.csv``) with its text as plain CSV.
 
-    A workbook is read where there is no such file. What cannot be read is noted, and is None.
+    A workbook is read where there is no such file. What cannot be read is noted, and is None; so is a table that stands
+    in two files, of which one is older.
     """
     stem = name.removesuffix(".csv")
+    holding = [file for file in (name, f"{stem}.xlsx", WORKBOOK) if _may_hold(folder / file, stem)]
+    if len(holding) > 1:
+        faults.add(
+            name,
+            None,
+            None,
+            f"this table stands in {' and in '.join(holding)}; take away what is not to be read",
+        )
+        return None, None
     books = [] if (folder / name).exists() else [f"{stem}.xlsx", WORKBOOK]
     book = next((book for book in books if (folder / book).is_file()), None)
     content = read_bytes(folder, book or name, LARGEST_CSV, faults)
@@ -50,6 +60,18 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
         else _sheet_text(book, content, stem, faults)
     )
     return SourceFile(book or name, content), text
+
+
+def _may_hold(path: Path, stem: str) -> bool:
+    """Whether a file is there that holds a table: the workbook of all tables only where a sheet has its name."""
+    if path.name != WORKBOOK:
+        return path.is_file()
+    try:
+        with zipfile.ZipFile(path) as packed, packed.open("xl/workbook.xml") as listed:
+            sheets = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', listed.read(2**20))
+    except (zipfile.BadZipFile, KeyError, ValueError, OSError, NotImplementedError, RuntimeError):
+        return False  # said where it is read
+    return stem.encode() in [sheet.lower() for sheet in sheets]
 
 
 def renamed(faults: Iterable[Fault], files: Mapping[str, str]) -> list[Fault]:

@@ -159,6 +159,11 @@ def likenesses_written(out: Path, campaigns: int, machines: int, pattern: tuple[
     )
 
 
+def hidden_in_all(effect: str, peak_um: float) -> str:
+    """Return what is said of an effect that all campaigns hide."""
+    return f"; {effect} with a peak of {peak_um:g} µm is hidden in all of them"
+
+
 def hardly_seen(effect: str, standard_deviations: float, certain_from_um: float | None) -> str:
     """Return what follows where a plan shows a hidden effect too little for a search to find it, or not at all."""
     if certain_from_um is None:

@@ -97,6 +97,11 @@ class LikeRequest:
                     f"{did_you_mean(machine, self.machines)}there are {', '.join(self.machines)}"
                 )
 
+    @property
+    def hidden_um(self) -> float:
+        """The peak of the hidden effect."""
+        return PEAK_UM if self.peak_um is None else self.peak_um
+
     def _check_peak(self) -> None:
         if self.peak_um is None:
             return
@@ -149,9 +154,10 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
                 f"{pattern.name} has no parameter '{parameter}'; {did_you_mean(parameter, units)}"
                 f"it has {', '.join(units)}"
             )
+    _check_events(request, likeness.campaign)
     added = sight = None
     if request.effect is not None:
-        peak = MICROMETRE.to_internal(PEAK_UM if request.peak_um is None else request.peak_um)
+        peak = MICROMETRE.to_internal(request.hidden_um)
         added = likeness.hidden(request.effect, peak)
         sight = effect_sight(likeness.problem, request.effect, peak)
     rng = np.random.default_rng(request.seed)
@@ -167,11 +173,15 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
             write_campaign(replace(dated, probings=written.probings), folder)
             folders.append(str(folder))
             truth += _true_values(dated, likeness, local, units)
+            if request.effect is not None:
+                truth += _hidden(dated, likeness, request.effect, request.hidden_um)
     file = request.out / TRUTH
     write_truth(file, truth)
     message = messages.likenesses_written(
         request.out, len(folders), len(request.machines), (pattern.name, method.name), TRUTH
     )
+    if request.effect is not None:
+        message += messages.hidden_in_all(request.effect, request.hidden_um)
     if sight is not None and request.effect is not None and not sight.is_certain:
         message += messages.hardly_seen(request.effect, sight.standard_deviations, sight.certain_from_um)
     return LikeAnswer(tuple(folders), str(file), request.seed, message, sight)
@@ -233,6 +243,27 @@ def _errors(
                 true[row, names.index(step.parameter)] += step.size * units[step.parameter][1]
     local[:, : len(names)] = true
     return local
+
+
+def _check_events(request: LikeRequest, pattern: Campaign) -> None:
+    """Raise InputError for a step that no run is before, or none behind."""
+    moments = [run.started_at for run in pattern.runs]
+    last = _month(request.start, request.months - 1) + (max(moments).date() - moments[0].date())
+    for step in request.events:
+        if not request.start < step.on <= last:
+            raise InputError(
+                f"--event {step.on} {step.parameter}: the runs are of {request.start} to {last}, and none is "
+                f"{'behind' if step.on > last else 'before'} it"
+            )
+
+
+def _hidden(dated: Campaign, likeness: Likeness, effect: str, peak_um: float) -> list[TrueValue]:
+    """The peak of the hidden effect in every run."""
+    started = {run.run: run.started_at.isoformat() for run in dated.runs}
+    return [
+        TrueValue(dated.machine.id, dated.name, int(run), started[int(run)], effect, peak_um, "µm (peak)")
+        for run in likeness.problem.runs
+    ]
 
 
 def _true_values(

@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import numpy as np
@@ -352,3 +352,17 @@ def test_importing_the_package_loads_no_library() -> None:
     code = "import monitor, sys; print(sorted({'numpy', 'duckdb', 'pandas'} & set(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    "since", ["2012-03-05", "2012-03-05T07:00:00+00:00", date(2012, 3, 5), datetime(2012, 3, 5)]
+)
+def test_a_moment_is_a_text_a_day_or_a_time(db: mm.Database, since: object) -> None:
+    """A text ended in a TypeError, a time without an offset too."""
+    assert db.trend("HU40-T", since=since).machine == "HU40-T"
+
+
+def test_what_is_no_moment_is_refused(db: mm.Database) -> None:
+    for since in ("yesterday", 5):
+        with pytest.raises(InputError, match=r"since.*a day or a time"):
+            db.trend("HU40-T", since=since)

@@ -162,6 +162,14 @@ def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> 
     assert message in answer.err
 
 
+def test_one_machine_type_in_two_spellings_is_refused(typed: Any) -> None:
+    """The later one counted, and with it the verdict."""
+    configured('[tolerances."MILL"]\nEX0A = 5.5\n[tolerances."mill"]\nEX0A = 70.5\n')
+    answer = typed("config", "check")
+    assert answer.status == 2
+    assert '[tolerances."MILL"] and [tolerances."mill"] are one type; write one of them' in answer.err
+
+
 def test_a_machine_type_may_limit_an_effect(typed: Any) -> None:
     # Of machines with any axes: a second X, a joint of a robot, a pitch that looks like a coefficient.
     names = (

@@ -105,6 +105,21 @@ def test_a_workbook_is_the_same_campaign(folder: Path, single: bool) -> None:
     assert not any(name.endswith(".csv") for name in names)
 
 
+@pytest.mark.parametrize("single", [True, False])
+def test_a_table_that_stands_in_two_files_is_refused(tmp_path: Path, single: bool) -> None:
+    """The table was corrected in Excel and saved beside the CSV, which was read without a word."""
+    folder = Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / "cold-cold"))
+    kept = (folder / "probings.csv").read_bytes()
+    as_workbook(folder, single=single)
+    (folder / "probings.csv").write_bytes(kept)
+    other = "campaign.xlsx" if single else "probings.xlsx"
+    with pytest.raises(CampaignError, match=rf"this table stands in probings.csv and in {other}; take away"):
+        read_campaign(folder)
+    # Other tables may come from the workbook, and notes beside a table are no table.
+    (folder / "probings.csv").unlink()
+    assert read_campaign(folder).name == "cold-cold"
+
+
 def test_points_and_commas_in_one_table_are_refused_with_the_cause(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / "cold-cold"))
     rows = tables(folder)["probings.csv"]

@@ -188,13 +188,34 @@ def test_a_hidden_effect_that_the_plan_cannot_see_is_called_so(tmp_path: Path) -
     weak = hidden("weak", "EXX:reversal", 0.1)
     assert weak.message.endswith("from a peak of 0.41 µm on it sees that something is missing")
     seen = hidden("seen", "EXX:reversal", 8.0)
-    assert seen.message.endswith("; truth.csv has the true values")
+    assert seen.message.endswith("; EXX:reversal with a peak of 8 µm is hidden in all of them")
+    rows = list(csv.DictReader((tmp_path / "seen" / "truth.csv").read_text(encoding="utf-8").splitlines()))
+    assert {(row["value"], row["unit"]) for row in rows if row["parameter"] == "EXX:reversal"} == {
+        ("8.0", "µm (peak)")
+    }
     assert seen.sight is not None
     assert seen.sight.is_certain
     demo = simulate(SimulateRequest(tmp_path / "demo", effect="EXX:reversal", peak_um=0.1))
     assert "; this plan shows EXX:reversal by 1.8 standard deviations of its readings" in demo.message
     nothing = simulate(SimulateRequest(tmp_path / "nothing"))
     assert nothing.sight is None
+
+
+@pytest.mark.parametrize(
+    ("on", "where"), [(date(2023, 12, 1), "before"), (START, "before"), (date(2027, 5, 1), "behind")]
+)
+def test_a_step_that_no_run_is_before_or_behind_is_refused(tmp_path: Path, on: date, where: str) -> None:
+    request = LikeRequest(
+        tmp_path / "out",
+        str(EXAMPLES / "tilting-table"),
+        ("A",),
+        START,
+        months=2,
+        events=(Step(on, "EB0C", 8.0),),
+    )
+    with pytest.raises(InputError, match=f"and none is {where} it"):
+        simulate_like(request)
+    assert not request.out.exists()
 
 
 def test_a_mount_may_be_off_by_minutes_of_arc() -> None:
