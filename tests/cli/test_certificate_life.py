@@ -95,6 +95,7 @@ def test_a_draft_says_so_on_paper_and_when_verified(
     assert "DRAFT" not in text_of(Path("draft.pdf"))
 
 
+@pytest.mark.slow
 def test_numbers_follow_one_another_within_the_year(
     typed: Any, issued: Any, laboratory: Path, pdf_unread: Any
 ) -> None:

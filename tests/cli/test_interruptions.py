@@ -68,6 +68,7 @@ def duration(start: Any) -> float:
     return time.monotonic() - begun
 
 
+@pytest.mark.slow
 def test_sigkill_in_the_middle_of_import(
     started: Any, typed: Any, examples: Path, tmp_path: Path, seeds: Any, thorough: bool
 ) -> None:

@@ -48,6 +48,7 @@ def test_a_hidden_effect_leads_or_stands_in_the_leading_group(virtual_campaigns,
     assert effect not in answer.blind
 
 
+@pytest.mark.slow
 def test_three_effects_are_found_one_after_the_other_and_the_error_falls(virtual_campaigns, explained):
     sim = simulator()
     hidden = [
@@ -140,6 +141,7 @@ def test_a_channel_with_empty_cells_is_refused_aloud(virtual_campaigns, explaine
     assert "empty at 1 of 1240 probings" in refused["EZC1:const@x_axis_degC"]
 
 
+@pytest.mark.slow
 def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaigns, explained):
     """Far beyond what is likely, and where curvature matters: a scale that shrinks everything is no answer."""
     sim = simulator()

@@ -56,6 +56,7 @@ def test_gum_f_2_4_5_covariance_is_right_on_average_where_an_effect_is_hidden(hi
     assert max(added) < 2.0
 
 
+@pytest.mark.slow
 def test_intervals_of_k_2_hold_where_an_effect_is_hidden(hidden):
     without = [np.abs(d) < 2.0 * np.sqrt(np.diag(plain)) for _, d, plain, _, _ in hidden]
     added = [np.abs(d) < 2.0 * np.sqrt(np.diag(plain + extra)) for _, d, plain, extra, _ in hidden]

@@ -113,6 +113,7 @@ def test_the_sums_of_tails_of_two_parts_and_a_known_one_are_those_of_plain_draws
         assert tails(k) == pytest.approx(beyond.mean(), abs=4.0 * error + 2e-4)
 
 
+@pytest.mark.slow
 def test_k_q_of_parts_is_the_quantile_of_plain_draws_taken_twice() -> None:
     # The quotient of the factors of the two worlds, each from a million plain draws that share no code with ours.
     rng, m, dof = np.random.default_rng(23), 4, 12

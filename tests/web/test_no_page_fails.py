@@ -120,6 +120,7 @@ def stored(
     return serve(path, False), machine, campaign, nasty
 
 
+@pytest.mark.slow
 def test_no_address_is_answered_by_a_server_error(stored: tuple[Any, str, str, tuple[str, ...]]) -> None:
     served, machine, campaign, nasty = stored
     failed = []
@@ -133,6 +134,7 @@ def test_no_address_is_answered_by_a_server_error(stored: tuple[Any, str, str, t
     assert failed == []
 
 
+@pytest.mark.slow
 def test_no_form_is_answered_by_a_server_error(stored: tuple[Any, str, str, tuple[str, ...]]) -> None:
     served, machine, campaign, nasty = stored
     assert {route.path for route in _routes(served.client.app._app) if "POST" in route.methods} == set(FORMS)

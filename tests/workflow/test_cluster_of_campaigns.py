@@ -112,6 +112,7 @@ def test_weekly_reports_with_explanations_are_the_same_to_the_bit_on_a_cluster_t
         assert Path(one).read_bytes() == Path(other).read_bytes()
 
 
+@pytest.mark.slow
 def test_all_campaigns_are_identified_to_the_bit_by_two_processes(tmp_path: Path) -> None:
     with fleet(tmp_path / "here.duckdb", 2) as here, fleet(tmp_path / "there.duckdb", 2) as there:
         alone = identify_all(here, IdentifyAllRequest())

@@ -429,6 +429,7 @@ def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_pa
         assert not ink[-int(6 / 25.4 * 60) :].any()
 
 
+@pytest.mark.slow
 def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_with_its_worst_place(
     fleet: Database, week10: dict, tmp_path: Path, pdf_unread
 ) -> None:

@@ -75,6 +75,7 @@ def page_of(db: Database, machine: str) -> MachineHealth:
     return stored_health(db, number)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "example",
     [

@@ -152,6 +152,7 @@ def test_a_run_that_is_not_there_and_a_method_of_one_instrument_are_refused(db: 
         instruments(db, InstrumentsRequest("tilting-table"))
 
 
+@pytest.mark.slow
 def test_the_health_report_of_several_instruments_names_what_the_combination_shows(
     db: Database, tmp_path: Path
 ) -> None:
