@@ -70,7 +70,7 @@ def _may_hold(path: Path, stem: str) -> bool:
         with zipfile.ZipFile(path) as packed, packed.open("xl/workbook.xml") as listed:
             sheets = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', listed.read(2**20))
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, NotImplementedError, RuntimeError):
-        return False  # said where it is read
+        return False  # said where a table is read from it
     return stem.encode() in [sheet.lower() for sheet in sheets]
 
 
