@@ -6,7 +6,6 @@ are numbered, ``authorised_by.0.name``. What does not apply is said in a box of 
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -72,7 +72,9 @@ def values_of_page(local: Any, since: str, until: str) -> Any:
     """What the page cuts of the whole history, as the interface would answer it."""
     _, whole = local.ask("values", {"machine": "HU40-T"})
     return json.loads(
-        json.dumps(to_document(_within(from_document(ValuesAnswer, whole), **_ends(since=since, until=until))))
+        json.dumps(
+            to_document(_within(from_document(ValuesAnswer, whole), **_ends(since=since, until=until)))
+        )
     )
 
 

@@ -272,7 +272,9 @@ def test_a_day_is_read_as_a_german_writes_it_or_refused(local: Any, typed: str, 
 
 def test_a_period_says_which_of_its_days_is_none(local: Any) -> None:
     """Python's own words ("month must be in 1..12") told a reader nothing."""
-    address = "/machine/periods?name=HU40-T&since_1=2026-03-02&until_1={}&since_2=2026-03-02&until_2=2026-03-02"
+    address = (
+        "/machine/periods?name=HU40-T&since_1=2026-03-02&until_1={}&since_2=2026-03-02&until_2=2026-03-02"
+    )
     assert "the last day is a day, such as" in local.client.get(address.format("2026-13-02")).text
     assert "no calendar has a day after 9999-12-31" in local.client.get(address.format("9999-12-31")).text
 

@@ -248,9 +248,7 @@ def _period(name: str, since: str, until: str) -> dict[str, Any]:
 
 def _ends(**days: str) -> dict[str, datetime]:
     """The ends of a period that are named, as ISO 8601 writes them."""
-    return {
-        name: datetime.combine(date.fromisoformat(day), time(), UTC) for name, day in days.items() if day
-    }
+    return {name: datetime.combine(date.fromisoformat(day), time(), UTC) for name, day in days.items() if day}
 
 
 def _within(
