@@ -46,7 +46,11 @@ class _Block:
 
 def contrasts(problem: ChainProblem, solution: Solution, run: int) -> tuple[Contrast, ...]:
     """What every setup and every instrument of several setups says against all others, in a run."""
-    at = run_rows(problem, solution, run)
+    return contrasts_of(run_rows(problem, solution, run))
+
+
+def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
+    """What every setup and every instrument of several setups says against all others."""
     blocks = _blocks(at)
     units = _units(at, blocks)
     return tuple(_judged(at, blocks, units, frozenset(blocks)))

@@ -36,7 +36,7 @@ class RunRows:
     @cached_property
     def is_read(self) -> npt.NDArray[np.bool_]:
         """Which rows (N,) are numbers that were read."""
-        read = np.any(self.jacobian != 0.0, axis=1)
+        read: npt.NDArray[np.bool_] = np.any(self.jacobian != 0.0, axis=1)
         read[self.extras :] = False
         return read
 
