@@ -1,4 +1,4 @@
-"""Which setup contradicts all others: against least squares of its own, over drawn readings, and by who was read wrongly."""
+"""Which setup contradicts all others: against other least squares, over drawn readings, and by who was read wrongly."""
 
 from __future__ import annotations
 
@@ -80,7 +80,9 @@ def _drawn(rows: RunRows, rng: np.random.Generator, times: float, of: str) -> Ru
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("times", "of"), [(1.0, ""), (1.1, ""), (1.5, ""), (2.0, ""), (2.0, "bar"), (2.0, "r-test-B")])
+@pytest.mark.parametrize(
+    ("times", "of"), [(1.0, ""), (1.1, ""), (1.5, ""), (2.0, ""), (2.0, "bar"), (2.0, "r-test-B")]
+)
 def test_right_readings_contradict_each_other_as_seldom_as_said(rows: RunRows, times: float, of: str) -> None:
     """Bonferroni's bound over all setups and instruments, for scatter of 1 to 2 times the stated one."""
     rng = np.random.default_rng([62, int(10 * times), len(of)])
@@ -102,7 +104,10 @@ def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
     suspects = []
     for seed in range(62, 68):
         campaign = read_campaign(_campaign(tmp_path / str(seed), seed, ("r-test-B", -1.0)))
-        problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+        problem, ability = (
+            campaign_method(campaign).problem_of(campaign),
+            campaign_method(campaign).instruments,
+        )
         beside = against_others(problem, solve_problem(problem), ability, 1)
         assert beside is not None
         assert "r-test-B" in beside.suspects

@@ -89,17 +89,18 @@ def _disagreement(campaign: str, apart: Disagreement) -> None:
 def _against_others(beside: AgainstOthers) -> None:
     suspects = " or ".join(beside.suspects)
     if not suspects:
-        who = (
-            "no single setup or instrument explains it: more than one is wrong, or the model lacks something"
-        )
+        who = "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
     elif len(beside.suspects) == 1:
-        who = f"without {suspects} the others agree: look at its signs, unit, points and rows first"
+        who = (
+            f"Without {suspects} the others agree: look at its signs, unit, points and rows first; where they are "
+            "right, the model lacks what the others do not meet"
+        )
     else:
-        who = f"without {suspects} the others agree, which cannot tell them apart: look at each of them"
+        who = f"Without {suspects} the others agree, which cannot tell them apart: look at each of them"
     output.say(
         f"{beside.name} in run {beside.run} contradicts all other setups together by {beside.size:.1f} u in "
         f"{beside.directions} {'direction' if beside.directions == 1 else 'directions'}; chance alone makes as much in "
-        f"{_chance(beside.by_chance)} of campaigns. {who[0].upper()}{who[1:]}"
+        f"{_chance(beside.by_chance)} of campaigns. {who}"
     )
 
 
