@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -40,7 +41,7 @@ class Database:
         with suppress(OSError, KeyError):  # a container may run under a number that has no name
             actor = getpass.getuser()
         self._store = store.SharedDatabase(
-            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s)
+            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s), unstored=_warn
         )
         self._ask = Ask(self._store)
         self.path = Path(path)
@@ -156,6 +157,10 @@ class Database:
     def _repr_html_(self) -> str:
         """Return the campaigns, as a notebook shows them."""
         return f"<p>{self.path}</p>{self.campaigns()._repr_html_()}"  # type: ignore[operator]
+
+
+def _warn(why: str) -> None:
+    warnings.warn(why, stacklevel=2)
 
 
 def _no_campaign(name: str, names: Sequence[str]) -> str:

@@ -200,6 +200,7 @@ if TYPE_CHECKING:
     from monitor.store.turns import (
         Holder as Holder,
         Patience as Patience,
+        activity as activity,
     )
     from monitor.store.type_tolerances import type_in_use as type_in_use
     from monitor.store.verification import (
@@ -253,7 +254,7 @@ else:
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",
             "sharing": "SharedDatabase one_at_a_time",
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",
-            "turns": "Holder Patience",
+            "turns": "Holder Patience activity",
             "type_tolerances": "type_in_use",
             "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",

@@ -75,7 +75,7 @@ def keep_blocks(path: str) -> None:
     """
     if path == ":memory:" or not _LOCKS:
         return
-    file = _own_descriptor(path)
+    file = own_descriptor(path)
     if file is None:
         return
     headers = os.pread(file, _HEADERS, 0)
@@ -325,7 +325,7 @@ def _remove(path: str) -> None:
 @contextmanager
 def _alone(path: str, *, for_writing: bool) -> Iterator[int | None]:
     """Open a file that nobody writes, or has open at all; None where somebody does, or it may not be opened."""
-    if not _LOCKS or _own_descriptor(path) is not None:
+    if not _LOCKS or own_descriptor(path) is not None:
         yield None
         return
     try:
@@ -344,7 +344,7 @@ def _alone(path: str, *, for_writing: bool) -> Iterator[int | None]:
         os.close(file)
 
 
-def _own_descriptor(path: str) -> int | None:
+def own_descriptor(path: str) -> int | None:
     """Return the descriptor under which this process has a file open; None where it has not."""
     try:
         wanted = os.stat(path)

@@ -137,7 +137,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
 
 
 def _refuse_lake(db: Database, participle: str) -> None:
-    if not db.keeps_answers:
+    if db.is_lake:
         raise InputError(
             f"{db.path} is a lake of many plants, which is not {participle}: the chain is that of each plant's own "
             "database, and the lake can be made again from these"

@@ -112,7 +112,7 @@ def main() -> None:
     parser.add_argument("--stated", action="store_true")
     options = parser.parse_args()
     if options.stated:
-        shares._scatter = lambda remaining, freedom: (1.0, float("inf"))
+        shares.scatter_of = lambda remaining, freedom: (1.0, float("inf"))
     begin = time.process_time()
     cases = {name: (keys, options.seeds) for name, keys in RIGHT.items()}
     cases |= {name: ({"otherwise": how}, max(1, options.seeds // 5)) for name, how in WRONG.items()}
