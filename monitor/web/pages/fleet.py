@@ -230,7 +230,7 @@ def routes() -> APIRouter:
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
             states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
-            state=state, plant=plant, **period, plants=sorted({row.plant for row in rows if row.plant}),
+            state=state, plant=plant, since=period["since"], until=period["until"], plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
             older=_older(answer),
