@@ -52,9 +52,9 @@ _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
 
 #: What the log is called; how version 2 of it begins, in DuckDB 2.0 with the 16 bytes that name the file and the number
-#: of the checkpoint behind which it was begun; the size and checksum before each further entry, and how the entries of a
-#: checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99 a
-#: checkpoint, 100 the end).
+#: of the checkpoint behind which it was begun; the size and checksum before each further entry; and how the entries of
+#: a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99
+#: a checkpoint, 100 the end).
 _LOG = ".wal"
 _LOG_BEGIN = re.compile(
     rb"d\0be\0\x02(f\0\x10([\0-\x7f]|[\x80-\xff]\x01){16})?(g\0[\x80-\xff]*[\0-\x7f])?\xff\xff", re.DOTALL

@@ -317,6 +317,8 @@ def _in_words(path: str, read_only: bool, message: str) -> str:
         return f"the folder of {path} does not exist; make it first"
     if "Is a directory" in message:
         return f"{path} is a folder; name a file"
+    if "Read-only file system" in message:
+        return f"{path} lies on a file system that can only be read; nothing can be stored there"
     if _OWN_FINDING in message:
         return _of_foreign_log(path)
     if "Permission denied" in message:
