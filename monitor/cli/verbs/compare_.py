@@ -89,7 +89,9 @@ def _disagreement(campaign: str, apart: Disagreement) -> None:
 def _against_others(beside: AgainstOthers) -> None:
     suspects = " or ".join(beside.suspects)
     if not suspects:
-        who = "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
+        who = (
+            "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
+        )
     elif len(beside.suspects) == 1:
         who = (
             f"Without {suspects} the others agree: look at its signs, unit, points and rows first; where they are "
