@@ -182,7 +182,8 @@ class SharesOf(Protocol):
 
 @dataclass(frozen=True)
 class Contrast:
-    """What the ``setups`` of one instrument, or one of them, say against all others of a run, by ``name``.
+    """What the ``setups`` of one instrument, one of them, or what several have in common that is known beforehand, say
+    against all others of a run, by ``name``.
 
     They can differ in so many ``directions``, do by ``size`` (root of the mean square in standard uncertainties), and
     chance alone makes ``p`` as much; ``freedom`` are the degrees of freedom of the scatter, infinite where it is as

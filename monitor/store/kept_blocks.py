@@ -20,6 +20,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import stat
 import struct
 from collections.abc import Iterator
@@ -50,11 +51,15 @@ _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
 
-#: What the log is called; how version 2 of it begins, the size and checksum before each further entry, and how the
-#: entries of a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the
-#: version, 99 a checkpoint, 100 the end).
+#: What the log is called; how version 2 of it begins, in DuckDB 2.0 with the 16 bytes that name the file and the number
+#: of the checkpoint behind which it was begun; the size and checksum before each further entry; and how the entries of
+#: a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99
+#: a checkpoint, 100 the end).
 _LOG = ".wal"
-_LOG_BEGIN, _FRAME, _MARK, _END = b"d\x00be\x00\x02\xff\xff", struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
+_LOG_BEGIN = re.compile(
+    rb"d\0be\0\x02(f\0\x10([\0-\x7f]|[\x80-\xff]\x01){16})?(g\0[\x80-\xff]*[\0-\x7f])?\xff\xff", re.DOTALL
+)
+_LONGEST_BEGIN, _FRAME, _MARK, _END = 64, struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
 
 #: The copy: this line, the SHA-256 of what follows, the headers, and for each block its number and its bytes.
 _BEGIN = b"blocks before a checkpoint, 1\n"
@@ -151,10 +156,12 @@ def has_log(path: str) -> bool:
 
 
 def _ends_with_mark(path: str) -> bool:
-    """Whether a checkpoint is the last that a log tells; so, too, where it is of a form not known here."""
+    """Whether a checkpoint is the last that a log tells; False where it is of a form not known here."""
     with open(path + _LOG, "rb") as file:
-        if file.read(len(_LOG_BEGIN)) != _LOG_BEGIN:
-            return True
+        begin = _LOG_BEGIN.match(file.read(_LONGEST_BEGIN))
+        if begin is None:
+            return False
+        file.seek(begin.end())
         last = b""
         while len(frame := file.read(_FRAME.size)) == _FRAME.size:
             size, _ = _FRAME.unpack(frame)

@@ -11,8 +11,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import ExitStack, contextmanager
 
 from monitor.exceptions import StoreError
 from monitor.store.kept_blocks import own_descriptor
@@ -44,16 +43,19 @@ def private_copy(path: str) -> Iterator[str]:
 
     It is removed behind the block. Raises StoreError where there is no room for it.
     """
-    with tempfile.TemporaryDirectory(prefix="monitor-", ignore_cleanup_errors=True) as folder:
-        copy = os.path.join(folder, "copy.duckdb")
+    with ExitStack() as copied:
         try:
+            folder = copied.enter_context(
+                tempfile.TemporaryDirectory(prefix="monitor-", ignore_cleanup_errors=True)
+            )
+            copy = os.path.join(folder, "copy.duckdb")
             if os.path.exists(path + ".wal"):
                 shutil.copyfile(path + ".wal", copy + ".wal")
             _copy(path, copy)
         except OSError as fault:
             raise StoreError(
-                f"{path} may not be written by this user, and there is no room for the copy in {Path(folder).parent} "
-                f"that this question needs: {fault.strerror}"
+                f"{path} may not be written by this user, and there is no room for the copy in the temporary folder "
+                f"(TMPDIR) that this question needs: {fault.strerror}"
             ) from fault
         yield copy
 

@@ -117,7 +117,21 @@ def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
     assert set(suspects) == {("r-test-B",), ("bar-zx", "r-test-B")}
 
 
-def _campaign(folder: Path, seed: int, otherwise: tuple[str, float]) -> Path:
+def test_a_wrong_length_of_a_bar_is_named_and_no_plane_of_it(tmp_path: Path) -> None:
+    """The length is one number of all three planes: 5 µm too long, each of them contradicts the laser alike."""
+    campaign = read_campaign(_campaign(tmp_path, 65, None))
+    longer = tuple(
+        replace(setup, length=None if setup.length is None else setup.length + 5e-3)
+        for setup in campaign.artefact.setups
+    )
+    campaign = replace(campaign, artefact=replace(campaign.artefact, setups=longer))
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    beside = against_others(problem, solve_problem(problem), ability, 1)
+    assert beside is not None
+    assert beside.suspects == ("the stated length of ball bar",)
+
+
+def _campaign(folder: Path, seed: int, otherwise: tuple[str, float] | None) -> Path:
     rng = np.random.default_rng(seed)
     truth = centre.truth_of(rng)
     return centre.campaign(folder / "shop", rng, truth, otherwise=otherwise)

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from monitor.exceptions import StoreError
@@ -17,6 +18,7 @@ from monitor.store import (
     SharedDatabase,
     StoredIdentification,
     analysis_text,
+    compact,
     import_campaign,
     load_identification,
     record_event,
@@ -136,7 +138,7 @@ def test_no_room_for_the_copy_is_said(
     monkeypatch.setattr("monitor.store.unwritable._copy", full)
     with (
         reading.opened() as db,
-        pytest.raises(StoreError, match=r"no room for the copy in .*: No space left"),
+        pytest.raises(StoreError, match=r"no room for the copy in .*TMPDIR.*: No space left"),
     ):
         save_identification(db, identification)
 
@@ -148,6 +150,42 @@ def test_why_a_file_may_not_be_written(path: Path, tmp_path: Path) -> None:
     assert why_not_written(str(path)) is None
     os.link(path, tmp_path / "other name")
     assert why_not_written(str(path)) == f"{path} has several names (hard links)"
+
+
+def test_no_folder_for_the_copy_is_said(
+    reading: Reading, identification: StoredIdentification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nowhere(**options: object) -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    monkeypatch.setattr("tempfile.TemporaryDirectory", nowhere)
+    with reading.opened() as db, pytest.raises(StoreError, match=r"TMPDIR.*: No usable temporary directory"):
+        save_identification(db, identification)
+
+
+@pytest.mark.parametrize("kind", [Database, SharedDatabase])
+def test_a_mount_for_reading_is_no_damaged_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[Database]
+) -> None:
+    """It was advised to restore a backup; `compact` ended with status 3 (as seen on a tmpfs that was mounted so)."""
+    Database(path).close()
+
+    def refused(name: str, *options: object, read_only: bool = False, **config: object) -> object:
+        raise duckdb.IOException(f'IO Error: Cannot open file "{name}": Read-only file system')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(duckdb, "connect", refused)
+        with (
+            pytest.raises(StoreError, match="lies on a file system that can only be read; nothing"),
+            kind(path),
+        ):
+            pass
+    with kind(path) as db:
+        monkeypatch.setattr(
+            "monitor.store.copies.compaction.why_not_written", lambda name: f"{name} may not be"
+        )
+        with pytest.raises(StoreError, match=r"may not be; it stays as it was"):
+            compact(db)
 
 
 _AS_NOBODY = """

@@ -8,7 +8,8 @@ setup, fitted by themselves, scatter more than it states, their own scatter coun
 distance of parts that scatter differently has those of K. Krishnamoorthy and J. Yu, Stat. Probab. Lett. 66 (2004) 161,
 eq. 2.5 and 2.6. Less scatter never makes it surer.
 
-Where one is wrong, the others agree without it: whoever has that alone is the one.
+Where one is wrong, the others agree without it: whoever has that alone is the one. What several setups have in common
+and is known beforehand (the length of a bar) may be the wrong one as well: without it the setups agree.
 """
 
 from __future__ import annotations
@@ -72,17 +73,21 @@ def _least(block: _Block) -> float:
 
 
 def _blocks(at: RunRows) -> dict[str, _Block]:
-    """The setups that read something in the run; what setups share beforehand stands with the first of them."""
+    """The setups that read something in the run, and what several of them have in common that is known beforehand."""
     blocks: dict[str, _Block] = {}
-    taken: set[int] = set()
+    shared = {
+        name: rows
+        for name, (rows, setups) in at.shared_beforehand().items()
+        if sum(bool(at.is_read[at.of_setups((setup,))].any()) for setup in setups) > 1
+    }
+    apart = np.concatenate([np.zeros(0, dtype=np.int64), *shared.values()])
     for part in at.problem.parts:
         read = at.of_setups((part.id,))
         read = read[at.is_read[read]]
         if not len(read):
             continue
-        prior = [row for row in at.known_of((part.id,)).tolist() if row not in taken]
-        taken.update(prior)
-        rows = np.concatenate([read, np.array(prior, dtype=np.int64)])
+        prior = at.known_of((part.id,))
+        rows = np.concatenate([read, prior[~np.isin(prior, apart)]])
         basis = _basis(at, rows, np.ones(len(rows)))
         remaining = at.residual[rows] - basis @ (basis.T @ at.residual[rows])
         numbers = len(read) - float(np.sum(basis[: len(read)] ** 2))
@@ -94,14 +99,16 @@ def _blocks(at: RunRows) -> dict[str, _Block]:
             float(np.sqrt(square)),
             freedom,
         )
-    return blocks
+    return blocks | {name: _Block(rows, 0.0, 0.0, 1.0, float("inf")) for name, rows in shared.items()}
 
 
 def _units(at: RunRows, blocks: dict[str, _Block]) -> dict[str, frozenset[str]]:
-    """The setups that may be wrong together, by name: every setup, and every instrument that has several."""
-    units = {setup: frozenset({setup}) for setup in blocks}
+    """What may be wrong together, by name: every setup, every instrument that has several, what is known beforehand."""
+    units = {name: frozenset({name}) for name in blocks}
+    shared = at.shared_beforehand()
     for name, setups in instruments_of(at.problem).items():
-        mine = frozenset(setups) & blocks.keys()
+        of_it = {what for what, (_, of) in shared.items() if of <= set(setups)}
+        mine = frozenset({*setups, *of_it}) & blocks.keys()
         if len(mine) > 1:
             units.setdefault(name, mine)
     return units

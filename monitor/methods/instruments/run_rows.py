@@ -60,6 +60,26 @@ class RunRows:
             dtype=np.int64,
         )
 
+    def shared_beforehand(self) -> dict[str, tuple[npt.NDArray[np.int64], frozenset[str]]]:
+        """What is known beforehand of an unknown that several setups have in common (the length of a bar), by what it
+        is: its rows, and the setups."""
+        rows: dict[str, list[int]] = {}
+        setups: dict[str, frozenset[str]] = {}
+        for number, extra in enumerate(self.problem.extra_names):
+            column = self.problem.own_names.index(extra)
+            parts = [
+                part
+                for part, columns in zip(self.problem.parts, self.problem.own_columns, strict=True)
+                if column in columns
+            ]
+            if len(parts) > 1:
+                unknown = extra.removeprefix(f"{parts[0].id} ").removesuffix(" x")
+                unknown = unknown.removesuffix(" y").removesuffix(" z")
+                name = f"the stated {unknown} of {parts[0].instrument}"
+                rows.setdefault(name, []).append(self.extras + number)
+                setups[name] = frozenset(part.id for part in parts)
+        return {name: (np.array(of_name), setups[name]) for name, of_name in rows.items()}
+
     def separated(self, rows: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.bool_], int]:
         """The projector (p, p) on the unknowns that rows (m,) separate, which unknowns (p,) these are, and the rank.
 
