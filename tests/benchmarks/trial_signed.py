@@ -221,10 +221,11 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--campaigns", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1411)
-    parser.add_argument("--only", default="")
+    parser.add_argument("--only", default="", help="part of a name")
+    parser.add_argument("--exactly", choices=tuple(CASES))
     arguments = parser.parse_args()
     for number, (name, case) in enumerate(CASES.items()):
-        if arguments.only not in name:
+        if arguments.only not in name or arguments.exactly not in (None, name):
             continue
         machine = OwnMachine(motions={"X": _backlash} if case.effects else {})
         outcomes, failed = [], 0
