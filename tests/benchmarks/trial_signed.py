@@ -14,7 +14,7 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from own_machine import BAR_MM, BAR_PER_K, BAR_U_MM, TRUE, OwnMachine, plan, rec
 from monitor.discovery import fit, robust_fit
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
+from monitor.sources import Quantity, Sharing, Source
 from monitor.store.models import StoredModel
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.models import as_model
@@ -88,9 +89,11 @@ class Case:
     runs: int = 4
     lag_K: float = 0.0
     effects: tuple[str, ...] = ()
+    sources: tuple[Source, ...] = ()
 
 
 WITH = ("EXX:reversal",)
+WARM = Source(name="bar", quantity=Quantity.STANDARD_TEMPERATURE, size=1.0, shared_by=Sharing.RUN)
 CASES = {
     "effects: 20 runs": Case(effects=WITH),
     "effects: 6 runs": Case(days=2, runs=3, effects=WITH),
@@ -117,6 +120,8 @@ CASES = {
     "read to 1 µm, noise 0.2, stated 0.2, 20": Case(times=0.2, stated_um=0.2, resolution_um=1.0),
     "bar lags by 1 K, 20": Case(lag_K=1.0),
     "bar lags by 1 K, 1": Case(lag_K=1.0, days=1, runs=1),
+    "bar lags by 1 K, stated, 20": Case(lag_K=1.0, sources=(WARM,)),
+    "bar lags by 1 K, stated, 1": Case(lag_K=1.0, sources=(WARM,), days=1, runs=1),
 }
 
 
@@ -138,10 +143,11 @@ def measured(case: Case, machine: OwnMachine, rng: np.random.Generator):
     readings = clean + 1e-3 * case.times * case.noise(rng, runs)
     if case.resolution_um:
         readings = np.round(readings / (1e-3 * case.resolution_um)) * 1e-3 * case.resolution_um
-    return recorded(
+    campaign = recorded(
         PLAN, readings, np.repeat(np.arange(case.days), case.runs), stated_um=case.stated_um,
         bar_mm=BAR_MM + BAR_U_MM * rng.standard_normal(), ambient=ambient,
     )  # fmt: skip
+    return replace(campaign, sources=case.sources)
 
 
 @dataclass(frozen=True)
