@@ -41,6 +41,7 @@ from monitor.workflow.uncertainty.stating import statement
 PLAN = plan()
 #: µm; half of the reversal value of X where the machine has one.
 AMPLITUDE = 2.0
+TRUTH = {**TRUE, "EXX:reversal": AMPLITUDE}
 
 Draw = Callable[[np.random.Generator, int], np.ndarray]
 
@@ -93,12 +94,16 @@ class Case:
 
 
 WITH = ("EXX:reversal",)
+#: The last two have no true size; of 20 runs no ellipsoid holds them all.
+THREE = ("EXX:reversal", "EBB:harmonic1", "EYX:poly2")
 WARM = Source(name="bar", quantity=Quantity.STANDARD_TEMPERATURE, size=1.0, shared_by=Sharing.RUN)
 CASES = {
     "effects: 20 runs": Case(effects=WITH),
     "effects: 6 runs": Case(days=2, runs=3, effects=WITH),
     "effects: 2 runs": Case(days=1, runs=2, effects=WITH),
     "effects: 1 run": Case(days=1, runs=1, effects=WITH),
+    "three effects: 20 runs": Case(effects=THREE),
+    "three effects: 1 run": Case(days=1, runs=1, effects=THREE),
     "white, 20": Case(),
     "white, 3": Case(days=1, runs=3),
     "white, 1": Case(days=1, runs=1),
@@ -173,7 +178,7 @@ def outcome(case: Case, machine: OwnMachine, rng: np.random.Generator) -> Outcom
     answer = statement(result)
     against = (*grounds_of(campaign, robust_fit(problem), result.run), *lack_in_budget(answer))
     names = answer.parameters
-    truth = np.array([TRUE.get(name, AMPLITUDE) for name in names])
+    truth = np.array([TRUTH.get(name, 0.0) for name in names])
     estimate = np.array([answer.guf.estimate[name] for name in names])
     u = np.array([answer.guf.u[name] for name in names])
     error = estimate - truth
