@@ -261,8 +261,7 @@ class Setup:
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
     that in which a vector is read; ``known`` names the unknowns held as stated; ``drift_uncertainty`` (mm or rad) is
-    that of what its numbers drift over its rows of a run.
-    """
+    that of what its numbers drift over a run, ``tool_point_uncertainty`` (mm) of each coordinate of the tool point."""
 
     id: str
     reading: str
@@ -282,6 +281,7 @@ class Setup:
     turn_uncertainty: float | None = None
     certificate: str | None = None
     drift_uncertainty: float | None = None
+    tool_point_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)

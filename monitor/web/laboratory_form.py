@@ -6,17 +6,16 @@ are numbered, ``authorised_by.0.name``. What does not apply is said in a box of 
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from datetime import date
 from typing import Any
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory import MAY_NOT_APPLY
 from monitor.reporting.certificate.laboratory_keys import REPEATED, SECTIONS
 from monitor.reporting.texts import ENGLISH, Texts, languages, texts_of
+from monitor.web.days import typed_day
 
 #: Entries that the form has boxes for: persons who authorise, measurement standards.
 ENTRIES = {"authorised_by": 2, "standards": 3}
@@ -160,25 +159,13 @@ def _answer(key_of_file: str, name: str, texts: Mapping[str, str]) -> str | None
     if key_of_file in _LINES:
         return f"[{', '.join(_quoted(line.strip()) for line in text.splitlines() if line.strip())}]"
     if key_of_file in _DAYS:
-        return _day(name, text)
+        return typed_day(name, text).isoformat()
     if key_of_file in _NUMBERS:
         try:
             return repr(float(text.replace(",", ".")))
         except ValueError as error:
             raise InputError(f"{name} is a number, such as 20.5, not '{text}'") from error
     return _quoted(text)
-
-
-def _day(name: str, text: str) -> str:
-    """A day of the calendar as TOML has it; 2.3.2026 is one too, as the German form has it. Raises InputError."""
-    german = re.fullmatch(r"([0-9]{1,2})\. ?([0-9]{1,2})\. ?([0-9]{4})", text)
-    try:
-        # Of what `fromisoformat` reads the form of the message alone.
-        iso = text if re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text) else ""
-        day = date(int(german[3]), int(german[2]), int(german[1])) if german else date.fromisoformat(iso)
-    except ValueError as error:
-        raise InputError(f"{name} is a day, such as 2026-03-02 or 02.03.2026, not '{text}'") from error
-    return day.isoformat()
 
 
 def _quoted(text: str) -> str:

@@ -65,14 +65,16 @@ def test_a_period_is_cut_of_the_history_as_the_database_cuts_it(local: Any) -> N
         assert shown == answer
     refused = local.client.get("/machine?name=HU40-T&since=yesterday")
     assert refused.status_code == 400
-    assert "write dates such as 2026-03-02" in refused.text
+    assert "since is a day, such as 2026-03-02 or 02.03.2026, not" in refused.text
 
 
 def values_of_page(local: Any, since: str, until: str) -> Any:
     """What the page cuts of the whole history, as the interface would answer it."""
     _, whole = local.ask("values", {"machine": "HU40-T"})
     return json.loads(
-        json.dumps(to_document(_within(from_document(ValuesAnswer, whole), **_ends(since, until))))
+        json.dumps(
+            to_document(_within(from_document(ValuesAnswer, whole), **_ends(since=since, until=until)))
+        )
     )
 
 

@@ -248,6 +248,37 @@ def test_the_fleet_filters_by_state_and_date(local: Any) -> None:
     assert "measured last in this period" in looked_at(local, "/?until=2020-01-01")
 
 
+@pytest.mark.parametrize(
+    ("typed", "name"),
+    [
+        ("/?since={}", "since"),
+        ("/?until={}", "until"),
+        ("/machine?name=HU40-T&until={}", "until"),
+        ("/machine/values.csv?name=HU40-T&since={}", "since"),
+    ],
+)
+def test_a_day_is_read_as_a_german_writes_it_or_refused(local: Any, typed: str, name: str) -> None:
+    """02.03.2026 was passed over by the fleet, as though no period had been asked for."""
+    german, iso = (
+        re.sub(r'name="once" value="[^"]*"', "", looked_at(local, typed.format(day)))
+        for day in ("02.03.2026", "2026-03-02")
+    )
+    assert german == iso
+    for wrong in ("2026-02-30", "31.4.2026", "20260302", "March"):
+        refused = local.client.get(typed.format(wrong))
+        assert refused.status_code == 400
+        assert f"{name} is a day, such as 2026-03-02 or 02.03.2026, not" in refused.text
+
+
+def test_a_period_says_which_of_its_days_is_none(local: Any) -> None:
+    """Python's own words ("month must be in 1..12") told a reader nothing."""
+    address = (
+        "/machine/periods?name=HU40-T&since_1=2026-03-02&until_1={}&since_2=2026-03-02&until_2=2026-03-02"
+    )
+    assert "the last day is a day, such as" in local.client.get(address.format("2026-13-02")).text
+    assert "no calendar has a day after 9999-12-31" in local.client.get(address.format("9999-12-31")).text
+
+
 def test_a_new_database_says_what_to_do_first(tmp_path: Path, serve: Any) -> None:
     text = serve(tmp_path / "new.duckdb", False).client.get("/").text
     assert "There is no machine in this database yet. Three steps" in text

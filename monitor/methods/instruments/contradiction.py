@@ -156,7 +156,8 @@ def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
             point = ", ".join(f"{value:.2f}" for value in np.round(np.add(setup.tool_point, move), 2) + 0.0)
             yield (
                 f"the readings of setup {part.id} fit tool_point_mm = [{point}], with {remaining:.2g} mm left where "
-                f"the stated one leaves {as_stated:.2g} mm"
+                f"the stated one leaves {as_stated:.2g} mm; write it, or state how well it is known as "
+                "tool_point_standard_uncertainty_mm, and it is solved for"
             )
 
 

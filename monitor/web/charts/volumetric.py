@@ -38,7 +38,11 @@ def vectors_chart(answer: OverStrokeAnswer) -> Chart:
                 "type": "cone", "x": at[:, 0].tolist(), "y": at[:, 1].tolist(), "z": at[:, 2].tolist(),
                 "u": vector[:, 0].tolist(), "v": vector[:, 1].tolist(), "w": vector[:, 2].tolist(),
                 "sizemode": "scaled", "sizeref": 1.1, "anchor": "tail", "colorscale": ARROWS, "cmin": 0,
-                "colorbar": {"title": {"text": "µm"}, "thickness": 12, "len": 0.7},
+                # Below, not beside: a telephone has no width for it, and the title of the upright axis was cut off.
+                "colorbar": {
+                    "title": {"text": "µm", "side": "right"}, "orientation": "h", "thickness": 12, "len": 0.8,
+                    "y": 0, "yanchor": "bottom", "ypad": 0,
+                },
                 "text": [
                     f"{readings} mm: {number(float(length))} ± {number(float(u), 2)} µm"
                     for readings, length, u in zip(where, lengths, answer.expanded_um, strict=True)
@@ -47,7 +51,7 @@ def vectors_chart(answer: OverStrokeAnswer) -> Chart:
             }
         ],
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": CAMERA},
+            "scene": {**frame, "aspectmode": "data", "camera": CAMERA, "domain": {"y": [0.12, 1.0]}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
         height=520,

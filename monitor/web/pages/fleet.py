@@ -15,6 +15,7 @@ from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
+from monitor.web.days import as_iso
 from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
@@ -210,6 +211,7 @@ def routes() -> APIRouter:
         request: Request, state: str = "", plant: str = "", since: str = "", until: str = "", first: int = 0
     ) -> Response:
         """Show the machines; of one state, of one plant, measured last in a period."""
+        period = as_iso(since=since, until=until)
         machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
         sums = _summed(request, machines)
         answer, waiting = sums.answer, sums.waiting
@@ -218,7 +220,7 @@ def routes() -> APIRouter:
         shown = [
             row
             for row in rows
-            if state in ("", row.attention) and plant in ("", row.plant) and _within(row.latest, since, until)
+            if state in ("", row.attention) and plant in ("", row.plant) and _within(row.latest, **period)
         ]
         first = min(max(first, 0), max(len(shown) - 1, 0))
         return page(
@@ -228,7 +230,8 @@ def routes() -> APIRouter:
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
             states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
-            state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
+            state=state, plant=plant, since=period["since"], until=period["until"],
+            plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
             older=_older(answer),

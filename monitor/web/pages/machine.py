@@ -16,6 +16,7 @@ from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
+from monitor.web.days import as_iso, typed_day
 from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
@@ -49,7 +50,8 @@ def routes() -> APIRouter:
         ask, user = request.app.state.asker, request.state.user
         if colour not in GROUPINGS:
             raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
-        trends = _Trends(request, _asked(name, since, campaign), parameter)
+        period = as_iso(since=since, until=until)
+        trends = _Trends(request, _asked(name, period["since"], campaign), parameter)
         # The whole history, of which a period is cut: it is read once and held for every period that is looked at.
         values: ValuesAnswer = ask(user, "values", {"machine": name})
         is_unidentified = (
@@ -60,7 +62,7 @@ def routes() -> APIRouter:
         if is_unidentified and trends.of_all() is not None:
             # The trend has identified what nobody had identified before: both are then of one version.
             values = ask(user, "values", {"machine": name})
-        values = _within(values, **_ends(since, until))
+        values = _within(values, **_ends(**period))
         methods = sorted(set(values.method))
         values = _chosen(values, campaign, method, warm_up)
         names = list(values.parameters)
@@ -77,7 +79,7 @@ def routes() -> APIRouter:
             every=all_trends if shown else None, waiting=trends.waiting,
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
-            groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
+            groupings=GROUPINGS, colour=colour, since=period["since"], until=period["until"], campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
             refused=form,
         )  # fmt: skip
@@ -231,28 +233,22 @@ def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
 
 def _whole_days(since: str, until: str) -> dict[str, str]:
     """The period from the beginning of one day to the end of another. Raises InputError for what is no date."""
+    first, last = typed_day("the first day", since), typed_day("the last day", until)
     try:
-        first, end = date.fromisoformat(since), date.fromisoformat(until) + timedelta(days=1)
-    except (ValueError, OverflowError) as error:
-        raise InputError(f"write dates such as 2026-03-02: {error}") from error
+        end = last + timedelta(days=1)
+    except OverflowError as error:
+        raise InputError(f"no calendar has a day after {last}") from error
     return {"since": f"{first}T00:00:00Z", "until": f"{end}T00:00:00Z"}
 
 
 def _period(name: str, since: str, until: str) -> dict[str, Any]:
-    ends = {"since": since, "until": until}
-    return {"machine": name, **{key: f"{date}T00:00:00Z" for key, date in ends.items() if date}}
+    ends = as_iso(since=since, until=until)
+    return {"machine": name, **{key: f"{day}T00:00:00Z" for key, day in ends.items() if day}}
 
 
-def _ends(since: str, until: str) -> dict[str, datetime]:
-    """The ends of a period that are named. Raises InputError for what is no date."""
-    try:
-        return {
-            key: datetime.combine(date.fromisoformat(text), time(), UTC)
-            for key, text in {"since": since, "until": until}.items()
-            if text
-        }
-    except ValueError as error:
-        raise InputError(f"write dates such as 2026-03-02: {error}") from error
+def _ends(**days: str) -> dict[str, datetime]:
+    """The ends of a period that are named, as ISO 8601 writes them."""
+    return {name: datetime.combine(date.fromisoformat(day), time(), UTC) for name, day in days.items() if day}
 
 
 def _within(
