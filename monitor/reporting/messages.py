@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -308,3 +308,26 @@ def may_still_be_copied(seconds: float) -> str:
 def arrival_refused(folder: object) -> str:
     """Return that a folder was refused."""
     return f"refused, and left where it is: {folder}"
+
+
+#: What the kinds of change are, for whoever reads a table of them.
+_CHANGES = {
+    "step": "the values step here",
+    "slope": "the values bend here: size is the change of the slope",
+    "trend": "the values drift from here on: size is the slope",
+    "transient": "the values begin off by size and settle, as of warming up or running in",
+}
+
+
+def change_in_words(kind: str) -> str:
+    """Return what a kind of change is, and where it was computed."""
+    return f"{_CHANGES[kind]}; computed from the runs, as `monitor trend` does"
+
+
+def no_change(parameters: int, whys: Collection[str]) -> str:
+    """Return that a search of so many parameters has no change, or the reasons why nothing was searched."""
+    if not parameters:
+        return "no run of this machine has parameters"
+    if whys:
+        return "; ".join(sorted(whys))
+    return f"no change of any of {parameters} parameters beyond chance"

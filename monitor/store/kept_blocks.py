@@ -20,6 +20,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import stat
 import struct
 from collections.abc import Iterator
@@ -50,11 +51,15 @@ _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
 
-#: What the log is called; how version 2 of it begins, the size and checksum before each further entry, and how the
-#: entries of a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the
-#: version, 99 a checkpoint, 100 the end).
+#: What the log is called; how version 2 of it begins, in DuckDB 2.0 with the 16 bytes that name the file and the number
+#: of the checkpoint behind which it was begun; the size and checksum before each further entry; and how the entries of
+#: a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99
+#: a checkpoint, 100 the end).
 _LOG = ".wal"
-_LOG_BEGIN, _FRAME, _MARK, _END = b"d\x00be\x00\x02\xff\xff", struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
+_LOG_BEGIN = re.compile(
+    rb"d\0be\0\x02(f\0\x10([\0-\x7f]|[\x80-\xff]\x01){16})?(g\0[\x80-\xff]*[\0-\x7f])?\xff\xff", re.DOTALL
+)
+_LONGEST_BEGIN, _FRAME, _MARK, _END = 64, struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
 
 #: The copy: this line, the SHA-256 of what follows, the headers, and for each block its number and its bytes.
 _BEGIN = b"blocks before a checkpoint, 1\n"
@@ -75,7 +80,7 @@ def keep_blocks(path: str) -> None:
     """
     if path == ":memory:" or not _LOCKS:
         return
-    file = _own_descriptor(path)
+    file = own_descriptor(path)
     if file is None:
         return
     headers = os.pread(file, _HEADERS, 0)
@@ -151,10 +156,12 @@ def has_log(path: str) -> bool:
 
 
 def _ends_with_mark(path: str) -> bool:
-    """Whether a checkpoint is the last that a log tells; so, too, where it is of a form not known here."""
+    """Whether a checkpoint is the last that a log tells; False where it is of a form not known here."""
     with open(path + _LOG, "rb") as file:
-        if file.read(len(_LOG_BEGIN)) != _LOG_BEGIN:
-            return True
+        begin = _LOG_BEGIN.match(file.read(_LONGEST_BEGIN))
+        if begin is None:
+            return False
+        file.seek(begin.end())
         last = b""
         while len(frame := file.read(_FRAME.size)) == _FRAME.size:
             size, _ = _FRAME.unpack(frame)
@@ -325,7 +332,7 @@ def _remove(path: str) -> None:
 @contextmanager
 def _alone(path: str, *, for_writing: bool) -> Iterator[int | None]:
     """Open a file that nobody writes, or has open at all; None where somebody does, or it may not be opened."""
-    if not _LOCKS or _own_descriptor(path) is not None:
+    if not _LOCKS or own_descriptor(path) is not None:
         yield None
         return
     try:
@@ -344,7 +351,7 @@ def _alone(path: str, *, for_writing: bool) -> Iterator[int | None]:
         os.close(file)
 
 
-def _own_descriptor(path: str) -> int | None:
+def own_descriptor(path: str) -> int | None:
     """Return the descriptor under which this process has a file open; None where it has not."""
     try:
         wanted = os.stat(path)

@@ -15,10 +15,12 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.reporting import messages
 from monitor.store import (
+    CHANGES,
     AuditEntry,
     Database,
     anchored_entry,
     chain_faults,
+    check_workbook_path,
     export_tables,
     export_workbook,
     last_entries,
@@ -135,7 +137,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
 
 
 def _refuse_lake(db: Database, participle: str) -> None:
-    if not db.keeps_answers:
+    if db.is_lake:
         raise InputError(
             f"{db.path} is a lake of many plants, which is not {participle}: the chain is that of each plant's own "
             "database, and the lake can be made again from these"
@@ -314,21 +316,32 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class ExportAnswer:
-    """The files that were written."""
+    """The files that were written; ``notes`` say what a workbook lacks because it was not computed yet."""
 
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
 
 def export(db: Database, request: ExportRequest) -> ExportAnswer:
     """Write tables as files or a workbook. Raises InputError for what exists already, NotFoundError, StoreError."""
+    if request.format == "xlsx":
+        return _workbook(db, request)
     with db.reading():
-        if request.format == "xlsx":
-            file = (
-                request.folder
-                if request.folder.suffix.lower() == ".xlsx"
-                else request.folder / "monitor.xlsx"
-            )
-            return ExportAnswer((export_workbook(db, file, request.tables, request.machine),))
         return ExportAnswer(
             export_tables(db, request.folder, request.format, tables=request.tables, machine=request.machine)
         )
+
+
+def _workbook(db: Database, request: ExportRequest) -> ExportAnswer:
+    is_file = request.folder.suffix.lower() == ".xlsx"
+    file = request.folder if is_file else request.folder / "monitor.xlsx"
+    check_workbook_path(file)
+    # Loaded here: nothing else of this file computes.
+    from monitor.workflow.trend.workbook_changes import NOT_SEARCHED, workbook_changes
+
+    is_wanted = request.tables is None or CHANGES in request.tables
+    # Outside of `reading`: nobody waits for a search of years.
+    changes = workbook_changes(db, request.machine) if is_wanted else ()
+    with db.reading():
+        written = export_workbook(db, file, request.tables, request.machine, changes)
+    return ExportAnswer((written,), tuple(row.what for row in changes if row.kind == NOT_SEARCHED))
