@@ -43,13 +43,13 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
         return symbol
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
-    told = _TELLS_ITS_DIRECTION.fullmatch(axis) is not None
-    if not told and not match["location"]:
+    knows_direction = _TELLS_ITS_DIRECTION.fullmatch(axis) is not None
+    if not knows_direction and not match["location"]:
         return symbol  # the name does not say which are its roll, tilts and displacements
-    spindle = told and len(axis) > 1 and axis[0] in "ABC"
+    spindle = knows_direction and len(axis) > 1 and axis[0] in "ABC"
     named = say("terms.spindle" if spindle else "terms.axis", name=axis)
     kind = (
-        _location(match["direction"], axis if told else "", turns)
+        _location(match["direction"], axis if knows_direction else "", turns)
         if match["location"]
         else _motion(match["direction"], axis, turns, rest)
     )

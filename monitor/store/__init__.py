@@ -99,7 +99,14 @@ if TYPE_CHECKING:
         Restored as Restored,
         restore as restore,
     )
-    from monitor.store.copies.workbook import export_workbook as export_workbook
+    from monitor.store.copies.workbook import (
+        check_workbook_path as check_workbook_path,
+        export_workbook as export_workbook,
+    )
+    from monitor.store.copies.workbook_sheets import (
+        CHANGES as CHANGES,
+        ComputedChange as ComputedChange,
+    )
     from monitor.store.curves import (
         curve_names as curve_names,
         is_curve as is_curve,
@@ -225,7 +232,8 @@ else:
             "copies.increment": "take_increment",
             "copies.manifest": "Backup list_backups",
             "copies.restoring": "Restored restore",
-            "copies.workbook": "export_workbook",
+            "copies.workbook": "check_workbook_path export_workbook",
+            "copies.workbook_sheets": "CHANGES ComputedChange",
             "curves": "curve_names is_curve load_curve",
             "database_name": "check_database_name",
             "events": "NOTE MachineEvent StoredEvent list_events machine_events record_event",
