@@ -84,6 +84,18 @@ class BallMoved(Sentence):
 
 
 @dataclass(frozen=True)
+class PieceMoved(Sentence):
+    """The whole piece stands elsewhere since a probing of a run."""
+
+    size: float
+    unit: str
+    run: int
+
+    def __str__(self) -> str:
+        return f"the piece on the table moved by {self.size:.1f} {self.unit} (run {self.run})"
+
+
+@dataclass(frozen=True)
 class EventNoted(Sentence):
     """An event that people recorded."""
 

@@ -180,7 +180,7 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     moved = (
         MovedTarget(
             move.target, move.run, move.sequence, um(move.size), tuple(um(part) for part in move.shift),
-            MICROMETRE.name, move.p_value,
+            MICROMETRE.name, move.p_value, move.of_all or None,
         )
         for move in explanation.moves
     )  # fmt: skip
@@ -231,8 +231,14 @@ def _as_said(effect: MachineMissing) -> MissingEffect:
 def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: str) -> Move:
     """A change as a sentence says it."""
     stepped = isinstance(change, ChangedParameter)
-    subject = change.parameter if isinstance(change, ChangedParameter) else f"{target_word} {change.target}"
-    return Move(subject, stepped, change.size, change.unit, change.run)
+    if isinstance(change, ChangedParameter):
+        subject = change.parameter
+    elif isinstance(change, MovedTarget) and change.of_all:
+        subject = "The piece on the table"
+    else:
+        subject = f"{target_word} {change.target}"
+    sequence = change.sequence if isinstance(change, MovedTarget) else None
+    return Move(subject, stepped, change.size, change.unit, change.run, sequence)
 
 
 def _undecided(explanation: Explanation) -> tuple[str, ...]:
