@@ -33,6 +33,9 @@ GROUND = {
     "progress",
     "on_demand",
     "group_sums",
+    "moments",
+    "toml_text",
+    "topology_text",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

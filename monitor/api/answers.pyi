@@ -54,6 +54,7 @@ from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.refuted import RefutedCampaign
 from monitor.workflow.identify.answer import CurveNoise
+from monitor.workflow.instruments.answer import AgainstOthers
 from monitor.workflow.instruments.answer import Disagreement
 from monitor.workflow.instruments.answer import RunsWithTime
 from monitor.workflow.intake.importing import ImportAnswer
@@ -153,6 +154,8 @@ class TypedCompareAnswer(Answer[CompareAnswer]):
     def comparison(self) -> CurveComparison | MachineComparison: ...
     @property
     def instruments_disagree(self) -> Disagreement | None: ...
+    @property
+    def against_others(self) -> AgainstOthers | None: ...
     @property
     def run_with_time(self) -> tuple[RunsWithTime, ...] | None: ...
     @property

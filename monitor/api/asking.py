@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields
-from datetime import date, datetime, time
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from monitor.api.answer import Answer
-from monitor.exceptions import InputError, did_you_mean
+from monitor.api.arguments import argument, unknown_option
+from monitor.exceptions import InputError
 from monitor.store import Database
 from monitor.workflow.contract import QUESTIONS
 
 Typed = TypeVar("Typed")
-#: How the fields of requests that are moments are annotated.
-_MOMENTS = (datetime, datetime | None)
 #: An option of the command line in a message, such as ``--digits`` or ``-p``.
 _OPTION = re.compile(r"(?<![\w-])--?([a-z][a-z-]*)(?![\w-])")
 
@@ -28,10 +26,14 @@ class Ask:
     def __init__(self, db: Database) -> None:
         self.db = db
 
-    def __call__(self, question: str, **values: Any) -> Any:
+    def __call__(self, question: str, /, **values: Any) -> Any:
         """Return the typed answer. Raises InputError for an option that the question does not have."""
         asked = QUESTIONS[question]
         with options_as_arguments(asked.request):
+            if asked.request is None and values:
+                raise InputError(
+                    f"'{question}' has no options; there is none to give as '{next(iter(values))}'"
+                )
             arguments = [] if asked.request is None else [request_of(asked.request, values)]
             self.db.forget_campaigns()
             return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
@@ -59,36 +61,17 @@ def options_as_arguments(request: Any) -> Iterator[None]:
 
 
 def request_of(kind: Any, values: dict[str, Any]) -> Any:
-    """Return a request of a type. Raises InputError for an option that it does not have."""
+    """Return a request of a type. Raises InputError for an option that it does not have, or a value of another type."""
     names = [field.name for field in fields(kind) if field.init]
     for name in values:
         if name not in names:
-            raise InputError(
-                f"there is no option '{name}'; {did_you_mean(name, names)}there are {', '.join(names)}"
-            )
+            raise InputError(unknown_option(name, names))
     hints = get_type_hints(kind)
-    return kind(
-        **{name: _moment(name, value) if hints[name] in _MOMENTS else value for name, value in values.items()}
-    )
-
-
-def _moment(name: str, value: Any) -> Any:
-    """Return a moment with its offset: of a text, a day or a time; without an offset the time of this computer.
-
-    Raises InputError for what is none.
-    """
-    if isinstance(value, str):
-        try:
-            value = datetime.fromisoformat(value.strip())
-        except ValueError as error:
-            raise InputError(
-                f"{name}='{value}': write a day or a time, such as '2026-03-05' or '2026-03-05T07:00:00-05:00'"
-            ) from error
-    elif isinstance(value, date) and not isinstance(value, datetime):
-        value = datetime.combine(value, time())
-    if value is not None and not isinstance(value, datetime):
-        raise InputError(f"{name} is a day or a time, such as '2026-03-05', not {value!r}")
-    return value if value is None or value.tzinfo is not None else value.astimezone()
+    for field in fields(kind):
+        is_needed = field.init and field.default is MISSING and field.default_factory is MISSING
+        if is_needed and field.name not in values:
+            raise InputError(f"{field.name} is needed; there are {', '.join(names)}")
+    return kind(**{name: argument(name, value, hints[name]) for name, value in values.items()})
 
 
 # Of which answer it is says the annotation of the caller alone (``answers.pyi``), hence a variable in the result only.
@@ -97,10 +80,10 @@ def answered(content: Any) -> Typed:  # type: ignore[type-var]
     return Answer(content)  # type: ignore[return-value]
 
 
-def drawn(ask: Ask, question: str, **values: Any) -> Typed:  # type: ignore[type-var]
+def drawn(ask: Ask, question: str, /, **values: Any) -> Typed:  # type: ignore[type-var]
     """Return an ``Answer`` that can draw its pictures: the question is asked again with a folder for them."""
 
     def draw(folder: Path) -> Any:
-        return ask(question, **values, figures=folder)
+        return ask(question, **{**values, "figures": folder})
 
     return Answer(ask(question, **values), draw)  # type: ignore[return-value]

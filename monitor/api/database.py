@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import getpass
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from datetime import date
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
 from monitor import store
+from monitor.api.arguments import argument, checked
 from monitor.api.asking import Ask, answered, drawn, options_as_arguments, request_of
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
@@ -42,7 +41,7 @@ class Database:
         with suppress(OSError, KeyError):  # a container may run under a number that has no name
             actor = getpass.getuser()
         self._store = store.SharedDatabase(
-            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s)
+            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s), unstored=_warn
         )
         self._ask = Ask(self._store)
         self.path = Path(path)
@@ -59,6 +58,7 @@ class Database:
         """Close the file; other processes can open it then."""
         self._store.close()
 
+    @checked
     def add(
         self, *folders: str | Path, mapping: str | Path | None = None, **options: Any
     ) -> TypedImportAnswer:
@@ -73,8 +73,8 @@ class Database:
             raise InputError("name a campaign folder or more")
         answer = self._ask(
             "import",
-            folders=[Path(folder) for folder in folders],
-            mapping=None if mapping is None else Path(mapping),
+            folders=folders,
+            mapping=mapping,
             **options,
         )
         if answer.refused:
@@ -83,25 +83,31 @@ class Database:
             raise InputError(f"{whys}\nImported or unchanged: {imported}")
         return answered(answer)
 
+    @checked
     def machines(self) -> pd.DataFrame:
         """Return the machines, a row each: topology, manufacturer, number of campaigns, moment of the latest run."""
         return table_of(self._ask("machines"))
 
+    @checked
     def campaigns(self) -> pd.DataFrame:
         """Return the campaigns, a row each, in the order of import: machine, method, number of runs."""
         return main_table(self._ask("campaigns"))
 
+    @checked
     def campaign(self, name: str) -> Campaign:
         """Return one campaign. Raises NotFoundError with the nearest name, or those that there are."""
+        name = argument("name", name, str)
         rows = {row.campaign: row for row in self._ask("campaigns").campaigns}
         if name not in rows:
             raise NotFoundError(_no_campaign(name, list(rows)))
         return Campaign(self._ask, name, rows[name].machine, rows[name].method)
 
+    @checked
     def models(self) -> TypedModelsAnswer:
         """List the models and their versions."""
         return answered(self._ask("models"))
 
+    @checked
     def trend(self, machine: str, **options: Any) -> TypedTrendAnswer:
         """Follow the parameters of a machine: drift, changes, alarms, forecast (``TrendRequest``).
 
@@ -110,31 +116,36 @@ class Database:
         """
         return drawn(self._ask, "trend", machine=machine, **options)
 
+    @checked
     def fleet(self, **options: Any) -> TypedFleetAnswer:
         """List every machine and parameter, a row each, the most urgent first; values in the ``unit`` of the row
         (``FleetRequest``)."""
         return answered(self._ask("fleet", **options))
 
+    @checked
     def report(self, week: str | None = None, *, out: str | Path = ".", **options: Any) -> TypedReportAnswer:
         """Write the weekly health report as HTML and PDF into ``out`` (``ReportRequest``).
 
         ``week`` is an ISO 8601 week such as ``"2026-W10"``, without it the last one that has ended. Raises InputError
         for a week to come, NotFoundError for a machine or campaign that does not exist.
         """
-        return answered(self._ask("report", week=week, out=Path(out), **options))
+        return answered(self._ask("report", week=week, out=out, **options))
 
+    @checked
     def sql(self, query: str, limit: int | None = None) -> pd.DataFrame:
         """Return the rows of a query that only reads, ``limit`` at most; ``attrs["units"]`` has the unit of each column
         whose name ends in one. Raises InputError for any other query."""
         return table_of(self._ask("sql", query=query, limit=limit))
 
-    def ask(self, question: str, **options: Any) -> AnyAnswer:
+    @checked
+    def ask(self, question: str, /, **options: Any) -> AnyAnswer:
         """Ask any question of the contract by its name, such as ``ask("plan", campaign="five-days")``.
 
         Raises InputError for a question that there is not.
         """
         from monitor.workflow.contract import QUESTIONS
 
+        question = argument("question", question, str)
         if question not in QUESTIONS:
             hint = did_you_mean(question, QUESTIONS)
             raise InputError(f"there is no question '{question}'; {hint}there are {', '.join(QUESTIONS)}")
@@ -148,21 +159,30 @@ class Database:
         return f"<p>{self.path}</p>{self.campaigns()._repr_html_()}"  # type: ignore[operator]
 
 
+def _warn(why: str) -> None:
+    warnings.warn(why, stacklevel=2)
+
+
 def _no_campaign(name: str, names: Sequence[str]) -> str:
     listed = ", ".join(names) if names else "none yet: add(FOLDER) imports one"
     return f"there is no campaign '{name}'; {did_you_mean(name, names)}there are {listed}"
 
 
+@checked
 def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 300.0) -> Database:
     """Open a database file; ``new`` makes one where there is none; another process that has it is waited for.
+
+    ``read_only``: what is stored can be read, and questions that store their answer are refused.
 
     Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use for longer
     than ``wait_s``.
     """
-    path = Path(path)
-    if not new and not path.exists():
-        raise NotFoundError(f"there is no database {path}; open('{path}', new=True) makes one")
-    return Database(path, read_only=read_only, wait_s=wait_s)
+    file = argument("path", path, Path)
+    if not argument("new", new, bool) and not file.exists():
+        raise NotFoundError(f"there is no database {file}; open('{file}', new=True) makes one")
+    return Database(
+        file, read_only=argument("read_only", read_only, bool), wait_s=argument("wait_s", wait_s, float)
+    )
 
 
 @overload
@@ -182,6 +202,7 @@ def simulate(
 def simulate(
     out: str | Path, topology: None = None, *, like: None = None, **options: Any
 ) -> TypedSimulateAnswer: ...
+@checked
 def simulate(
     out: str | Path,
     topology: str | None = None,
@@ -213,14 +234,9 @@ def simulate(
         if errors is not None:
             raise InputError("errors needs topology, the machine that has them; without it there is effect")
         with options_as_arguments(simulation.SimulateRequest):
-            return answered(
-                simulation.simulate(request_of(simulation.SimulateRequest, {**options, "out": Path(out)}))
-            )
-    sizes = {
-        text: tuple(np.atleast_1d(np.asarray(size, dtype=float)).tolist())
-        for text, size in (errors or {}).items()
-    }
-    wanted = {**options, "out": Path(out), "topology": topology, "errors": sizes}
+            wanted = {**options, "out": out}
+            return answered(simulation.simulate(request_of(simulation.SimulateRequest, wanted)))
+    wanted = {**options, "out": out, "topology": topology, "errors": {} if errors is None else errors}
     with options_as_arguments(simulation.SimulateMachineRequest):
         return answered(simulation.simulate_machine(request_of(simulation.SimulateMachineRequest, wanted)))
 
@@ -229,20 +245,9 @@ def _simulated_like(out: str | Path, like: str | Path, options: dict[str, Any]) 
     """Write campaigns like that of a folder."""
     from monitor.workflow import likeness
 
-    def day(written: date | str) -> date:
-        try:
-            return written if isinstance(written, date) else date.fromisoformat(written)
-        except (TypeError, ValueError) as fault:
-            raise InputError(f"'{written}' is no day; write 2026-01-12") from fault
-
-    values = {**options, "out": Path(out), "like": str(like)}
     for name, example in (("machines", '("M1", "M2")'), ("start", '"2026-01-12"')):
-        if name not in values:
+        if name not in options:
             raise InputError(f"like needs {name}, such as {name}={example}")
-    machines = values["machines"]
-    values["machines"] = (machines,) if isinstance(machines, str) else tuple(machines)
-    values["start"] = day(values["start"])
+    values = {**options, "out": out, "like": str(argument("like", like, Path))}
     with options_as_arguments(likeness.LikeRequest):
-        values["drifts"] = tuple(likeness.Drift(*drift) for drift in values.get("drifts", ()))
-        values["events"] = tuple(likeness.Step(day(on), *step) for on, *step in values.get("events", ()))
         return answered(likeness.simulate_like(request_of(likeness.LikeRequest, values)))

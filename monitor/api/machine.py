@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from monitor.exceptions import InputError
-from monitor.records import Array, plain_topology
+from monitor.api.arguments import argument, checked
+from monitor.records import Array
+from monitor.topology_text import plain_topology
 from monitor.workflow.kinematics import PosesAnswer, PosesRequest, poses
 
 Point = tuple[float, float, float]
@@ -21,13 +20,16 @@ class Machine:
     ISO 10791-6 (docs/mathematics.md, 1). Raises InputError for a topology that cannot be read.
     """
 
+    @checked
     def __init__(self, topology: str) -> None:
         # One pose at zero: the topology is checked where it is written.
-        answer = poses(PosesRequest(topology, {_first_axis(topology): (0.0,)}))
+        typed = argument("topology", topology, str)
+        answer = poses(PosesRequest(typed, {_first_axis(typed): (0.0,)}))
         self.topology = answer.topology
         self.axes = answer.axes
         self.base = answer.base
 
+    @checked
     def deviation(
         self,
         errors: Mapping[str, float | Sequence[float]],
@@ -44,6 +46,7 @@ class Machine:
         """
         return self._poses(errors, tool, target, readings).deviation_um
 
+    @checked
     def vector(
         self,
         errors: Mapping[str, float | Sequence[float]] | None = None,
@@ -65,35 +68,21 @@ class Machine:
         target: Point,
         readings: Mapping[str, float | Sequence[float] | Array],
     ) -> PosesAnswer:
-        columns = {axis: _numbers(axis, values) for axis, values in readings.items()}
+        columns = {axis: argument(axis, values, tuple[float, ...]) for axis, values in readings.items()}
         count = max((len(values) for values in columns.values()), default=1)
-        columns = {
-            axis: np.repeat(values, count) if len(values) == 1 else values for axis, values in columns.items()
-        }
-        columns = columns or {self.axes[0]: np.zeros(1)}
+        columns = {axis: values * count if len(values) == 1 else values for axis, values in columns.items()}
         return poses(
             PosesRequest(
                 self.topology,
-                {axis: tuple(values.tolist()) for axis, values in columns.items()},
-                {text: tuple(_numbers(text, sizes).tolist()) for text, sizes in errors.items()},
-                tool,
-                target,
+                columns or {self.axes[0]: (0.0,)},
+                argument("errors", errors, Mapping[str, tuple[float, ...]]),
+                argument("tool", tool, Point),
+                argument("target", target, Point),
             )
         )
 
     def __repr__(self) -> str:
         return f"Machine('{self.topology}'): axes {', '.join(self.axes)}; errors {', '.join(self.base)}"
-
-
-def _numbers(name: str, values: object) -> Array:
-    """Return one finite number or several (n,). Raises InputError where they are none."""
-    try:
-        numbers = np.atleast_1d(np.asarray(values, dtype=float))
-        if numbers.ndim == 1 and np.isfinite(numbers).all():
-            return numbers
-    except (TypeError, ValueError):
-        pass  # said below, with all else that is no number
-    raise InputError(f"{name} is a number or several, such as 20.0 or [0.0, 100.0]; it is {values!r}")
 
 
 def _first_axis(topology: str) -> str:

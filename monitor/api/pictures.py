@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from monitor.api.arguments import argument
 from monitor.exceptions import InputError
 
 
@@ -29,16 +30,22 @@ class Pictures:
         """Return the bytes of a file. Raises InputError for a name that there is not, with those that there are."""
         try:
             return self._files[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise InputError(f"there is no picture '{name}'; there are {', '.join(self._files)}") from None
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the pictures into a folder, made where there is none; return their paths."""
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, content in self._files.items():
-            (folder / name).write_bytes(content)
-        return tuple(folder / name for name in self._files)
+        """Write the pictures into a folder, made where there is none; return their paths.
+
+        Raises InputError where it cannot be written.
+        """
+        path: Path = argument("folder", folder, Path)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            for name, content in self._files.items():
+                (path / name).write_bytes(content)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written: {error.strerror or error}") from error
+        return tuple(path / name for name in self._files)
 
     def __repr__(self) -> str:
         return f"Pictures({', '.join(self._files)})"

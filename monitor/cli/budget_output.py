@@ -94,6 +94,7 @@ def _days(answer: UncertaintyAnswer) -> None:
             output.two_digits(answer.guf.expanded[name]),
         ]
         for name in answer.parameters
+        if name in days.u_day
     ]
     columns = [
         "parameter",

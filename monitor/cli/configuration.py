@@ -11,11 +11,12 @@ import os
 import re
 import tomllib
 import zoneinfo
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import InputError, did_you_mean
+from monitor.toml_text import toml_refusal
 
 NAME = "monitor.toml"
 #: The units of angle that a screen may have.
@@ -87,12 +88,16 @@ def configuration() -> Configuration:
 def read(file: Path) -> Configuration:
     """Read a configuration. Raises InputError with every fault of the file."""
     try:
-        document = tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+        text = file.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
+    except UnicodeDecodeError as error:
         raise InputError(f"{file} is no TOML in UTF-8: {error}") from error
-    faults = [fault for key, value in document.items() if (fault := _fault(key, value, file))]
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(toml_refusal(file, error, text)) from error
+    faults = [fault for key, value in document.items() for fault in _faults(key, value, file)]
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     paths = {
@@ -104,41 +109,46 @@ def read(file: Path) -> Configuration:
     return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
 
 
-def _fault(key: str, value: object, file: Path) -> str | None:
-    """What is wrong with a key; None where nothing is."""
+def _faults(key: str, value: object, file: Path) -> Iterator[str]:
+    """Yield what is wrong with a key."""
     if key == "tolerances":
-        return _tolerances(value)
-    if key not in _CHECKS:
+        yield from _tolerances(value)
+    elif key not in _CHECKS:
         keys = (*_CHECKS, "tolerances")
-        return f"there is no key {key}; {did_you_mean(key, keys)}there are {', '.join(keys)}"
-    if not isinstance(value, str) or not value.strip():
-        return f'{key} is a text in quotes, such as {key} = "..."'
-    wrong = _CHECKS[key](value, file)
-    return f"{key} = {value!r}: {wrong}" if wrong else None
+        yield f"there is no key {key}; {did_you_mean(key, keys)}there are {', '.join(keys)}"
+    elif not isinstance(value, str) or not value.strip():
+        yield f'{key} is a text in quotes, such as {key} = "..."'
+    elif wrong := _CHECKS[key](value, file):
+        yield f"{key} = {value!r}: {wrong}"
 
 
-def _tolerances(value: object) -> str | None:
-    """What is wrong with the tolerances by machine type; None where nothing is."""
+def _tolerances(value: object) -> Iterator[str]:
+    """Yield what is wrong with the tolerances by machine type."""
     example = 'write [tolerances."TYPE"] and below it limits such as EC0Y = 20.0'
     if not isinstance(value, dict) or not all(isinstance(limits, dict) for limits in value.values()):
-        return f"tolerances are tables, one a machine type; {example}"
+        yield f"tolerances are tables, one a machine type; {example}"
+        return
     if twice := _one_type_twice(value):
-        return twice
+        yield twice
     for name, limits in value.items():
         if not limits:
-            return f'[tolerances."{name}"] states no limit; {example}'
+            yield f'[tolerances."{name}"] states no limit; {example}'
         for term, limit in limits.items():
-            if term != "volumetric" and not _TERM.fullmatch(term):
-                return (
-                    f'[tolerances."{name}"] {term}: no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, '
-                    "as an effect such as EXX:reversal, or volumetric"
-                )
-            if _EFFECT_SIGN in term and (wrong := _wrong_effect(term)):
-                return f'[tolerances."{name}"] {term}: {wrong}'
+            if wrong := _wrong_term(term):
+                yield f'[tolerances."{name}"] {term}: {wrong}'
             number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
             if not number or not 0.0 < limit < math.inf:
-                return f'[tolerances."{name}"] {term} = {limit!r}: a number above 0 in µm, µrad or µm/m'
-    return None
+                yield f'[tolerances."{name}"] {term} = {limit!r}: a number above 0 in µm, µrad or µm/m'
+
+
+def _wrong_term(term: str) -> str:
+    """Why no machine has a limit of such a name; empty where one may have."""
+    if term != "volumetric" and not _TERM.fullmatch(term):
+        return (
+            "no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, as an effect such as EXX:reversal, or "
+            "volumetric"
+        )
+    return _wrong_effect(term) if _EFFECT_SIGN in term else ""
 
 
 def _one_type_twice(types: Iterable[str]) -> str | None:

@@ -124,8 +124,12 @@ def opened_file(options: Namespace, *, threads: int | None = None, judging: bool
         if judging:
             lake.type_tolerances = configuration().tolerances or {}
         return lake
+
+    def say_unstored(why: str) -> None:
+        print(f"monitor: {why}", file=sys.stderr, flush=True)
+
     patience = Patience(options.wait, report)
-    db = SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+    db = SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience, unstored=say_unstored)
     if judging:
         db.type_tolerances = configuration().tolerances or {}
     return db

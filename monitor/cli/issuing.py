@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from datetime import date
 from pathlib import Path
@@ -15,6 +14,7 @@ from monitor.cli.configuration import configuration
 from monitor.cli.parser import add_model
 from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
+from monitor.moments import day_of
 from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
@@ -110,12 +110,9 @@ def add_fonts(parser: ArgumentParser) -> None:
 
 def _day(text: str) -> date:
     try:
-        # strptime would take 2026-3-2, fromisoformat 20260302 and 2026-W10-1: what a reader may take for another day.
-        if re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text) is None:
-            raise ValueError(text)
-        return date.fromisoformat(text)
-    except ValueError as error:
-        raise ArgumentTypeError(f"'{text}' is no day; write it as 2026-03-02") from error
+        return day_of(text, f"'{text}' is no day")
+    except InputError as error:
+        raise ArgumentTypeError(str(error)) from error
 
 
 def _accepted(text: str) -> tuple[GroundKind, str]:

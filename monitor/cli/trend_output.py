@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
-from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
+from monitor.cli.day_output import resemblance
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
-from monitor.workflow.history.season import Season, SlopeVerdict
+from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
     ConditionEffect,
     Cycle,
     DatedChange,
-    DriftStatement,
     ParameterTrend,
     StepAtEvent,
     TrendAnswer,
@@ -56,6 +55,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
         yield from out_of_tolerance(name, parameter)
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
+        yield from _settled(name, parameter)
         yield from (_event_step(name, step) for step in parameter.event_steps)
     few = [
         change.days for _, parameter in parameters for change in parameter.changes if change.days < FEW_DAYS
@@ -72,7 +72,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _volumetric(answer.volumetric_error, latest)
     yield from _next_check(answer)
     yield from _backtest(answer)
-    yield from _resemblance(answer)
+    yield from resemblance(answer)
     yield from dict.fromkeys(str(parameter.drift.why) for _, parameter in parameters if parameter.drift.why)
     if answer.weekly_looks is not None:
         yield from weekly_lines(answer.weekly_looks)
@@ -180,8 +180,19 @@ def _with_u(value: float, u: float, unit: str) -> str:
 def _change(name: str, change: DatedChange) -> str:
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, p = {output.probability(change.p_value)})"
+        f"({_interval(change.interval)}, {output.stated('p', change.p_value)})"
     )
+
+
+def _settled(name: str, parameter: ParameterTrend) -> Iterator[str]:
+    """The sentence of the weekly report on each change that passes again, with the time and the probability."""
+    for change in parameter.drifts:
+        if change.time_constant_days is not None:
+            # Loaded here, as below.
+            from monitor.reporting.health.settling import ParameterSettled
+
+            what = ParameterSettled(name, change.size, change.u, change.unit, change.time_constant_days)
+            yield f"from {_minute(change.at)} on: {what}; {output.stated('p', change.p_value)}"
 
 
 def _event_step(name: str, step: StepAtEvent) -> str:
@@ -192,7 +203,7 @@ def _event_step(name: str, step: StepAtEvent) -> str:
     what = SteppedAtEvent(
         name, step.description, step.size, step.u, step.unit, step.why_not_decided, step.drift_in_30_days
     )
-    p_value = f" (p = {output.probability(step.p_value)})" if step.decided else ""
+    p_value = f" ({output.stated('p', step.p_value)})" if step.decided else ""
     return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"
 
 
@@ -341,63 +352,6 @@ def _next_check(answer: TrendAnswer) -> Iterator[str]:
     span = first.drift.span_days
     if intervals[name] >= span:
         yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is an assumption"
-
-
-#: Blocks of days up to which nothing is known of how far days resemble each other.
-_FEW_BLOCKS = 5
-#: From this ratio on it is said that days differ, and from this factor that an interval is wider.
-_DAYS_DIFFER, _WIDER = 0.5, 1.1
-
-
-def _resemblance(answer: TrendAnswer) -> Iterator[str]:
-    """What the intervals of the slopes assume of days that differ and that resemble each other, and of the year."""
-    stated = {
-        name: parameter.drift for name, parameter in answer.parameters.items() if parameter.drift.resemblance
-    }
-    allowed = {name: drift.resemblance for name, drift in stated.items() if drift.resemblance is not None}
-    if not allowed:
-        return
-    ratios = {
-        name: drift.between_days / drift.within_days
-        for name, drift in stated.items()
-        if drift.between_days and drift.within_days
-    }
-    name = max(ratios, key=lambda parameter: ratios[parameter], default="")
-    if name and ratios[name] > _DAYS_DIFFER:
-        yield f"{name}: days differ by {ratios[name]:.2g} times the scatter of a run; allowed for"
-    name = max(allowed, key=lambda parameter: allowed[parameter].widening)
-    widest = allowed[name]
-    if widest.blocks <= _FEW_BLOCKS:
-        yield (
-            f"{widest.blocks} days cannot tell how far days resemble each other, nor a drift from days that differ: "
-            f"the intervals of the slopes are up to {widest.widening:.2g} times as wide as with independent days"
-        )
-    elif widest.widening > _WIDER:
-        yield (
-            f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
-            f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
-        )
-    yield from _seasons(stated)
-
-
-def _seasons(stated: Mapping[str, DriftStatement]) -> Iterator[str]:
-    """Yield what answers for the season beside the slopes, and which of them may be nothing else."""
-    names = dict.fromkeys(drift.temperature for drift in stated.values() if drift.temperature)
-    if names:
-        yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
-    unsure = [name for name, drift in stated.items() if drift.verdict is SlopeVerdict.DRIFT_OR_SEASON]
-    if unsure:
-        moves = ", ".join(f"{name} {_direction(stated[name])}" for name in unsure)
-        yield f"{moves}; {DRIFT_OR_SEASON}"
-    seasons = {drift.season for drift in stated.values()}
-    if Season.NOT_TOLD in seasons:
-        yield SEASON_NOT_TOLD
-    if Season.ALLOWED_FOR in seasons:
-        yield "what goes up and down with the year is allowed for beside the slopes"
-
-
-def _direction(drift: DriftStatement) -> str:
-    return "rises" if (drift.slope_per_year or 0.0) > 0.0 else "falls"
 
 
 def _backtest(answer: TrendAnswer) -> Iterator[str]:

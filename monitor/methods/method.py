@@ -181,6 +181,35 @@ class SharesOf(Protocol):
 
 
 @dataclass(frozen=True)
+class Contrast:
+    """What the ``setups`` of one instrument, one of them, or what several have in common that is known beforehand, say
+    against all others of a run, by ``name``.
+
+    They can differ in so many ``directions``, do by ``size`` (root of the mean square in standard uncertainties), and
+    chance alone makes ``p`` as much; ``freedom`` are the degrees of freedom of the scatter, infinite where it is as
+    stated. ``others_p`` is how often at most chance makes the others contradict each other as they do without it.
+    """
+
+    name: str
+    setups: tuple[str, ...]
+    directions: int
+    size: float
+    freedom: float
+    p: float
+    others_p: float
+
+
+@dataclass(frozen=True)
+class SetupScatter:
+    """The readings of a ``setup``, fitted by themselves, scatter ``times`` what it states; chance alone leaves ``p`` as
+    little."""
+
+    setup: str
+    times: float
+    p: float
+
+
+@dataclass(frozen=True)
 class SetupDrift:
     """What a ``number`` of a ``setup`` ran off from its first row of a ``run`` to its last, beside what a fit knows.
 
@@ -199,10 +228,13 @@ class SetupDrift:
 
 @dataclass(frozen=True)
 class Instruments(Able):
-    """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``drifts`` which of
-    their setups run off with the time."""
+    """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``contrasts`` what
+    each setup says against all others, ``scatters`` what its readings scatter, ``drifts`` which setups run off with the
+    time."""
 
     shares: SharesOf
+    contrasts: Callable[[ChainProblem, Solution, int], tuple[Contrast, ...]]
+    scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]
 
 

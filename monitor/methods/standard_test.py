@@ -114,13 +114,16 @@ class PartPath:
 @dataclass(frozen=True)
 class PartTest:
     """A part that the machine cut in one ``run``, measured by the instrument of ``setup``: ``features`` and ``paths``
-    in the order of cutting, ``u_reading`` mm of one coordinate."""
+    in the order of cutting, ``u_reading`` mm of one coordinate; ``short`` are the points of paths that have too few, by
+    name, and ``needed`` how many a line, a circle and any other path need."""
 
     setup: str
     run: int
     features: tuple[PartFeature, ...]
     paths: tuple[PartPath, ...]
     u_reading: float
+    short: Mapping[str, int]
+    needed: tuple[int, int, int]
 
 
 StandardTestRows = AxisTest | CircleTest | RotationTest | InterpolationTest | PartTest

@@ -43,6 +43,8 @@ class Head:
     sources: tuple[Source, ...] = ()
 
 
+#: Columns of runs.csv and probings.csv that every method needs.
+_OF_ALL_METHODS = (*runs_file.PLAN, *probings_file.FIRST[:-1])
 EMPTY = Head(None, None, None, MachinePart(None, None, {}), None, None, None)
 
 
@@ -55,8 +57,20 @@ class Parts:
 
 
 def read_parts(head: Head, runs_table: CsvTable | None, table: CsvTable | None, faults: Faults) -> Parts:
-    """Read runs and probings, and judge them by the rules of the method."""
-    ambient = head.rules is None or (head.rules.needs_ambient and not head.rules.needs_setups)
+    """Read runs and probings, and judge them by the rules of the method.
+
+    Where the method is not known, nothing is said of columns that one method has and another has not.
+    """
+    if head.rules is None:
+        noted = Faults(())
+        parts = _read_parts(head, runs_table, table, noted)
+        faults.extend(fault for fault in noted.sorted() if fault.line != 1 or fault.column in _OF_ALL_METHODS)
+        return parts
+    return _read_parts(head, runs_table, table, faults)
+
+
+def _read_parts(head: Head, runs_table: CsvTable | None, table: CsvTable | None, faults: Faults) -> Parts:
+    ambient = head.rules is not None and head.rules.needs_ambient and not head.rules.needs_setups
     runs = None if runs_table is None else runs_file.read_runs(runs_table, faults, ambient=ambient)
     part = None
     if table is not None:
@@ -94,7 +108,10 @@ def read_head(top: Table) -> Head:
     rules = _rules(top, method)
     machine = read_machine(top)
     has_setups = rules is not None and rules.needs_setups
-    probe = read_probe(top, required=not has_setups)
+    # Without a method nobody knows whether the folder needs a probe or may have setups.
+    probe = read_probe(top, required=rules is not None and not has_setups)
+    if rules is None:
+        top.tables("setups")
     artefact, balls = read_artefact(top)
     fits = _artefact_fits(top, artefact, rules)
     sources = read_sources(top, machine.axes)
@@ -138,16 +155,16 @@ def _refuse_other_format(top: Table) -> None:
 
 
 def _rules(top: Table, method: str | None) -> MethodRules | None:
+    """Return the rules of a method; of one that there is not those of the nearest name, by which the rest is judged."""
     if method is None:
         return None
     rules = method_rules()
-    if method not in rules:
-        names = [*rules, CURVE]
-        top.fault(
-            "method",
-            f"method {quoted(method)} is not known; {did_you_mean(method, names)}the methods are {one_of(names)}",
-        )
-    return rules.get(method)
+    if method in rules:
+        return rules[method]
+    names = [*rules, CURVE]
+    hint = did_you_mean(method, names)
+    top.fault("method", f"method {quoted(method)} is not known; {hint}the methods are {one_of(names)}")
+    return next((rules[name] for name in rules if f"'{name}'" in hint), None)
 
 
 def _artefact_fits(top: Table, artefact: Artefact | None, rules: MethodRules | None) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
@@ -46,6 +47,8 @@ def _machine(machine: Machine) -> Iterator[str]:
             yield f"{key} = {_text(value)}"
     if not machine.chain:
         yield f"topology = {_text(machine.topology)}"
+    if machine.virtual:
+        yield "virtual = true"
     if machine.gravity is not None:
         yield f"gravity = {_numbers(machine.gravity)}"
     for placed in machine.chain:
@@ -112,30 +115,31 @@ def _is_derived(campaign: Campaign) -> bool:
     return bool(setups) and campaign.probe == probe_of(setups, campaign.probings)
 
 
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
 def _setup(setup: Setup) -> Iterator[str]:
     form = FORMATS[setup.reading]
     yield from ("", "[[setups]]", f"id = {_text(setup.id)}", f"reading = {_text(setup.reading)}")
     if setup.instrument is not None:
         yield f"instrument = {_text(setup.instrument)}"
     unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
-    if setup.standard_uncertainty is not None:
-        yield f"standard_uncertainty_{name} = {decimal_in(unit)(setup.standard_uncertainty)}"
-    if setup.drift_uncertainty is not None:
-        yield f"drift_standard_uncertainty_{name} = {decimal_in(unit)(setup.drift_uncertainty)}"
-    if setup.turn_uncertainty is not None:
-        yield f"standard_uncertainty_urad = {decimal_in(MICRORADIAN)(setup.turn_uncertainty)}"
-    yield f"tool_point_mm = {_numbers(setup.tool_point)}"
-    yield f"work_point_mm = {_numbers(setup.work_point)}"
-    if setup.direction is not None:
-        yield f"direction = {_numbers(setup.direction)}"
-    if setup.tool_direction is not None:
-        yield f"tool_direction = {_numbers(setup.tool_direction)}"
-    if setup.length is not None:
-        yield f"length_mm = {float(setup.length)!r}"
-    if setup.length_uncertainty is not None:
-        yield f"length_standard_uncertainty_um = {decimal_in(MICROMETRE)(setup.length_uncertainty)}"
-    if setup.direction_uncertainty is not None:
-        yield f"direction_standard_uncertainty_urad = {decimal_in(MICRORADIAN)(setup.direction_uncertainty)}"
+    urad, um = decimal_in(MICRORADIAN), decimal_in(MICROMETRE)
+    keys: tuple[tuple[str, Any, Callable[[Any], str]], ...] = (
+        (f"standard_uncertainty_{name}", setup.standard_uncertainty, decimal_in(unit)),
+        (f"drift_standard_uncertainty_{name}", setup.drift_uncertainty, decimal_in(unit)),
+        ("standard_uncertainty_urad", setup.turn_uncertainty, urad),
+        ("tool_point_mm", setup.tool_point, _numbers),
+        ("tool_point_standard_uncertainty_mm", setup.tool_point_uncertainty, _number),
+        ("work_point_mm", setup.work_point, _numbers),
+        ("direction", setup.direction, _numbers),
+        ("tool_direction", setup.tool_direction, _numbers),
+        ("length_mm", setup.length, _number),
+        ("length_standard_uncertainty_um", setup.length_uncertainty, um),
+        ("direction_standard_uncertainty_urad", setup.direction_uncertainty, urad),
+    )
+    yield from (f"{key} = {write(value)}" for key, value, write in keys if value is not None)
     if setup.along is not None:
         yield f"along = {_text(setup.along)}"
     yield from (f"{key} = {_text(getattr(setup, key))}" for key in ("side", "frame") if key in form.allows)

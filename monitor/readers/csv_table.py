@@ -44,7 +44,7 @@ def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
     if is_cut(text):
         faults.add(file, text.count("\n") + 1, None, CUT)
         return None
-    lines = plain_csv(text).split("\n")
+    lines = plain_csv(file, text, faults).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)

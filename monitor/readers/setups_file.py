@@ -24,6 +24,7 @@ LARGEST_URAD = 1e5
 _LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
 _DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
 _DRIFT_UNCERTAINTY = "drift_standard_uncertainty"
+_TOOL_UNCERTAINTY = "tool_point_standard_uncertainty_mm"
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -49,15 +50,21 @@ ONE_LENGTH, ONE_ANGLE = ("reading_um",), ("reading_urad",)
 POINTS = ("point_x_mm", "point_y_mm", "point_z_mm")
 QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
-    "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), holdable=("work_point",)),
-    "component": ReadingFormat(ONE_LENGTH, needs=("direction",), holdable=("zero",)),
+    "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame", _TOOL_UNCERTAINTY), holdable=("work_point",)),
+    "component": ReadingFormat(
+        ONE_LENGTH, needs=("direction",), allows=(_TOOL_UNCERTAINTY,), holdable=("zero",)
+    ),
     "distance": ReadingFormat(
-        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY,), holdable=("work_point", "length")
+        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY, _TOOL_UNCERTAINTY),
+        holdable=("work_point", "length"),
     ),
     "displacement": ReadingFormat(
-        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY,), holdable=("direction",)
+        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY, _TOOL_UNCERTAINTY),
+        holdable=("direction",),
     ),
-    "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), holdable=("zero", "slope")),
+    "offset": ReadingFormat(
+        ONE_LENGTH, needs=("direction", "along"), allows=(_TOOL_UNCERTAINTY,), holdable=("zero", "slope")
+    ),
     "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), holdable=("zero",)),
     "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), holdable=("zero",)),
     "direction": ReadingFormat(
@@ -115,9 +122,7 @@ def _setup(table: Table) -> Setup | None:
         else None,
         length=_length(table) if "length_mm" in form.needs else None,
         length_uncertainty=_length_uncertainty(table) if _LENGTH_UNCERTAINTY in form.allows else None,
-        direction_uncertainty=_direction_uncertainty(table)
-        if _DIRECTION_UNCERTAINTY in form.allows
-        else None,
+        direction_uncertainty=_direction_uncertainty(table, form),
         along=table.text("along", required=True, example='"X"') if "along" in form.needs else None,
         side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
@@ -125,6 +130,7 @@ def _setup(table: Table) -> Setup | None:
         turn_uncertainty=_stated(table, "urad") if form.turns else None,
         certificate=table.text("certificate"),
         drift_uncertainty=_drift(table, form),
+        tool_point_uncertainty=_tool_uncertainty(table, form),
     )
     table.finish()
     return None if len(table.faults) > before else setup
@@ -196,12 +202,21 @@ def _length_uncertainty(table: Table) -> float | None:
     return None if value is None else MICROMETRE.to_internal(value)
 
 
-def _direction_uncertainty(table: Table) -> float | None:
+def _direction_uncertainty(table: Table, form: ReadingFormat) -> float | None:
     """Return the standard uncertainty of a beam's direction in rad; None where it is not stated."""
+    if _DIRECTION_UNCERTAINTY not in form.allows:
+        return None
     value = table.number(
         _DIRECTION_UNCERTAINTY, positive=True, largest=LARGEST_URAD, unit="urad", example="200.0"
     )
     return None if value is None else MICRORADIAN.to_internal(value)
+
+
+def _tool_uncertainty(table: Table, form: ReadingFormat) -> float | None:
+    """Return the standard uncertainty of each coordinate of the tool point in mm; None where it is as stated."""
+    if _TOOL_UNCERTAINTY not in form.allows:
+        return None
+    return table.number(_TOOL_UNCERTAINTY, positive=True, largest=FARTHEST_MM, unit="mm", example="1.0")
 
 
 def _unit(table: Table, key: str, *, required: bool = True) -> Vector | None:

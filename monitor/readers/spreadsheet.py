@@ -1,7 +1,8 @@
 """Tables as a spreadsheet saves them, workbooks and CSV with semicolons and decimal commas, made plain CSV.
 
-A German Excel writes ``1,5;WAHR``. Cells may have a decimal comma there, because the comma separates nothing; a table
-that has decimal points as well is left as it is, since then nobody can know what its commas mean.
+A German Excel writes ``1,5;WAHR``. Cells may have a decimal comma there, because the comma separates nothing. In a
+table that has decimal points as well the rarer mark is the slip, and its cells are refused; where both are as frequent,
+nobody can know what the commas mean.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import io
 import re
 import warnings
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime
@@ -18,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import Fault
-from monitor.readers.faults import Faults
+from monitor.readers.faults import Faults, quoted
 from monitor.readers.files import LARGEST_CSV, decode, read_bytes
 from monitor.records import SourceFile
 
@@ -29,6 +31,8 @@ _POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
 _TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
 #: Unpacked, a workbook of a million rows has some 200 MiB; what is larger is an attack on memory.
 UNPACKED_BYTES = 512 * 2**20
+#: What zipfile and openpyxl raise for a file that is no workbook, or a damaged one.
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, KeyError, ValueError, OSError, SyntaxError)
 #: Columns of true and false.
 _OF_TRUTHS = ("warm_up",)
 
@@ -40,7 +44,15 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
     in two files, of which one is older.
     """
     stem = name.removesuffix(".csv")
-    holding = [file for file in (name, f"{stem}.xlsx", WORKBOOK) if _may_hold(folder / file, stem)]
+    sheets = _sheets_of(folder / WORKBOOK)
+    if sheets is None and (folder / name).is_file():
+        faults.add(
+            WORKBOOK, None, None,
+            "this is no workbook of Excel (.xlsx) that can be read; take it away, or save it anew and take away "
+            f"{name}",
+        )  # fmt: skip
+    holding = [file for file in (name, f"{stem}.xlsx") if (folder / file).is_file()]
+    holding += [WORKBOOK] if sheets is not None and stem in sheets else []
     if len(holding) > 1:
         faults.add(
             name,
@@ -62,16 +74,17 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
     return SourceFile(book or name, content), text
 
 
-def _may_hold(path: Path, stem: str) -> bool:
-    """Whether a file is there that holds a table: the workbook of all tables only where a sheet has its name."""
-    if path.name != WORKBOOK:
-        return path.is_file()
+def _sheets_of(path: Path) -> list[str] | None:
+    """The names of the sheets of the workbook of all tables in small letters, none where there is no such file; None
+    where it is no workbook."""
+    if not path.is_file():
+        return []
     try:
         with zipfile.ZipFile(path) as packed, packed.open("xl/workbook.xml") as listed:
-            sheets = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', listed.read(2**20))
-    except (zipfile.BadZipFile, KeyError, ValueError, OSError, NotImplementedError, RuntimeError):
-        return False  # said where a table is read from it
-    return stem.encode() in [sheet.lower() for sheet in sheets]
+            names = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', listed.read(2**20))
+    except (*_UNREADABLE, NotImplementedError, RuntimeError):
+        return None
+    return [name.decode("utf-8", "replace").lower() for name in names]
 
 
 def renamed(faults: Iterable[Fault], files: Mapping[str, str]) -> list[Fault]:
@@ -85,8 +98,11 @@ def _renamed(fault: Fault, file: str) -> Fault:
     return replace(fault, file=file, sheet=sheet)
 
 
-def plain_csv(text: str) -> str:
-    """Return a table that is separated by semicolons or tabs as plain CSV with the same lines; any other as it is."""
+def plain_csv(file: str, text: str, faults: Faults) -> str:
+    """Return a table that is separated by semicolons or tabs as plain CSV with the same lines; any other as it is.
+
+    A decimal point among more decimal commas is noted.
+    """
     header = text.partition("\n")[0]
     mark = next((mark for mark in ";\t" if mark in header and "," not in header), None)
     if mark is None:
@@ -96,19 +112,34 @@ def plain_csv(text: str) -> str:
         rows = [next(csv.reader([line.rstrip("\r")], delimiter=mark, strict=True), []) for line in lines]
     except csv.Error:
         return text
-    return _written(_with_points(rows))
+    points = sum(_POINT.fullmatch(cell) is not None for row in rows[1:] for cell in row)
+    commas = sum(_COMMA.fullmatch(cell) is not None for row in rows[1:] for cell in row)
+    if commas > points > 0:
+        _note_points(file, rows, faults)
+    return _written(_with_points(rows, of_commas=commas > points))
 
 
-def _with_points(rows: Sequence[list[str]]) -> Iterable[list[str]]:
-    """Yield the rows with decimal points, where no cell has one, and with true and false in their column."""
-    body = rows[1:]
-    commas = not any(_POINT.fullmatch(cell) for row in body for cell in row)
+def _note_points(file: str, rows: Sequence[list[str]], faults: Faults) -> None:
+    """Note every cell with a decimal point of a table with decimal commas."""
+    for line, row in enumerate(rows[1:], start=2):
+        for index, cell in enumerate(row):
+            if _POINT.fullmatch(cell):
+                column = rows[0][index] if index < len(rows[0]) else None
+                comma = quoted(cell.replace(".", ","))
+                faults.add(
+                    file, line, column,
+                    f"{quoted(cell)} has a decimal point in a table of decimal commas; write {comma}",
+                )  # fmt: skip
+
+
+def _with_points(rows: Sequence[list[str]], *, of_commas: bool) -> Iterable[list[str]]:
+    """Yield the rows with decimal points in place of commas, and with true and false in their column."""
     truths = {index for index, name in enumerate(rows[0]) if name in _OF_TRUTHS}
     yield rows[0]
-    for row in body:
+    for row in rows[1:]:
         yield [
             _TRUTHS.get(cell, cell) if index in truths
-            else cell.replace(",", ".") if commas and _COMMA.fullmatch(cell)
+            else cell.replace(",", ".") if of_commas and _COMMA.fullmatch(cell)
             else cell
             for index, cell in enumerate(row)
         ]  # fmt: skip
@@ -167,10 +198,8 @@ def sheet_rows(
             # What openpyxl does not keep (drop-down lists, colours) is not read either.
             warnings.simplefilter("ignore")
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-    except (zipfile.BadZipFile, KeyError, ValueError, OSError, SyntaxError) as error:
-        faults.add(
-            file, None, None, f"this is no workbook of Excel (.xlsx) that can be read: {str(error)[:100]}"
-        )
+    except _UNREADABLE as error:
+        _note_no_workbook(file, error, faults)
         return None
     names = {name.casefold(): name for name in book.sheetnames}
     first = book.sheetnames[0] if book.sheetnames else None
@@ -184,7 +213,15 @@ def sheet_rows(
             f"there is no sheet '{sheet}'; name the sheet of that table so; there are {listed}",
         )
         return None
-    return [[_cell(value) for value in row] for row in book[title].iter_rows(values_only=True)]
+    try:
+        return [[_cell(value) for value in row] for row in book[title].iter_rows(values_only=True)]
+    except _UNREADABLE as error:  # a damaged sheet of a workbook that is whole elsewhere
+        _note_no_workbook(file, error, faults)
+        return None
+
+
+def _note_no_workbook(file: str, error: Exception, faults: Faults) -> None:
+    faults.add(file, None, None, f"this is no workbook of Excel (.xlsx) that can be read: {str(error)[:100]}")
 
 
 def _cell(value: Any) -> str:

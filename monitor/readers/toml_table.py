@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import tomllib
 from collections.abc import Iterable
 from typing import Any
@@ -11,11 +10,10 @@ from typing import Any
 from monitor.exceptions import did_you_mean
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.toml_lines import Path, line_of, lines_of_keys
+from monitor.toml_text import toml_fault
 
 #: Longest name or text that a key may hold.
 LONGEST_TEXT = 200
-#: What the parser's message ends in.
-PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 class Table:
@@ -103,6 +101,13 @@ class Table:
             return None
         return value
 
+    def truth(self, key: str) -> bool:
+        """Return true or false; false where the key is absent."""
+        value = self.raw(key, required=False, example="true")
+        if value is not None and not isinstance(value, bool):
+            self.fault(key, f"{quoted(value)} is neither true nor false; write {key} = true, or leave it out")
+        return value is True
+
     def table(self, key: str, *, required: bool = False) -> Table | None:
         """Return the table under a key."""
         self._asked_for.append(key)
@@ -166,13 +171,8 @@ def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
     except RecursionError:
         faults.add(file, None, None, "the brackets are nested too deeply for a campaign file")
     except ValueError as error:
-        message = str(error)
-        match = PLACE.search(message)
-        line = int(match[1]) if match and match[1] else text.count("\n") + 1 if match else None
-        reason = message[: match.start()] if match else message
-        reason = reason if reason.isprintable() else reason.encode("ascii", "backslashreplace").decode()
-        where = f" at character {match[2]}" if match and match[2] else ""
-        faults.add(file, line, None, f"this is not TOML{where}: {reason[:200]}")
+        line, reason = toml_fault(error, text)
+        faults.add(file, line, None, reason)
     else:
         return Table(file, faults, content, lines_of_keys(text))
     return None

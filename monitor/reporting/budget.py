@@ -125,6 +125,8 @@ _LINES = {
     "calibrated quantities": "calibrated",
     "lack of fit of the model": "lack_of_fit",
     "between days": "between_days",
+    "readings of the other runs": "other_runs",
+    "scatter of the added effects": "effects_scatter",
 }
 
 

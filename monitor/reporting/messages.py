@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -287,6 +287,12 @@ def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
     )
 
 
+def lacks_campaigns(sheets: Sequence[str], campaigns: Sequence[str]) -> str:
+    """Return which campaigns the sheets of a workbook do not hold, because they are not identified yet."""
+    named = ", ".join(campaigns[:8]) + (f" and {len(campaigns) - 8} more" if len(campaigns) > 8 else "")
+    return f"{', '.join(sheets)}: without {named}, not identified yet; type `monitor identify`"
+
+
 def no_identified_run(machine: str, campaigns: Sequence[str], since: datetime | None) -> str:
     """Return that a trend has no run."""
     when = "yet" if since is None else f"since {since:%Y-%m-%d}"
@@ -308,3 +314,26 @@ def may_still_be_copied(seconds: float) -> str:
 def arrival_refused(folder: object) -> str:
     """Return that a folder was refused."""
     return f"refused, and left where it is: {folder}"
+
+
+#: What the kinds of change are, for whoever reads a table of them.
+_CHANGES = {
+    "step": "the values step here",
+    "slope": "the values bend here: size is the change of the slope",
+    "trend": "the values drift from here on: size is the slope",
+    "transient": "the values begin off by size and settle, as of warming up or running in",
+}
+
+
+def change_in_words(kind: str) -> str:
+    """Return what a kind of change is, and where it was computed."""
+    return f"{_CHANGES[kind]}; computed from the runs, as `monitor trend` does"
+
+
+def no_change(parameters: int, whys: Collection[str]) -> str:
+    """Return that a search of so many parameters has no change, or the reasons why nothing was searched."""
+    if not parameters:
+        return "no run of this machine has parameters"
+    if whys:
+        return "; ".join(sorted(whys))
+    return f"no change of any of {parameters} parameters beyond chance"

@@ -113,6 +113,25 @@ class NoProfile(Sentence):
 
 
 @dataclass(frozen=True)
+class FewPoints(Sentence):
+    """Paths of a part with fewer points than a figure needs: ``of_line`` on a straight path, ``of_circle`` on a circle,
+    ``of_path`` on any other."""
+
+    elements: tuple[str, ...]
+    points: tuple[int, ...]
+    of_line: int
+    of_circle: int
+    of_path: int
+
+    def __str__(self) -> str:
+        named = ", ".join(f"{name} ({count})" for name, count in zip(self.elements, self.points, strict=True))
+        return (
+            f"{named}: too few points for a figure: a straight path needs {self.of_line}, a circle {self.of_circle} "
+            f"over half a turn or more, any other path {self.of_path}"
+        )
+
+
+@dataclass(frozen=True)
 class OneRevolution(Sentence):
     """Some angle of an axis of rotation was read once."""
 

@@ -18,10 +18,11 @@ _DIRECTIONS = {
 #: An error of a table at a node, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
-#: ``J2`` is a joint of a robot: the name does not say along which direction its axis lies.
+#: ``J2`` is a joint of a robot, ``DEC`` an axis of a mount: such names do not say along which direction an axis lies.
 _SYMBOL = re.compile(
-    r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+)(?::(?P<rest>.+))?"
+    r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+|[A-Z]{2,}\d*)(?::(?P<rest>.+))?"
 )
+_TELLS_ITS_DIRECTION = re.compile(r"[XYZUVWABC]\d*")
 
 
 def describe(symbol: str, texts: Texts | None = None) -> str:
@@ -42,12 +43,13 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
         return symbol
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
-    if axis[0] == "J" and not match["location"]:
+    knows_direction = _TELLS_ITS_DIRECTION.fullmatch(axis) is not None
+    if not knows_direction and not match["location"]:
         return symbol  # the name does not say which are its roll, tilts and displacements
-    spindle = len(axis) > 1 and axis[0] in "ABC"
+    spindle = knows_direction and len(axis) > 1 and axis[0] in "ABC"
     named = say("terms.spindle" if spindle else "terms.axis", name=axis)
     kind = (
-        _location(match["direction"], axis, turns)
+        _location(match["direction"], axis if knows_direction else "", turns)
         if match["location"]
         else _motion(match["direction"], axis, turns, rest)
     )
@@ -58,7 +60,7 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
 def _location(direction: str, axis: str, turns: bool) -> str:
     if not turns:
         return "position"
-    return "zero_angle" if direction == axis[0] else "orientation"
+    return "zero_angle" if direction == axis[:1] else "orientation"
 
 
 def _motion(direction: str, axis: str, turns: bool, rest: str | None) -> str:

@@ -30,7 +30,8 @@ class Change:
 
     ``at`` is the time of run ``index``, ``interval`` the times between which the change lies; ``size`` is a
     step or a transient's amplitude in the unit of the values, or a (change of) slope per unit of time;
-    ``p_value`` is that of the search.
+    ``p_value`` is that of the search. ``time_constant`` is that of a transient, in the unit of the times: the best of
+    those that were tried (``scan_candidates.DECAYS``), else None.
     """
 
     parameter: str
@@ -41,6 +42,7 @@ class Change:
     size: float
     u: float
     p_value: float
+    time_constant: float | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,8 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
         size,
         u,
         best.p_value,
+        # The column of a decay is 1 at the first run and exp(-span / time constant) at the last.
+        -float(np.ptp(series.t)) / float(np.log(best.column[-1])) if best.kind == "transient" else None,
     )
 
 

@@ -99,7 +99,14 @@ if TYPE_CHECKING:
         Restored as Restored,
         restore as restore,
     )
-    from monitor.store.copies.workbook import export_workbook as export_workbook
+    from monitor.store.copies.workbook import (
+        check_workbook_path as check_workbook_path,
+        export_workbook as export_workbook,
+    )
+    from monitor.store.copies.workbook_sheets import (
+        CHANGES as CHANGES,
+        ComputedChange as ComputedChange,
+    )
     from monitor.store.curves import (
         curve_names as curve_names,
         is_curve as is_curve,
@@ -193,6 +200,7 @@ if TYPE_CHECKING:
     from monitor.store.turns import (
         Holder as Holder,
         Patience as Patience,
+        activity as activity,
     )
     from monitor.store.type_tolerances import type_in_use as type_in_use
     from monitor.store.verification import (
@@ -224,7 +232,8 @@ else:
             "copies.increment": "take_increment",
             "copies.manifest": "Backup list_backups",
             "copies.restoring": "Restored restore",
-            "copies.workbook": "export_workbook",
+            "copies.workbook": "check_workbook_path export_workbook",
+            "copies.workbook_sheets": "CHANGES ComputedChange",
             "curves": "curve_names is_curve load_curve",
             "database_name": "check_database_name",
             "events": "NOTE MachineEvent StoredEvent list_events machine_events record_event",
@@ -245,7 +254,7 @@ else:
             "selections": "SelectionRow StoredSelection find_selection list_selections save_selection",
             "sharing": "SharedDatabase one_at_a_time",
             "sql": "QueryResult campaign_readings column_comments list_machines run_query",
-            "turns": "Holder Patience",
+            "turns": "Holder Patience activity",
             "type_tolerances": "type_in_use",
             "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",

@@ -79,7 +79,7 @@ def save_analysis(
     latest: LatestText | None = None,
     **subject: Unpack[Subject],
 ) -> int:
-    """Store a result; its number, below zero where the database keeps none (a lake).
+    """Store a result; its number, below zero where the database keeps none (a lake, a file that may not be written).
 
     ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend. ``action`` stands in the audit.
     Not ``repeated``: a result that is the latest of its kind and subject already, to the last letter, is not stored
@@ -96,14 +96,14 @@ def save_analysis(
         text = json.dumps(document, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as fault:
         raise DataError(f"the {kind} result cannot be kept as JSON: {fault}") from fault
-    if not db.keeps_answers:
-        return db.remember(text)
-    if not repeated:
+    if not repeated and not db.is_lake:
         stored = latest or latest_text(db, kind, method=method, **subject)
         if stored is not None and (stored.text, stored.software_version, stored.seed) == (
             text, __version__, None if seed is None else str(seed)
         ):  # fmt: skip
             return stored.number
+    if not db.keeps_answers:
+        return db.remember(text)
     campaign, machine = subject.get("campaign"), subject.get("machine")
     with db.transaction():
         campaign_id = None if campaign is None else campaign_number(db, campaign)

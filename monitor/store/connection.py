@@ -14,7 +14,7 @@ import contextlib
 import copy
 import threading
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -337,7 +337,7 @@ class Database:
                 self._in_transaction = True
                 try:
                     yield
-                    prepare_commit(self.path)
+                    self._prepare_commit()
                     connection.commit()
                 except BaseException as fault:
                     _roll_back(connection)
@@ -352,13 +352,14 @@ class Database:
                     self._in_transaction = False
                     self._forget()
 
+    def _prepare_commit(self) -> None:
+        prepare_commit(self.path)
+
     def _fit(self, connection: duckdb.DuckDBPyConnection) -> None:
         """Bring the schema to the present one; refuse a database that does not fit this software."""
         try:
             if not self.read_only:
-                migrations.migrate(
-                    connection, self._available, before_commit=lambda: prepare_commit(self.path)
-                )
+                migrations.migrate(connection, self._available, before_commit=self._prepare_commit)
                 return
             waiting = migrations.pending(connection, self._available)
         except StoreError as fault:
@@ -369,8 +370,17 @@ class Database:
                 "open it once for writing, which brings it to the present schema"
             )
 
-    #: Whether computed answers are stored; of a lake they are remembered until it is closed.
-    keeps_answers = True
+    #: Whether it is a lake of many plants.
+    is_lake = False
+
+    @property
+    def keeps_answers(self) -> bool:
+        """Whether computed answers are stored; otherwise they are remembered until it is closed."""
+        return True
+
+    def storing_answer(self) -> AbstractContextManager[None]:
+        """Store in this block what was computed from the database alone, as ``transaction`` does."""
+        return self.transaction()
 
     def remember(self, document: str) -> int:
         """Remember an answer that is not stored; its number, below zero."""

@@ -40,7 +40,8 @@ class MachineEvent:
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
     """Record an event of a machine; return its number. ``happened_at`` has an offset from UTC.
 
-    Raises InputError for a time without an offset or an empty kind, NotFoundError for an unknown machine.
+    Raises InputError for a time without an offset, an empty kind or an event that is recorded already, NotFoundError
+    for an unknown machine.
     """
     offset = happened_at.utcoffset()
     if offset is None:
@@ -51,6 +52,7 @@ def record_event(db: Database, machine: str, happened_at: datetime, kind: str, d
         raise InputError("an event needs a kind, for example 'repair'")
     with db.transaction():
         check_machine(db, machine)
+        _refuse_twice(db, machine, happened_at, kind, description)
         number = db.next_number("event", "event_id")
         db.execute(
             "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -66,6 +68,21 @@ def record_event(db: Database, machine: str, happened_at: datetime, kind: str, d
         )
         audit.record(db, "record", "event", str(number), event_content(db, number))
     return number
+
+
+def _refuse_twice(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> None:
+    """Raise InputError where the same was recorded of the same moment."""
+    moment = happened_at.astimezone(UTC).replace(tzinfo=None)
+    same = db.rows(
+        "SELECT event_id FROM event WHERE machine = ? AND happened_at = ? AND kind = ? "
+        "AND lower(trim(description)) = lower(trim(?))",
+        [machine, moment, kind, description],
+    )
+    if same:
+        raise InputError(
+            f"this {kind} of {machine} is recorded already, as event {same[0][0]} of {moment:%Y-%m-%d %H:%M} UTC; "
+            "nothing was stored"
+        )
 
 
 def list_events(db: Database, machine: str | None = None) -> tuple[StoredEvent, ...]:

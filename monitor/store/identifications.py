@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 def save_identification(db: Database, identification: StoredIdentification) -> int:
     """Store an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
     check_identification(identification)
-    with db.transaction():
+    with db.storing_answer():
         campaign_id = campaign_number(db, identification.campaign)
         recorded = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
         strange = sorted({run.run for run in identification.runs} - recorded)

@@ -19,11 +19,12 @@ from monitor.store import migrations
 from monitor.store.kept_blocks import (
     ENDING,
     has_foreign_log,
-    has_log,
     has_torn_blocks,
     keep_blocks,
     settle_blocks,
+    settle_log,
 )
+from monitor.store.log import has_log, has_torn_log
 from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
@@ -32,6 +33,9 @@ BLOCK_SIZE = 65536
 
 #: Settings of DuckDB by name.
 Config = dict[str, str | bool | int | float | list[str]]
+
+#: What DuckDB says from 2.0 on of a log that was written for another file, or another state of it.
+_OWN_FINDING = "This WAL was created for"
 
 #: What a file is called while it is made: it gets its name when it is whole.
 _UNFINISHED = ".new"
@@ -82,7 +86,7 @@ def _in_the_way(path: str, read_only: bool, patience: Patience, fault: Exception
     if patience.seconds > 0 and _is_open_here(str(fault)):
         holder = Holder(os.getpid(), "another part of this process")
     if holder is None:
-        if read_only and "replaying WAL" in str(fault):
+        if read_only and "replaying WAL" in str(fault) and _OWN_FINDING not in str(fault):
             raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
         raise StoreError(_in_words(path, read_only, str(fault))) from fault
     return holder
@@ -91,17 +95,19 @@ def _in_the_way(path: str, read_only: bool, patience: Patience, fault: Exception
 def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnection:
     """Open a file whose blocks are whole. Raises UnfinishedLogError, StoreError, duckdb.Error, ValueError."""
     if has_foreign_log(path):
-        raise StoreError(
-            f"{path}.wal is the log of another state of {path}, which was put in its place meanwhile, as by a copy: "
-            f"replaying it would mix the two. To keep the file as it lies here, move {path}.wal and {path}{ENDING} "
-            "away; to keep what the log holds, put back the file that it was written for"
-        )
+        raise StoreError(_of_foreign_log(path))
     if not read_only:
         settle_blocks(path)
+        settle_log(path)
     elif has_torn_blocks(path):
         raise UnfinishedLogError(
             f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is put "
             f"back by the next verb of somebody who may write: `monitor --db {path} verify`"
+        )
+    elif has_torn_log(path):
+        raise UnfinishedLogError(
+            f"{path}.wal ends in half a write that was cut off, which is removed by the next verb of somebody who may "
+            f"write: `monitor --db {path} verify`"
         )
     connection = duckdb.connect(path, read_only=read_only, config=config)
     show_no_progress(connection)
@@ -110,6 +116,14 @@ def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnec
         with contextlib.suppress(StoreError):
             keep_blocks(path)
     return connection
+
+
+def _of_foreign_log(path: str) -> str:
+    return (
+        f"{path}.wal is the log of another state of {path}, which was put in its place meanwhile, as by a copy: "
+        f"replaying it would mix the two. To keep the file as it lies here, move {path}.wal and {path}{ENDING} "
+        "away; to keep what the log holds, put back the file that it was written for"
+    )
 
 
 def show_no_progress(connection: duckdb.DuckDBPyConnection) -> None:
@@ -310,6 +324,10 @@ def _in_words(path: str, read_only: bool, message: str) -> str:
         return f"the folder of {path} does not exist; make it first"
     if "Is a directory" in message:
         return f"{path} is a folder; name a file"
+    if "Read-only file system" in message:
+        return f"{path} lies on a file system that can only be read; nothing can be stored there"
+    if _OWN_FINDING in message:
+        return _of_foreign_log(path)
     if "Permission denied" in message:
         return (
             f"{path} may not be opened by this user{'' if read_only else ' for writing'}: permission denied"

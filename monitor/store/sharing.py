@@ -15,7 +15,7 @@ import atexit
 import threading
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from monitor.store import migrations
 from monitor.store.connection import Database
 from monitor.store.opening import busy, close_written, connect, is_missing
 from monitor.store.turns import Patience, turn_to_write, writer_at_work
+from monitor.store.unwritable import private_copy, why_not_written
 
 #: How long the file stays open for the next question, in s: to open it takes some 10 ms. Whoever reads keeps it longer
 #: while nobody has taken the turn to write: what is computed between two questions of one verb.
@@ -64,7 +65,8 @@ class SharedDatabase(Database):
     """A database file that others use, too; use it in a ``with`` statement.
 
     ``patience`` says how long another process is waited for. A file that is not there is made, unless ``read_only``. An
-    older schema is brought to the present one where this user may write. Raises BusyError, StoreError.
+    older schema is brought to the present one where this user may write. ``unstored`` is told once why answers are not
+    stored, where they are not (``unwritable``). Raises BusyError, StoreError.
     """
 
     def __init__(
@@ -75,8 +77,12 @@ class SharedDatabase(Database):
         threads: int | None = None,
         actor: str = "",
         patience: Patience | None = None,
+        unstored: Callable[[str], None] = lambda why: None,
     ) -> None:
         self._waiting = patience or Patience()
+        self._unstored: Callable[[str], None] | None = unstored
+        #: Whether a private copy is open in place of the file, and whether it is written now.
+        self._is_copy = self._copy_is_written = False
         self._turn = ExitStack()
         self._writes = False
         self._blocks = 0
@@ -96,6 +102,54 @@ class SharedDatabase(Database):
 
     def forget_campaigns(self) -> None:
         self._numbers.clear()
+
+    @property
+    def keeps_answers(self) -> bool:
+        """Whether this user may write the file."""
+        return self.read_only or why_not_written(self.path) is None
+
+    def remember(self, document: str) -> int:
+        """Remember an answer, and say that it is not stored."""
+        self._say_unstored()
+        return super().remember(document)
+
+    @contextmanager
+    def storing_answer(self) -> Iterator[None]:
+        """Store in this block what was computed from the database; of a file that may not be written in a copy."""
+        with ExitStack() as block:
+            if not self.keeps_answers:
+                self._say_unstored()
+                block.enter_context(self._in_copy())
+            block.enter_context(self.transaction())
+            yield
+
+    def _say_unstored(self) -> None:
+        say, self._unstored = self._unstored, None
+        if say is not None:
+            say(f"the answer was not stored: {why_not_written(self.path)}")
+
+    @contextmanager
+    def _in_copy(self) -> Iterator[None]:
+        """Write in this block a private copy, which stands for the file until it is let go of."""
+        with self._one_writes, self._lock:
+            if not self._is_copy:
+                self._open_copy()
+            self._copy_is_written = True
+            try:
+                yield
+            finally:
+                self._copy_is_written = False
+
+    def _open_copy(self) -> None:
+        with ExitStack() as copied:
+            with self._used():
+                path = copied.enter_context(private_copy(self.path))
+            self._let_go()
+            self._connection = connect(path, False, self._threads)
+            self._turn = copied.pop_all()
+        self._is_copy = True
+        self._openings += 1
+        _OPEN.add(self)
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -132,7 +186,7 @@ class SharedDatabase(Database):
 
     @contextmanager
     def _writing(self) -> Iterator[duckdb.DuckDBPyConnection]:
-        if not self._writes or self._is_overdue():
+        if not self._copy_is_written and (not self._writes or self._is_overdue()):
             self._let_go()
             self._open_to_write()
         # Kept from here on: a process that stood still meanwhile would find itself overdue, and open it to read.
@@ -145,7 +199,12 @@ class SharedDatabase(Database):
 
     def _is_overdue(self) -> bool:
         """Whether the file was kept for long enough and somebody else may want it."""
-        if self._blocks or self._in_transaction or time.monotonic() - self._opened_at < _LONGEST_S:
+        if (
+            self._is_copy
+            or self._blocks
+            or self._in_transaction
+            or time.monotonic() - self._opened_at < _LONGEST_S
+        ):
             return False
         return self._writes or writer_at_work(self.path) is not None
 
@@ -230,6 +289,10 @@ class SharedDatabase(Database):
     def _may_have_written(self) -> bool:
         return self._writes
 
+    def _prepare_commit(self) -> None:
+        if not self._is_copy:
+            super()._prepare_commit()
+
     def _note_use(self) -> None:
         self._used_at, self._processor_used_s = time.monotonic(), time.process_time()
 
@@ -247,7 +310,7 @@ class SharedDatabase(Database):
     def _let_go(self) -> None:
         super().close()
         self._connection = None
-        self._writes = False
+        self._writes = self._is_copy = False
         self._turn.close()
         _OPEN.discard(self)
 

@@ -92,7 +92,7 @@ def holder_in(message: str) -> Holder | None:
     """Return who holds the file by DuckDB's own words; None where the message is about something else."""
     named = _HOLDER.search(message)
     if named is not None:
-        return Holder(int(named[2]), _activity(int(named[2])) or named[1])
+        return Holder(int(named[2]), activity(int(named[2])) or named[1])
     return Holder(None, "") if "Could not set lock" in message else None
 
 
@@ -203,11 +203,11 @@ def _locked(file: int, way: int) -> bool:
 def _last_writer(file: int) -> Holder:
     with contextlib.suppress(OSError, ValueError):
         pid = int(os.pread(file, _PID_WIDTH, 0))
-        return Holder(pid, _activity(pid))
+        return Holder(pid, activity(pid))
     return Holder(None, "")
 
 
-def _activity(pid: int) -> str:
+def activity(pid: int) -> str:
     """Return what a process does, as `monitor import`, or its program; empty where the system does not say."""
     try:
         arguments = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")[:-1]

@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import InputError
-from monitor.machine import MOTION
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.records import Array, Campaign
 from monitor.sources import HALF_WIDTHS, Law, Quantity, Sharing, Source
@@ -140,10 +139,7 @@ def _as_readings(run: MeasuredRun, by_error: Array, rows: Array) -> Array:
     """
     if not isinstance(run, TouchedRun):
         return rows
-    joints = run.problem.context.chain.joints
-    along = np.array([joints[index].direction for index in run.linear]) * run.signs[:, None]
-    by_reading = np.einsum("nrac,ac->nra", by_error[:, :, run.linear, MOTION, :3], along)
-    return np.asarray(np.linalg.pinv(by_reading) @ rows)
+    return np.asarray(np.linalg.pinv(run.by_reading(by_error)) @ rows)
 
 
 def _strain(campaign: Campaign, number: int, source: Source) -> float:

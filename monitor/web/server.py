@@ -22,7 +22,8 @@ import uvicorn
 from monitor.exceptions import InputError
 from monitor.web.app import application
 from monitor.web.gate import Gate
-from monitor.web.note import Note, posted
+from monitor.web.listening import listening
+from monitor.web.note import Note, posted, read_note
 from monitor.web.opening import opened
 from monitor.web.rendering import prepare
 from monitor.web.settings import ServerSettings
@@ -48,16 +49,20 @@ class _Server(uvicorn.Server):
         """Listen; the port is the one that the system gave where none was named."""
         await super().startup(sockets)
         for server in self.servers:
-            for listening in server.sockets:
-                self._listens(int(listening.getsockname()[1]))
+            for taken in server.sockets:
+                self._listens(int(taken.getsockname()[1]))
                 return
 
 
 def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
     """Serve a database; returns when it was stopped. Raises NotFoundError, StoreError, InputError before it listens."""
     fingerprint = _checked_certificate(settings)
+    _refuse_served(settings.database)
+    sockets = listening(settings.host, settings.port)
     _end_in_order()
     with tempfile.TemporaryDirectory(prefix="monitor-serve-") as folder, ExitStack() as beside:
+        for taken in sockets:
+            beside.callback(taken.close)
         working_folder = Path(folder).resolve()
         with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
             gate = application(db, settings, working_folder)
@@ -82,9 +87,18 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
 
             prepare()
             sys.setswitchinterval(_SWITCH_S)
-            _Server(config, listens).run()
+            _Server(config, listens).run(sockets)
             beside.close()
             gate.close()
+
+
+def _refuse_served(database: Path) -> None:
+    """Raise InputError where a server of this account has the database."""
+    note = read_note(database)
+    if note is not None:
+        raise InputError(
+            f"{database} is served already, at {note.address}/ (PID {note.pid}): open that, or stop it first"
+        )
 
 
 def configuration(gate: Gate, settings: ServerSettings) -> uvicorn.Config:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, did_you_mean
 from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
 from monitor.store.catalogue import check_machine
 
@@ -17,7 +17,8 @@ USUAL_KINDS = ("crash", "repair", "compensation", "probe")
 class EventRequest:
     """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment with an offset; without text list them.
 
-    An event of any kind but a note splits the history of the machine.
+    An event of any kind but a note splits the history of the machine. Raises InputError for a kind that is nearly a
+    usual one, a moment to come or no words.
     """
 
     machine: str
@@ -42,6 +43,12 @@ class EventRequest:
         if self.at is not None and self.at > datetime.now(UTC) + timedelta(hours=1):
             raise InputError(
                 f"{self.at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
+            )
+        hint = did_you_mean(self.kind, (*USUAL_KINDS, NOTE))
+        if hint and self.kind not in (*USUAL_KINDS, NOTE):
+            raise InputError(
+                f"--kind {self.kind}: {hint}an event cannot be undone, so a kind that is nearly a usual one "
+                f"({', '.join((*USUAL_KINDS, NOTE))}) is not recorded; any other word is"
             )
 
 

@@ -15,13 +15,16 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.reporting import messages
 from monitor.store import (
+    CHANGES,
     AuditEntry,
     Database,
     anchored_entry,
     chain_faults,
+    check_workbook_path,
     export_tables,
     export_workbook,
     last_entries,
+    not_identified,
     restore,
     take_backup,
     take_increment,
@@ -30,6 +33,8 @@ from monitor.store import (
 )
 from monitor.workflow.recomputed import Recomputation, recompute
 
+#: Sheets of a workbook that hold what was identified.
+OF_PARAMETERS = ("parameters", "parameters long")
 #: Words that entries of the audit are looked through for at once.
 _MOST_WORDS = 20
 
@@ -135,7 +140,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
 
 
 def _refuse_lake(db: Database, participle: str) -> None:
-    if not db.keeps_answers:
+    if db.is_lake:
         raise InputError(
             f"{db.path} is a lake of many plants, which is not {participle}: the chain is that of each plant's own "
             "database, and the lake can be made again from these"
@@ -314,21 +319,34 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class ExportAnswer:
-    """The files that were written."""
+    """The files that were written; ``notes`` say what a workbook lacks because it was not computed yet."""
 
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
 
 def export(db: Database, request: ExportRequest) -> ExportAnswer:
     """Write tables as files or a workbook. Raises InputError for what exists already, NotFoundError, StoreError."""
+    if request.format == "xlsx":
+        return _workbook(db, request)
     with db.reading():
-        if request.format == "xlsx":
-            file = (
-                request.folder
-                if request.folder.suffix.lower() == ".xlsx"
-                else request.folder / "monitor.xlsx"
-            )
-            return ExportAnswer((export_workbook(db, file, request.tables, request.machine),))
         return ExportAnswer(
             export_tables(db, request.folder, request.format, tables=request.tables, machine=request.machine)
         )
+
+
+def _workbook(db: Database, request: ExportRequest) -> ExportAnswer:
+    is_file = request.folder.suffix.lower() == ".xlsx"
+    file = request.folder if is_file else request.folder / "monitor.xlsx"
+    check_workbook_path(file)
+    # Loaded here: nothing else of this file computes.
+    from monitor.workflow.trend.workbook_changes import workbook_changes
+
+    tables = (*OF_PARAMETERS, CHANGES) if request.tables is None else request.tables
+    # Outside of `reading`: nobody waits for a search of years.
+    changes = workbook_changes(db, request.machine) if CHANGES in tables else ()
+    with db.reading():
+        written = export_workbook(db, file, request.tables, request.machine, changes)
+    of_parameters = [name for name in (*OF_PARAMETERS, CHANGES) if name in tables]
+    lacking = not_identified(db, request.machine) if of_parameters else ()
+    return ExportAnswer((written,), (messages.lacks_campaigns(of_parameters, lacking),) if lacking else ())

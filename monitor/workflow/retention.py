@@ -46,7 +46,7 @@ def archive(db: Database, request: ArchiveRequest) -> ArchiveAnswer:
 
     Raises StoreError where one cannot be written or is there with other content, InputError for a lake, NotFoundError.
     """
-    if not db.keeps_answers:
+    if db.is_lake:
         raise InputError(f"{db.path} is a lake of many plants: files are archived at the plant that has them")
     if request.before is None:
         with db.reading():
@@ -74,7 +74,7 @@ class CompactAnswer:
 
 def compact_database(db: Database) -> CompactAnswer:
     """Write the database file anew without gaps. Raises StoreError, BusyError; InputError for a lake."""
-    if not db.keeps_answers:
+    if db.is_lake:
         raise InputError(f"{db.path} is a lake: merge its files (docs/scale.md)")
     result = compact(db)
     message = messages.compacted(db.path, result.bytes_before, result.bytes_after, result.rows)

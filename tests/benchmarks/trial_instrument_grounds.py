@@ -4,7 +4,7 @@
 measured in one run by laser, ball bar and R-test (``tests/simulator/horizontal_centre.py``, no code shared with the
 package). Errors are those beside the machine as it was in the middle of the run, in u of the joint fit times what all
 readings scatter more than stated. ``--first``: the first seed; ``--only``: a part of a name; ``--stated``: judged by
-what the instruments state alone, as before their own scatter counted.
+what the instruments state alone, as before their own scatter counted; ``--who``: who is said to be the wrong one.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from monitor.discovery import robust_fit
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
 from monitor.methods.instruments import shares
 from monitor.readers import read_campaign
+from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.uncertainty.grounds import grounds_of
 from tests.benchmarks.trial_instruments import Heavy
 from tests.simulator import horizontal_centre as shop
@@ -54,6 +56,50 @@ WRONG = {
     "bar, other sign": ("bar", -1.0),
     "bar in mm": ("bar", 1e-3),
 }
+
+
+#: What is wrong, with who should be named for it.
+WHO: dict[str, tuple[str, dict]] = {
+    "bar, other sign": ("ball bar", {"otherwise": ("bar", -1.0)}),
+    "one plane of the bar, other sign": ("bar-xy", {"otherwise": ("bar-xy", -1.0)}),
+    "bar 5 um longer than stated": ("the stated length of ball bar", {"length": 150.005}),
+    "bar 50 um longer than stated": ("the stated length of ball bar", {"length": 150.05}),
+    "R-test, other sign": ("R-test", {"otherwise": ("r-test", -1.0)}),
+    "R-test around A, other sign": ("r-test-A", {"otherwise": ("r-test-A", -1.0)}),
+    "R-test around B, other sign": ("r-test-B", {"otherwise": ("r-test-B", -1.0)}),
+    "R-test around B in mm": ("r-test-B", {"otherwise": ("r-test-B", 1e-3)}),
+}
+
+
+def suspects_of(
+    seed: int, otherwise: tuple[str, float] | None = None, length: float = shop.BAR
+) -> tuple[str, ...]:
+    """Without whom the others agree; nobody where nothing contradicts."""
+    rng = np.random.default_rng(seed)
+    truth = shop.truth_of(rng)
+    with tempfile.TemporaryDirectory() as folder:
+        path = shop.campaign(Path(folder) / "shop", rng, truth, otherwise=otherwise)
+        file = path / "campaign.toml"
+        text = file.read_text(encoding="utf-8").replace(f"length_mm = {shop.BAR}", f"length_mm = {length}")
+        file.write_text(text, encoding="utf-8")
+        campaign = read_campaign(path)
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    beside = against_others(problem, solve_problem(problem), ability, 1)
+    return () if beside is None else (beside.suspects or ("no single one",))
+
+
+def who(first: int, seeds: int) -> None:
+    """Print how often the wrong one is named, alone or with others, and how often another one alone."""
+    for name, (wrong, keys) in WHO.items():
+        named = Counter(suspects_of(seed, **keys) for seed in range(first, first + seeds))
+        alone = named[(wrong,)]
+        among = sum(count for suspects, count in named.items() if wrong in suspects) - alone
+        silent = named[()]
+        print(
+            f"{name}: {wrong} alone {_rate(alone, seeds)}, with others {among}, others "
+            f"{seeds - alone - among - silent}, nobody {silent}; {dict(named)}",
+            flush=True,
+        )
 
 
 def judged(seed: int, *, times: float = 1.0, heavy: bool = False, of: str = "", warmer: float = 0.0,
@@ -110,9 +156,13 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", default="")
     parser.add_argument("--stated", action="store_true")
+    parser.add_argument("--who", action="store_true")
     options = parser.parse_args()
+    if options.who:
+        who(options.first, options.seeds)
+        return
     if options.stated:
-        shares._scatter = lambda remaining, freedom: (1.0, float("inf"))
+        shares.scatter_of = lambda remaining, freedom: (1.0, float("inf"))
     begin = time.process_time()
     cases = {name: (keys, options.seeds) for name, keys in RIGHT.items()}
     cases |= {name: ({"otherwise": how}, max(1, options.seeds // 5)) for name, how in WRONG.items()}

@@ -162,6 +162,44 @@ def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> 
     assert message in answer.err
 
 
+def test_every_wrong_limit_of_every_table_is_named(typed: Any) -> None:
+    """The first of a table alone was."""
+    configured(
+        '[tolerances.a]\nEC0Y = -1\nsquareness = 1\nEB0C = "x"\n[tolerances.b]\n[tolerances.c]\nEXX = 0\n'
+    )
+    err = typed("config", "check").err
+    for words in (
+        '[tolerances."a"] EC0Y = -1: a number above 0',
+        '[tolerances."a"] squareness: no name of a term',
+        "[tolerances.\"a\"] EB0C = 'x': a number above 0",
+        '[tolerances."b"] states no limit',
+        '[tolerances."c"] EXX = 0: a number above 0',
+    ):
+        assert words in err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[tolerances.a]\nEC0Y = 20,0 # from the control\nEB0C = 1.5\nEXX = -3,25\nEYY = 4,5",
+            "line 2: 20,0 has a decimal comma, and TOML has decimal points: write 20.0; so have lines 4, 5",
+        ),
+        (
+            "[tolerances.a]\nEC0Y = 20,0\n",
+            "line 2: 20,0 has a decimal comma, and TOML has decimal points: write 20.0\n",
+        ),
+        ("[tolerances.a]\nEC0Y = twenty", "line 2: this is not TOML at character 8: Invalid value"),
+        ("[tolerances.a]\nEC0Y = [1", "line 2: this is not TOML: Unclosed array"),
+    ],
+)
+def test_what_is_no_toml_is_said_with_its_line(typed: Any, text: str, message: str) -> None:
+    configured(text)
+    answer = typed("config", "check")
+    assert answer.status == 2
+    assert message in answer.err
+
+
 def test_one_machine_type_in_two_spellings_is_refused(typed: Any) -> None:
     """The later one counted, and with it the verdict."""
     configured('[tolerances."MILL"]\nEX0A = 5.5\n[tolerances."mill"]\nEX0A = 70.5\n')

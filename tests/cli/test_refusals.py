@@ -116,7 +116,7 @@ WRONG = [
     (["import", "folder"], "campaign.toml: the file is missing; the folder holds nothing"),
     ([*ISSUE, "nope"], "nope cannot be read: No such file or directory"),
     ([*ISSUE, "folder"], "folder cannot be read: Is a directory"),
-    ([*ISSUE, "text"], "text is not TOML"),
+    ([*ISSUE, "text"], "text, line 1: this is not TOML"),
     (["trend", "NOPE"], "there is no machine 'NOPE'; there are HU40-T"),
     (["trend", "HU40-T", "--since", "nope"], "--since nope: write a day or a time as 2026-03-05"),
     (["trend", "HU40-T", "--reliability", "nan"], "--reliability nan: a probability lies between 0 and 1"),

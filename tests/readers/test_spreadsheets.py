@@ -6,6 +6,7 @@ import csv
 import io
 import re
 import shutil
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -120,19 +121,68 @@ def test_a_table_that_stands_in_two_files_is_refused(tmp_path: Path, single: boo
     assert read_campaign(folder).name == "cold-cold"
 
 
-def test_points_and_commas_in_one_table_are_refused_with_the_cause(tmp_path: Path) -> None:
+def mixed_marks(folder: Path, points: int) -> str:
+    """What is said of a German table whose last cells of the first rows, so many, have a decimal point."""
+    rows = tables(folder)["probings.csv"]
+    body = [[*row[:-1], f"{row[-1].partition('.')[0]},5"] for row in rows[1:]]
+    body = [[*row[:-1], row[-1].replace(",", ".")] for row in body[:points]] + body[points:]
+    # Whole numbers elsewhere: the last column alone has marks.
+    body = [[*(cell.partition(".")[0] for cell in row[:-1]), row[-1]] for row in body]
+    (folder / "probings.csv").write_text("\n".join(";".join(row) for row in [rows[0], *body]), "utf-8")
+    with pytest.raises(CampaignError) as refusal:
+        read_campaign(folder)
+    return str(refusal.value)
+
+
+def test_one_decimal_point_in_a_table_of_commas_is_named_alone(tmp_path: Path) -> None:
+    """All other cells were blamed for their commas: 6 599 faults of a table with one slip."""
     folder = Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / "cold-cold"))
     rows = tables(folder)["probings.csv"]
-    mixed = [rows[0], [*rows[1][:-1], "1.5"], *([cell.replace(".", ",") for cell in row] for row in rows[2:])]
+    head = rows[0]
+    mixed = [head, [*rows[1][:-1], "1.5"], *([cell.replace(".", ",") for cell in row] for row in rows[2:])]
+    mixed[1][:-1] = [cell.replace(".", ",") for cell in mixed[1][:-1]]
     (folder / "probings.csv").write_text("\n".join(";".join(row) for row in mixed), encoding="utf-8")
-    with pytest.raises(CampaignError, match="it has a decimal comma") as refusal:
+    with pytest.raises(CampaignError, match="was refused") as refusal:
         read_campaign(folder)
-    lines = str(refusal.value).splitlines()
-    assert len(lines) < 12
-    assert re.search(
-        r"column x_mm: .* it has a decimal comma; .* \(and 131[0-9] more like it, to line 1321\)",
-        str(refusal.value),
+    assert [str(fault) for fault in refusal.value.faults] == [
+        f"probings.csv, line 2, column {head[-1]}: '1.5' has a decimal point in a table of decimal commas; write '1,5'"
+    ]
+
+
+def test_where_points_are_as_frequent_as_commas_the_commas_are_named(tmp_path: Path) -> None:
+    fewer, more = (
+        Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / name)) for name in ("fewer", "more")
     )
+    count = len(tables(fewer)["probings.csv"]) - 1
+    assert "has a decimal point in a table of decimal commas" in mixed_marks(fewer, count // 2 - 1)
+    text = mixed_marks(more, count - count // 2)
+    assert "it has a decimal comma" in text
+    assert "table of decimal commas" not in text
+    assert len(text.splitlines()) < 25
+
+
+@pytest.mark.parametrize("content", [b"no workbook", b"PK\x03\x04 cut off"])
+def test_a_workbook_that_is_none_beside_whole_tables_is_named(tmp_path: Path, content: bytes) -> None:
+    """It was passed over without a word, though it may hold what was corrected last."""
+    folder = Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / "cold-cold"))
+    (folder / "campaign.xlsx").write_bytes(content)
+    with pytest.raises(CampaignError, match=r"campaign\.xlsx: this is no workbook of Excel") as refusal:
+        read_campaign(folder)
+    assert "take it away" in str(refusal.value)
+
+
+def test_a_workbook_whose_sheet_is_damaged_is_refused_in_words(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    as_workbook(folder, single=False)
+    path = folder / "data.xlsx"
+    with zipfile.ZipFile(path) as packed:
+        sheet = packed.getinfo("xl/worksheets/sheet1.xml")
+    content = bytearray(path.read_bytes())
+    start = sheet.header_offset + 60
+    content[start : start + 40] = bytes(40)
+    path.write_bytes(content)
+    with pytest.raises(CampaignError, match=r"data\.xlsx: this is no workbook of Excel .* that can be read"):
+        read_campaign(folder)
 
 
 def test_faults_of_a_workbook_name_its_file_and_row(tmp_path: Path) -> None:

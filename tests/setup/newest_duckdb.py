@@ -17,7 +17,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[2]
 TESTS = ("tests/store", "tests/archives", "tests/cli/test_keeping.py", "tests/cli/test_kill_then_verb.py")
 
-OF_THE_LAKE = ("tests/store/test_lake.py", "tests/store/test_torn_catalogue.py")
+OF_THE_LAKE = ("tests/store/test_lake.py", "tests/store/test_torn_catalogue.py", "tests/store/lake")
 
 
 def environment(folder: Path, requirement: str) -> Path:

@@ -6,8 +6,10 @@ DuckDB 1.5 replays whatever lies beside a file. A crash is made of the files as 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from monitor.exceptions import StoreError
 from monitor.records import Campaign
 from monitor.store import Database, SharedDatabase, import_campaign, record_event, restore, take_backup
 from monitor.store.copies.increment import take_increment
+from monitor.store.kept_blocks import has_foreign_log
 from monitor.store.opening import connect
 from monitor.store.verification import verify_audit
 
@@ -103,17 +106,70 @@ def test_a_file_that_went_on_without_its_log_is_not_mixed_with_it(shop: Shop) ->
     shop.refuse()
 
 
-def test_the_log_of_a_checkpoint_that_was_finished_is_no_foreign_one(shop: Shop) -> None:
+#: How a log begins: as DuckDB 1.5.5 writes it, as 2.0.1 (with the file's name in 16 numbers, of which those from 128 on
+#: take two bytes, and the checkpoint that it follows), and as some later one may.
+_BEGIN_1_5 = b"d\0be\0\x02\xff\xff"
+_BEGIN_2_0 = (
+    b"d\0be\0\x02f\0\x10"
+    + b"\xe6\x01-6\xec\x01\x89\x01Q\xef\x01\x16\xc5\x01\xec\x01v\x01\xbc\x01Wb)"
+    + b"g\0\x81\x02\xff\xff"
+)
+_BEGIN_OF_ANOTHER = b"d\0be\0\x03\xff\xff"
+
+
+def begin_log(shop: Shop, begin: bytes) -> None:
+    """Let the log begin in another form."""
+    log = Path(f"{shop.path}.wal")
+    log.write_bytes(re.sub(rb"\Ad\0be\0.*?\xff\xff", lambda _: begin, log.read_bytes(), flags=re.DOTALL))
+
+
+@pytest.mark.parametrize("begin", [_BEGIN_2_0, _BEGIN_OF_ANOTHER], ids=["2.0", "another"])
+def test_a_log_of_a_later_form_is_not_mixed_with_a_file_that_went_on(shop: Shop, begin: bytes) -> None:
+    """What a log of an unknown form ends with cannot be told, so that it is refused."""
+    begin_log(shop, begin)
+    shop.put(shop.after_two)
+    shop.refuse()
+
+
+@pytest.mark.parametrize("kind", [SharedDatabase, Database])
+def test_what_duckdb_2_0_says_of_a_foreign_log_is_said_in_our_words(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch, kind: type[Database]
+) -> None:
+    """It finds one itself, and was taken for a damaged file."""
+    said = f'Failure while replaying WAL file "{shop.path}.wal": This WAL was created for this database file, but the'
+
+    def refused(path: str, *options: object, **config: object) -> None:
+        raise duckdb.IOException(said)
+
+    monkeypatch.setattr(duckdb, "connect", refused)
+    with pytest.raises(StoreError, match="is the log of another state of"), kind(shop.path):
+        pass
+
+
+def mark(shop: Shop) -> None:
+    """Leave a log with the mark of a checkpoint that was finished behind it, as a crash does."""
     with Database(shop.path) as db:
         shop._record(db, 3)
         # DuckDB's own means of a test: the header is written, the log with its mark not yet removed.
         db.execute("SET debug_checkpoint_abort = 'before_truncate'")
         with pytest.raises(StoreError, match="Checkpoint aborted"):
             db.execute("CHECKPOINT")
-        marked = {ending: Path(f"{shop.path}{ending}").read_bytes() for ending in _ENDINGS}
-    for ending, content in marked.items():
+        left = {ending: Path(f"{shop.path}{ending}").read_bytes() for ending in _ENDINGS}
+    for ending, content in left.items():
         Path(f"{shop.path}{ending}").write_bytes(content)
     os.utime(shop.path)
+
+
+def test_the_mark_is_read_in_a_log_of_duckdb_2_0(shop: Shop) -> None:
+    mark(shop)
+    for begin, foreign in ((_BEGIN_1_5, False), (_BEGIN_2_0, False), (_BEGIN_OF_ANOTHER, True)):
+        begin_log(shop, begin)
+        os.utime(f"{shop.path}.wal", (0, 0))
+        assert has_foreign_log(str(shop.path)) is foreign
+
+
+def test_the_log_of_a_checkpoint_that_was_finished_is_no_foreign_one(shop: Shop) -> None:
+    mark(shop)
     with SharedDatabase(shop.path) as reader:
         assert reader.rows("SELECT count(*) FROM event") == [(3,)]
 
@@ -210,3 +266,57 @@ def test_a_new_database_whose_log_could_not_be_moved_into_it_gets_no_name(
     with pytest.raises(StoreError, match="could not be moved from its log"):
         Database(tmp_path / "new.duckdb")
     assert list(tmp_path.glob("new.duckdb*")) in ([], [tmp_path / "new.duckdb.lock"])
+
+
+@pytest.mark.parametrize("kind", [SharedDatabase, Database])
+@pytest.mark.parametrize(
+    "place", ["in the last entry", "behind one", "in the head of one", "all", "behind the head"]
+)
+def test_a_log_that_ends_in_zeros_is_replayed_as_one_that_is_cut_off(
+    shop: Shop, kind: type[Database], place: str
+) -> None:
+    """As a loss of power leaves it: DuckDB 1.5.5 calls it damaged, and nothing that was stored is missing."""
+    log = Path(f"{shop.path}.wal")
+    content = log.read_bytes()
+    begins = [found.start() for found in re.finditer(re.escape(b"d\0\x19"), content)]
+    kept = {
+        "in the last entry": len(content) - 3, "behind one": begins[-1] - 16, "in the head of one": begins[-1] - 5,
+        "all": 0, "behind the head": len(_BEGIN_1_5),
+    }[place]  # fmt: skip
+    assert len(begins) > 1
+    log.write_bytes(content[:kept] + bytes(len(content) - kept + 5000))
+    with pytest.raises(duckdb.IOException, match="WAL") if kept else nullcontext():
+        duckdb.connect(str(shop.path), read_only=True).close()
+    with pytest.raises(StoreError, match="ends in half a write that was cut off"):
+        Database(shop.path, read_only=True)
+    with kind(shop.path) as db:
+        assert verify_audit(db).faults == ()
+        # The first event lies in the file.
+        assert db.rows("SELECT count(*) FROM event") == [(1,)]
+        shop._record(db, 5)
+    with Database(shop.path) as db:
+        assert verify_audit(db).faults == ()
+        assert db.rows("SELECT count(*) FROM event") == [(2,)]
+
+
+def test_zeros_behind_whole_transactions_take_none_of_them(shop: Shop) -> None:
+    with Path(f"{shop.path}.wal").open("ab") as log:
+        log.write(bytes(2**20 + 77))
+    with SharedDatabase(shop.path) as db:
+        assert db.rows("SELECT count(*) FROM event") == [(2,)]
+
+
+@pytest.mark.parametrize("damage", ["a bit", "another form"])
+def test_a_log_that_is_damaged_otherwise_stays_as_it_is(shop: Shop, damage: str) -> None:
+    log = Path(f"{shop.path}.wal")
+    content = bytearray(log.read_bytes())
+    if damage == "a bit":
+        content[len(content) // 2] ^= 4
+    else:
+        content[: len(_BEGIN_1_5)] = _BEGIN_OF_ANOTHER
+        content += bytes(100)
+    log.write_bytes(content)
+    for kind in (SharedDatabase, Database):
+        with pytest.raises(StoreError, match="cannot be read, it may be damaged"), kind(shop.path):
+            pass
+    assert log.read_bytes() == content

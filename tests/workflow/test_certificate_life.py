@@ -27,6 +27,7 @@ from monitor.reporting.signature.signing import FileKey, sign
 from monitor.store import Database, import_campaign, list_certificates, load_certificate
 from monitor.workflow.certificate import issue as certificates
 from monitor.workflow.certificate.answer import CertificateChecks, Verdict
+from monitor.workflow.certificate.files import prepared, publish
 from monitor.workflow.certificate.issue import issue, withdraw
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import (
@@ -391,6 +392,45 @@ def test_stopped_behind_the_entry_the_database_gives_the_document_back(
     made = write_issued(db, CertificateFileRequest("K-2", tmp_path))
     assert verify_file(db, VerificationRequest(Path(made.file))).ok is True
     assert Path(made.file).read_bytes() == load_certificate(db, "K-2").pdf
+
+
+def test_stopped_behind_the_entry_the_next_certificate_gives_the_file_its_name(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pdf_unread
+) -> None:
+    """A kill of seed 13021 left the whole document under a name that nothing took away."""
+
+    def issued(number: str) -> None:
+        with pdf_unread():
+            issue(
+                db,
+                CertificateRequest(
+                    "five-days", 20, laboratory=LABORATORY, out=tmp_path, number=number, issued_on=DAY
+                ),
+            )
+
+    with monkeypatch.context() as patch:
+        patch.setattr(certificates, "publish", killed)
+        with pytest.raises(Killed, match="here"):
+            issued("K-5")
+    # Of a process that is about to store it, and of somebody who planted it.
+    (tmp_path / "certificate-K-6.pdf.part").write_bytes(b"not stored yet")
+    (tmp_path / "certificate-K-7.pdf.part").symlink_to(tmp_path / "certificate-K-5.pdf.part")
+    issued("K-8")
+    assert (tmp_path / "certificate-K-5.pdf").read_bytes() == load_certificate(db, "K-5").pdf
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "certificate-K-5.pdf", "certificate-K-6.pdf.part", "certificate-K-7.pdf.part", "certificate-K-8.pdf",
+    ]  # fmt: skip
+
+
+def test_a_prepared_file_that_another_process_named_is_no_fault(tmp_path: Path) -> None:
+    part = prepared(tmp_path / "c.pdf", b"content")
+    part.rename(tmp_path / "c.pdf")
+    publish(part, tmp_path / "c.pdf", "K-9")
+    (tmp_path / "c.pdf").unlink()
+    with pytest.raises(
+        InputError, match=r"certificate K-9 is in the database, but its file cannot be written"
+    ):
+        publish(part, tmp_path / "c.pdf", "K-9")
 
 
 def test_a_file_that_cannot_get_its_name_says_where_the_certificate_is(

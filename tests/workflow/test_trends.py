@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from by_path import TESTS, load
+from scipy.optimize import curve_fit
 
 from monitor.cli import main
 from monitor.cli.trend_output import out_of_tolerance
@@ -513,3 +514,41 @@ def test_parameters_that_were_measured_together_share_one_search(monkeypatch: py
     assert sorted(weights) == ["A", "B"]
     assert weights["A"] == weights["B"]
     assert list(found) == ["A", "B", "C"]
+
+
+def test_a_change_that_passes_again_is_said_with_its_size_and_time_constant(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Against a fit of an exponential by scipy; ``trend`` said nothing of it, and the weekly report neither."""
+    rng = np.random.default_rng(401)
+    week = np.arange(WEEKS)[:, np.newaxis]
+    values = {
+        "EX0B": 3.0 + 8.0 * np.exp(-week / 4.0) + 0.5 * rng.normal(size=(WEEKS, RUNS)),
+        "EY0C": -2.0 - 8.0 * np.exp(-week / 4.0) + 0.5 * rng.normal(size=(WEEKS, RUNS)),
+        "EZ0B": 0.5 * rng.normal(size=(WEEKS, RUNS)),
+    }
+    path = tmp_path / "m.duckdb"
+    with Database(path) as db:
+        add_machine(db, "M", values)
+        answer = trends(db, "M")
+    for name, sign, side in (("EX0B", 1.0, "above"), ("EY0C", -1.0, "below")):
+        ((change,), changes) = answer["parameters"][name]["drifts"], answer["parameters"][name]["changes"]
+        assert (change["kind"], changes) == ("transient", [])
+        fit, covariance = curve_fit(
+            lambda t, level, size, tau: level + size * np.exp(-t / tau),
+            np.repeat(7.0 * np.arange(WEEKS), RUNS),
+            values[name].ravel(),
+            (0.0, sign, 30.0),
+        )
+        # The time constant is the nearest of five that are tried, and the size goes with it.
+        assert 0.6 < change["time_constant_days"] / fit[2] < 1.7
+        assert abs(change["size"] - fit[1]) < 4.0 * np.hypot(change["u"], np.sqrt(covariance[1, 1]))
+        assert main(["--db", str(path), "trend", "M", "--parameter", name]) == 0
+        out = capsys.readouterr().out
+        assert re.search(
+            rf"^from 2024-01-01 \d\d:\d\d on: {name} began [\d.]+ µm \(u = 0\.\d+ µm\) {side} where",
+            out,
+            re.M,
+        )
+        assert f"with a time constant of about {change['time_constant_days']:.2g} days (a transient" in out
+    assert answer["parameters"]["EZ0B"]["drifts"] == []

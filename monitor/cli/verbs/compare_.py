@@ -17,7 +17,7 @@ from monitor.workflow.explain.compare_answer import (
     MachinePart,
 )
 from monitor.workflow.explain.request import CompareRequest
-from monitor.workflow.instruments.answer import Disagreement, RunsWithTime
+from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
@@ -50,6 +50,8 @@ def run(options: Namespace) -> int:
     residual_output.summary(answer.comparison)
     if answer.instruments_disagree is not None:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
+    if answer.against_others is not None:
+        _against_others(answer.against_others)
     for drift in answer.run_with_time or ():
         _drift(answer.comparison.campaign, drift)
     _breakdown(answer)
@@ -81,6 +83,26 @@ def _disagreement(campaign: str, apart: Disagreement) -> None:
         f"least likely of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "
         f"`monitor contributions {campaign} --run {apart.run}` says what "
         f"each says alone, `monitor explain {campaign}` what may be missing"
+    )
+
+
+def _against_others(beside: AgainstOthers) -> None:
+    suspects = " or ".join(beside.suspects)
+    if not suspects:
+        who = (
+            "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
+        )
+    elif len(beside.suspects) == 1:
+        who = (
+            f"Without {suspects} the others agree: look first at signs, unit, points and rows of {suspects}; where "
+            "they are right, the model lacks what the others do not meet"
+        )
+    else:
+        who = f"Without {suspects} the others agree, which cannot tell them apart: look at each of them"
+    output.say(
+        f"{beside.name} in run {beside.run} contradicts all other setups together by {beside.size:.1f} u in "
+        f"{beside.directions} {'direction' if beside.directions == 1 else 'directions'}; chance alone makes as much in "
+        f"{_chance(beside.by_chance)} of campaigns. {who}"
     )
 
 

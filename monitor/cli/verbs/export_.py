@@ -44,4 +44,6 @@ def run(options: Namespace) -> int:
     else:
         for file in answer.files:
             output.say(str(file))
+        for note in answer.notes:
+            output.say(f"note: {note}")
     return 0

@@ -20,7 +20,7 @@ import scipy
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainVariant, scene_of
-from monitor.methods.chain.least_squares import eliminate
+from monitor.methods.chain.least_squares import eliminate, project_out
 from monitor.records import Array
 
 # Lack of fit is an uncertainty from a p-value on at which it is hardly chance; called missing it is much later.
@@ -31,7 +31,8 @@ LEAST_PROBABLE = 1e-6
 
 @dataclass(frozen=True)
 class ModelUncertainty:
-    """Covariance (p, p) of a run's unknowns by lack of fit, whitened units; ``dof`` its degrees of freedom.
+    """Covariance (p + c, p + c) by lack of fit of a run's unknowns and of the common ones, whitened units; ``dof`` its
+    degrees of freedom.
 
     ``effects`` are the most probable causes with their probabilities, the first ones first.
     """
@@ -51,12 +52,13 @@ def model_uncertainty(fit: Fit, run: int, variants: Sequence[ChainVariant]) -> M
     if lack is None:
         return None
     scene = scene_of(fit, variants)
+    unknowns = _unknowns_of(fit, run)
     pulls = [
         pull
         for candidate in scene.candidates
-        if candidate.detectable and (pull := _pull(fit, run, candidate, scene.residual)) is not None
+        if candidate.detectable and (pull := _pull(fit, unknowns, candidate, scene.residual)) is not None
     ]
-    local = fit.solution.local_covariance[run]
+    local = unknowns.covariance(fit.solution.local_covariance[run])
     if not pulls:
         added = (lack.squares / lack.degrees_of_freedom - lack.pure) / lack.runs
         return ModelUncertainty(added * local, lack.degrees_of_freedom, ())
@@ -86,8 +88,8 @@ class _Lack:
 
 @dataclass(frozen=True)
 class _Pull:
-    """An effect with ``size`` coefficients at its best size: how it moves the unknowns of a run (p,), and the sum of
-    squares that it explains."""
+    """An effect with ``size`` coefficients at its best size: how it moves the unknowns of a run and the common ones
+    (p + c,), and the sum of squares that it explains."""
 
     effect: str
     size: int
@@ -121,7 +123,7 @@ def _probabilities(explained: Array, sizes: Array, lack: _Lack) -> Array:
     return np.asarray(weights / weights.sum())
 
 
-def _pull(fit: Fit, run: int, candidate: ChainCandidate, residual: Array) -> _Pull | None:
+def _pull(fit: Fit, unknowns: _Unknowns, candidate: ChainCandidate, residual: Array) -> _Pull | None:
     """The pull of an effect at its best size on the unknowns of a run; None where it has no size."""
     scale = np.linalg.norm(candidate.columns, axis=0)
     if not np.all(scale > 0.0):
@@ -132,7 +134,51 @@ def _pull(fit: Fit, run: int, candidate: ChainCandidate, residual: Array) -> _Pu
     size = size / scale
     explained = float(np.sum((candidate.columns @ size) ** 2))
     problem = fit.problem
-    rows = problem.padded(candidate.raw / problem.sigma[..., None])[run] @ size
-    space = eliminate(fit.solution.last.local[[run]])
-    basis = space.basis[0][: len(rows)]
-    return _Pull(candidate.family, len(scale), space.inverse[0] @ (basis.T @ rows), explained)
+    rows = problem.padded(candidate.raw / problem.sigma[..., None]) @ size
+    return _Pull(candidate.family, len(scale), unknowns.moved_by(rows), explained)
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """What the unknowns of a run and the common ones do to whitened numbers, linearised at a solution.
+
+    ``basis`` (N, p) and ``inverse`` (p, p) of the run alone as ``eliminate`` has them, ``common`` (N, c) its
+    derivatives by the common unknowns; ``remainder`` (R, N, c): what all runs' own unknowns leave of these.
+    """
+
+    run: int
+    basis: Array
+    inverse: Array
+    common: Array
+    remainder: Array
+    common_covariance: Array
+
+    def moved_by(self, rows: Array) -> Array:
+        """How a displacement of all runs' numbers (R, n) moves the unknowns of the run and the common ones (p + c,)."""
+        length = rows.shape[1]
+        # What the common unknowns take of it, the run's own do not.
+        of_common = self.common_covariance @ np.einsum("rmc,rm->c", self.remainder[:, :length], rows)
+        rest = rows[self.run] - self.common[:length] @ of_common
+        return np.concatenate([self.inverse @ (self.basis[:length].T @ rest), of_common])
+
+    def covariance(self, local: Array) -> Array:
+        """Their covariance (p + c, p + c) for residuals of unit variance, from that (p, p) of the run's."""
+        response = -(self.inverse @ (self.basis.T @ self.common))
+        beside = response @ self.common_covariance
+        return np.block([[local, beside], [beside.T, self.common_covariance]])
+
+
+def _unknowns_of(fit: Fit, run: int) -> _Unknowns:
+    solution, count = fit.solution, len(fit.solution.common)
+    common = solution.last.common[..., :count]
+    # Without common unknowns no other run moves those of this one.
+    space = eliminate(solution.last.local if count else solution.last.local[[run]])
+    place_of_run = run if count else 0
+    return _Unknowns(
+        run,
+        space.basis[place_of_run],
+        space.inverse[place_of_run],
+        common[run],
+        project_out(space.basis, common) if count else common,
+        solution.common_covariance[:count, :count],
+    )

@@ -77,6 +77,10 @@ class MeasuredChain(ABC):
         """The part (n, d, ...) that is measured of vectors or their derivatives (n, 3, ...): all three components."""
         return rows
 
+    def with_products(self) -> Self:
+        """The problem with all derivatives of its numbers, where it leaves out those that are products of errors."""
+        return self
+
     def as_vectors(self, rows: Array) -> Array:
         """Residuals (n, d) as the shortest vectors (n, 3) mm in the frame of the last work axis."""
         if self.components == ("x", "y", "z"):

@@ -19,7 +19,7 @@ from monitor.effects import (
 from monitor.exceptions import DataError, EffectError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.instruments.base import instrument_base
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
 from monitor.methods.instruments.readings import readings
@@ -112,7 +112,18 @@ def _parts(
         if drift is not None:
             _refuse_one_moment(campaign, setup, rows)
             drift *= LEVER if kind.angular else 1.0
-        parts.append(Part(setup.id, reading, rows, at, setup.instrument or "", drift))
+        parts.append(
+            Part(
+                id=setup.id,
+                reading=reading,
+                rows=rows,
+                at=at,
+                instrument=setup.instrument or "",
+                drift=drift,
+                tool_point=setup.tool_point_uncertainty,
+                tool_id=tool_id_of(setup),
+            )
+        )
     return tuple(parts)
 
 

@@ -36,7 +36,7 @@ def first_guess(part: Part, runs: int, nominal: Orientation) -> Array:
         return guess
     rows, values = part.rows, guess[part.rows.run]
     none = np.zeros((len(rows), len(rows.chain.joints), 2, 6))
-    pose = evaluate(rows.chain, rows.positions, none, *part.reading.ends(values, rows))
+    pose = evaluate(rows.chain, rows.positions, none, *part.ends(values))
     stance = stance_at(pose.residual, nominal, part.at)
     shown = part.shown(replace(stance, nominal=stance), values)
     assert shown.by_own is not None

@@ -11,6 +11,7 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.contrasts import contrasts, scatters
 from monitor.methods.instruments.drifts import drifts
 from monitor.methods.instruments.forecast import InstrumentForecast
 from monitor.methods.instruments.problem import InstrumentProblem
@@ -66,7 +67,7 @@ METHOD = ChainMethod(
     base_effects=usual_base,
     trial_rows=150,
     taken_up=without_numbers,
-    instruments=Instruments(shares, drifts),
+    instruments=Instruments(shares, contrasts, scatters, drifts),
     standards=StandardTests(standard_tests),
     plan=InstrumentPlan(InstrumentForecast),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),

@@ -29,6 +29,7 @@ ON_PATH = 5e-3
 FEWEST_OF_LINE, FEWEST_OF_CIRCLE = 4, 6
 #: Of a path of any form seven numbers are found: where the part lies, and the radius of the cutter.
 FEWEST_OF_PATH = 14
+NEEDED = (FEWEST_OF_LINE, FEWEST_OF_CIRCLE, FEWEST_OF_PATH)
 #: A circle is measured around by half a turn at least.
 SHORTEST_ARC = np.pi
 #: A rotary axis that moves by more than this turns, rad.
@@ -53,10 +54,11 @@ def part_tests(problem: InstrumentProblem) -> Iterator[PartTest]:
             continue
         for index in np.unique(part.rows.run):
             mine = np.flatnonzero(part.rows.run == index)
-            features, paths = _elements(_cut(part, mine))
-            if features or paths:
+            features, paths, short = _elements(_cut(part, mine))
+            # Points with names of their own are no paths: a part of them alone is none of this test.
+            if features or paths or max(short.values(), default=0) >= FEWEST_OF_LINE:
                 u = float(np.sqrt(np.mean(problem.sigma[part.at[mine], 0] ** 2)))
-                yield PartTest(part.id, int(problem.runs[index]), features, paths, u)
+                yield PartTest(part.id, int(problem.runs[index]), features, paths, u, short, NEEDED)
 
 
 @dataclass(frozen=True)
@@ -105,9 +107,10 @@ def _tool_axes(part: Part) -> Array:
     return np.asarray(np.swapaxes(sides.work, 1, 2) @ sides.tool @ along)
 
 
-def _elements(cut: _Cut) -> tuple[tuple[PartFeature, ...], tuple[PartPath, ...]]:
-    """The lines and circles, and the paths that are neither, in the order of cutting."""
-    features, paths = [], []
+def _elements(cut: _Cut) -> tuple[tuple[PartFeature, ...], tuple[PartPath, ...], dict[str, int]]:
+    """The lines and circles, the paths that are neither, and the points of those that have too few, in the order of
+    cutting."""
+    features, paths, short = [], [], {}
     for name in dict.fromkeys(cut.targets.tolist()):
         at = cut.targets == name
         nominal, measured, shape = cut.nominal[at], cut.measured[at], _shape(cut.nominal[at])
@@ -127,7 +130,9 @@ def _elements(cut: _Cut) -> tuple[tuple[PartFeature, ...], tuple[PartPath, ...]]
             )
         elif len(nominal) >= FEWEST_OF_PATH:
             paths.append(PartPath(str(name), measured, nominal, cut.axes[at], cut.has_heights))
-    return tuple(features), tuple(paths)
+        else:
+            short[str(name)] = len(nominal)
+    return tuple(features), tuple(paths), short
 
 
 def _normal(points: Array, targets: npt.NDArray[np.str_]) -> Array:

@@ -23,6 +23,7 @@ from monitor.methods.instruments.first_guess import first_guess, stance_at
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
+from monitor.methods.instruments.seen_errors import by_error_of, first_order
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -30,11 +31,6 @@ from monitor.records import Array, Setup
 LARGEST_OUTSIDE = (5.0, 0.02)
 # A zero that is off by more than 20 degrees is another zero.
 LARGEST_TURN = 0.35
-# What is read of an error's displacement is at least this part, else it comes from products of errors alone.
-SECOND_ORDER = 5e-3
-# A turn that moves a reading by less than this, mm/rad, is seen by rounding alone; one that turns sensors shows what
-# they read, which is some tenths of a millimetre and an error itself.
-LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 # An unknown of which less than this part is separated is open by itself.
 ALONE = 1e-6
 # Derivatives below this part of the largest, in mm or rad over what a reading is known to, are rounding.
@@ -55,7 +51,8 @@ class InstrumentProblem(ChainProblem):
     ``setups`` are those that have rows, ``gear_ratios`` those that the machine file gives. ``separated`` (R, p, p) is
     the projector of ``linearise`` where it was computed before; none is applied where the problem ``is_whole``.
     ``shares_bars``: whether the runs have their bars in common; ``from_others`` is what a run by itself knows of them
-    from the others.
+    from the others. ``masks`` are the errors that each setup reads where they were looked at before; ``has_products``:
+    whether derivatives hold products of errors too.
     """
 
     parts: tuple[Part, ...] = ()
@@ -66,6 +63,8 @@ class InstrumentProblem(ChainProblem):
     shares_bars: bool = False
     from_others: KnownFromOthers | None = None
     absent: tuple[tuple[str, str], ...] = ()
+    masks: dict[str, npt.NDArray[np.bool_]] | None = None
+    has_products: bool = False
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -221,7 +220,7 @@ class InstrumentProblem(ChainProblem):
         """The work points and tool points of all rows."""
         work, tool = np.zeros((2, len(self.context), 3))
         for part, values in self._with_own(nuisance):
-            work[part.at], tool[part.at] = part.reading.ends(values, part.rows)
+            work[part.at], tool[part.at] = part.ends(values)
         return work, tool
 
     def _with_own(self, nuisance: Array) -> Iterator[tuple[Part, Array]]:
@@ -257,7 +256,7 @@ class InstrumentProblem(ChainProblem):
             if shown.by_own is not None:
                 by_own[np.ix_(at, np.arange(kinds), columns)] = shown.by_own
             if by_error is not None:
-                derivatives = self._by_error(shown, pose, sides, at)
+                derivatives = by_error_of(self.context.chain, shown, pose, sides, at)
                 by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
         residual += self._of_instruments(local, common)
         return InstrumentPose(residual, pose.by_tip, pose.work_rotation, by_error, by_own)
@@ -303,55 +302,28 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def _masks(self) -> dict[str, npt.NDArray[np.bool_]]:
-        """Which errors each setup reads, by its id, as they were first looked at."""
-        return {}
+        """Which errors each setup reads, by its id, as they were first looked at, by the problem of which this one was
+        taken if it is one."""
+        return {} if self.masks is None else self.masks
+
+    def with_products(self) -> Self:
+        """The problem with all derivatives of its numbers, also those that are products of errors."""
+        return replace(self, separated=self._separated, has_products=True)
 
     def _first_order(
         self, setup: str, shown: Shown, derivatives: Array, pose: ChainPose, at: npt.NDArray[np.int64]
     ) -> npt.NDArray[np.bool_]:
-        """Which errors (J, 2, 6) a setup of lengths reads more of than products of errors.
-
-        One that moves the tool along the line of sight alone, or across the one direction that is read, shows only
-        through products with other errors. Its derivatives are taken as zero: they are as large as the other errors let
-        them be, and turn with every step.
-        """
-        assert pose.by_error is not None
-        if shown.by_shift is None:
+        """Which errors (J, 2, 6) a setup reads more of than products of errors, as it was first looked at."""
+        if self.has_products:
             return np.ones(derivatives.shape[2:], dtype=bool)
         if setup not in self._masks:
-            turns = shown.by_turn is not None
-            moved = np.zeros(derivatives.shape[2:]) if turns else np.sum(pose.by_error[at] ** 2, axis=(0, 1))
-            least = np.where(np.arange(6) < 3, 0.0, LEAST_READ if turns else LEAST_LEVER)
-            size = np.sum(derivatives**2, axis=(0, 1))
-            self._masks[setup] = (size > SECOND_ORDER**2 * moved) & (size > least**2 * len(at))
+            self._masks[setup] = first_order(shown, derivatives, pose, at)
         return self._masks[setup]
 
     def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
         """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
         nominal = stance_at(vectors[part.at], self._nominal, part.at)
         return replace(stance_at(vectors[part.at], sides, part.at), nominal=nominal)
-
-    def _by_error(
-        self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]
-    ) -> Array:
-        """Derivatives (m, k, J, 2, 6) of what a setup shows by every error."""
-        assert pose.by_error is not None
-        assert sides.by_error is not None
-        chain = self.context.chain
-        shape = (len(at), shown.residual.shape[1], len(chain.joints), 2, 6)
-        total = np.zeros((*shape[:2], shape[2] * 12))
-        turns = sides.by_error[at].reshape(len(at), 3, shape[2] * 12)
-        on_tool = np.repeat(np.arange(len(chain.joints)) >= len(chain.work), 12)
-        if shown.by_shift is not None:
-            total += shown.by_shift @ pose.by_error[at].reshape(len(at), 3, shape[2] * 12)
-        if shown.by_turn is not None:
-            relative = np.swapaxes(sides.work[at], 1, 2) @ (turns * np.where(on_tool, 1.0, -1.0))
-            total += shown.by_turn @ relative
-        if shown.by_tool is not None:
-            total += shown.by_tool @ (turns * on_tool)
-        if shown.by_work is not None:
-            total += shown.by_work @ (turns * ~on_tool)
-        return total.reshape(shape)
 
     def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, d, q) by the unknowns of the setups."""
@@ -419,7 +391,7 @@ class InstrumentProblem(ChainProblem):
     def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
         """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
         separated = self._separated_of(rows, run)
-        problem = replace(super().taken(rows, run), separated=separated, shares_bars=False)
+        problem = replace(super().taken(rows, run), separated=separated, shares_bars=False, masks=self._masks)
         index = np.searchsorted(problem.runs, run)
         parts = []
         for part in self.parts:
@@ -446,4 +418,6 @@ class InstrumentProblem(ChainProblem):
         """Positions in another unit, directions and lengths that are off by more than any machine's errors."""
         vectors = self.vectors(solution.local, solution.common)
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        return contradiction(self.parts, self.sigma, vectors, travel)
+        own = self.own_of(solution.local)
+        unknowns = [own[:, columns] for columns in self.own_columns]
+        return contradiction(self.parts, unknowns, self.sigma, vectors, travel)

@@ -15,7 +15,7 @@ from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
-from monitor.readers.registry import Reader
+from monitor.readers.registry import Reader, method_rules
 from monitor.readers.spreadsheet import read_table, renamed
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import CurveCampaign, Instrument, SourceFile
@@ -27,13 +27,16 @@ RESERVED = ("sequence", "formula", "pi")
 
 
 def recognises(folder: Path) -> bool:
-    """Return whether a folder is a curve: its file says so, or it has data.csv and no probings."""
+    """Return whether a folder is a curve: its file says so, or it has data.csv and no probings beside a file that is
+    damaged or names a method that there is not."""
+    has_rows = (folder / DATA).is_file() and not (folder / "probings.csv").exists()
     try:
         content = read_bounded(folder / TOML, LARGEST_TOML)
-        return tomllib.loads(content.decode("utf-8-sig")).get("method") == METHOD
+        method = tomllib.loads(content.decode("utf-8-sig")).get("method")
+        return method == METHOD or (has_rows and method not in list(method_rules()))
     except (OSError, ValueError, RecursionError):
         # A damaged file: the name of the method in it, or the data beside it, say which reader should refuse it.
-        if (folder / DATA).is_file() and not (folder / "probings.csv").exists():
+        if has_rows:
             return True
         try:
             head = read_bounded(folder / TOML, LARGEST_TOML)
@@ -94,7 +97,11 @@ def _head(top: Table) -> _Head:
     if top.raw("format", required=True, example=str(FORMAT)) not in (FORMAT, None):
         top.fault("format", f"this software reads format = {FORMAT}")
     name = top.text("campaign", required=True, example='"load-cell-7"')
-    top.text("method", required=True, example='"curve"')
+    method = top.text("method", required=True, example='"curve"')
+    if method not in (METHOD, None):
+        names = [*method_rules(), METHOD]
+        hint = did_you_mean(method, names)
+        top.fault("method", f"method {quoted(method)} is not known; {hint}the methods are {one_of(names)}")
     instrument = _instrument(top, name)
     settings = _settings(top)
     top.finish()

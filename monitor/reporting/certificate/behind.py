@@ -95,12 +95,17 @@ def _written(value: float, texts: Texts, nothing: float = 0.0) -> str:
 
 
 def _columns(
-    result: ResultSet, columns: Sequence[list[str]], heads: tuple[Markup, ...], texts: Texts
+    result: ResultSet,
+    names: Sequence[str],
+    columns: Sequence[list[str]],
+    heads: tuple[Markup, ...],
+    texts: Texts,
 ) -> PrintedTable:
     numbers = [aligned(column, texts.decimal_sign) for column in columns]
+    units = dict(zip(result.names, result.units, strict=True))
     rows = tuple(
-        (name, unit, tuple(column[position] for column in numbers))
-        for position, (name, unit) in enumerate(zip(result.names, result.units, strict=True))
+        (name, units[name], tuple(column[position] for column in numbers))
+        for position, name in enumerate(names)
     )
     return PrintedTable(heads, rows)
 
@@ -115,7 +120,7 @@ def _block(result: ResultSet, lines: tuple[BudgetLine, ...], first: int, texts: 
         for line in lines
     ]
     total = [_written(float(u), texts) for u in result.u]
-    return _columns(result, [*columns, total], (*heads, Markup("u")), texts)
+    return _columns(result, result.names, [*columns, total], (*heads, Markup("u")), texts)
 
 
 def _lines(budget: Budget, texts: Texts) -> tuple[Markup, ...]:
@@ -144,17 +149,19 @@ def _days(result: ResultSet, days: DayToDay, expanded: dict[str, float], texts: 
     heads = tuple(
         texts.markup(f"budget.{key}") for key in ("within_run", "between_runs", "u_day", "interval", "spread")
     )
+    # Effects of the model are one number of all runs: they have no components.
+    names = [name for name in result.names if name in days.u_day]
     interval = [
         f"{_written(low, texts)} \N{HORIZONTAL ELLIPSIS} {_written(high, texts)}" if low == low else _UNKNOWN
-        for low, high in (days.u_day_interval[name] for name in result.names)
+        for low, high in (days.u_day_interval[name] for name in names)
     ]
     columns = [
-        [_written(values[name], texts) for name in result.names]
+        [_written(values[name], texts) for name in names]
         for values in (days.within_run, days.between_runs, days.u_day)
     ]
-    spread = [texts.number(round_result(days.spread[name], expanded[name]).estimate) for name in result.names]
-    table = _columns(result, [*columns, interval, spread], (*heads, Markup("U")), texts)
-    larger = [_written(expanded[name], texts) for name in result.names]
+    spread = [texts.number(round_result(days.spread[name], expanded[name]).estimate) for name in names]
+    table = _columns(result, names, [*columns, interval, spread], (*heads, Markup("U")), texts)
+    larger = [_written(expanded[name], texts) for name in names]
     last = aligned(larger, texts.decimal_sign)
     plain = [Number(text, 0.0) for text in interval]
     rows = tuple(

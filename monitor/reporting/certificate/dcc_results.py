@@ -64,8 +64,12 @@ def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, 
         say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
         say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
         return
-    explained = texts("page.effects_explained", runs=effect.runs, days=effect.days)
-    values = [(description, effect.value, effect.u)]
+    key = "page.effects_joint" if effect.joint else "page.effects_explained"
+    explained = texts(key, effects=effect.name, runs=effect.runs, days=effect.days)
+    if effect.outside is not None:
+        explained += " " + texts(f"page.outside_{effect.outside.value}")
+    # One that is among the results is there with its value and the covariance.
+    values = [] if effect.joint else [(description, effect.value, effect.u)]
     if effect.reversal_value is not None and effect.u_reversal is not None:
         values.append((texts("page.effect_reversal"), effect.reversal_value, effect.u_reversal))
     for meaning, value, u in values:

@@ -15,6 +15,8 @@ from monitor.reporting.texts import Texts
 
 #: Between the names of a ground that is of several parameters together.
 SEVERAL = ", "
+#: The unit of what is counted in standard uncertainties.
+IN_U = "u"
 
 
 class GroundKind(StrEnum):
@@ -28,6 +30,7 @@ class GroundKind(StrEnum):
     UNITS = "units"
     WORK_POINT = "work-point"
     INSTRUMENTS = "instruments"
+    SIMULATED = "simulated"
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,10 @@ class Ground:
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
     them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and
-    none where the residuals are a ``size`` of what the statements leave. Of instruments the subject is a parameter with
-    the two that disagree, and ``size`` is their E_n.
+    none where the residuals are a ``size`` of what the statements leave, or the setup of which they are. Of what was
+    simulated the subject is the machine. Of instruments
+    the subject is a parameter with the two that disagree, and ``size`` is their E_n; or it is who contradicts all
+    others, by ``size`` in standard uncertainties.
     """
 
     kind: GroundKind
@@ -66,6 +71,10 @@ def ground_sentence(ground: Ground, texts: Texts) -> str:
         key = "common_gain"
     if ground.kind is GroundKind.UNITS and not ground.subject:
         key = "fits_too_well"
+    if ground.kind is GroundKind.UNITS and ground.subject and not ground.unit:
+        key = "setup_fits_too_well"
+    if ground.kind is GroundKind.INSTRUMENTS and ground.unit == IN_U:
+        key = "one_of_several" if SEVERAL in ground.subject else "against_others"
     if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:
         key = "lack_in_budget"
     return texts(

@@ -22,6 +22,7 @@ from monitor.reporting.certificate.record import Accreditation, NotApplicable, P
 from monitor.reporting.certificate.samples import sample_faults
 from monitor.reporting.resources import report_text
 from monitor.reporting.texts import languages
+from monitor.toml_text import toml_refusal
 
 #: The keys that may be answered by ``{ not_applicable = "..." }``.
 MAY_NOT_APPLY = frozenset(
@@ -100,7 +101,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         line = error.object[: error.start].count(b"\n") + 1
         raise InputError(f"{file}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file} is not TOML: {error}") from error
+        raise InputError(toml_refusal(file, error, text)) from error
     faults: list[str] = []
     answers = _answers(tables, faults)
     mark = read_mark(file, answers.get("laboratory.mark"), faults)

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from monitor.documents import OMITTED
+
+
+class Outside(StrEnum):
+    """Why effects of a model are no part of the joint region; the value is the key among the texts of ``outside``."""
+
+    SHARED_LENGTHS = "shared_lengths"
+    LINEAR_AXES = "linear_axes"
+    FEW_RUNS = "few_runs"
 
 
 @dataclass(frozen=True)
 class ModelEffect:
     """An effect of the model that all runs share: its size with standard uncertainty, in its display unit.
 
-    The size is the mean of what ``runs`` runs on ``days`` days say. ``reversal_value`` (ISO 230-2) and ``u_reversal``
+    With ``joint`` it is one of the results, the value of all runs together. Else the size is the mean of what ``runs``
+    runs on ``days`` days say by themselves, and ``outside`` says why. ``reversal_value`` (ISO 230-2) and ``u_reversal``
     of a play, twice its amplitude; None of another effect. ``value`` is None where nothing is stored of it.
     """
 
@@ -21,3 +33,5 @@ class ModelEffect:
     days: int = 0
     reversal_value: float | None = None
     u_reversal: float | None = None
+    joint: bool = field(default=False, metadata=OMITTED)
+    outside: Outside | None = field(default=None, metadata=OMITTED)

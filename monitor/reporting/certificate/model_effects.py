@@ -30,11 +30,12 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
     for effect in effects:
         if effect.value is None or effect.u is None:
             continue
-        lines.append((effect.name, describe(effect.name, texts), effect.value, effect.u, effect.unit))
+        # One that is among the results is there with its value.
+        if not effect.joint:
+            lines.append((effect.name, describe(effect.name, texts), effect.value, effect.u, effect.unit))
         if effect.reversal_value is not None and effect.u_reversal is not None:
             meaning = texts("page.effect_reversal")
             lines.append((effect.name, meaning, effect.reversal_value, effect.u_reversal, effect.unit))
-    with_value = [effect for effect in effects if effect.value is not None]
     unknown = [effect.name for effect in effects if effect.value is None]
     values = aligned(
         [texts.number(round_result(value, u).estimate) for _, _, value, u, _ in lines], texts.decimal_sign
@@ -45,8 +46,23 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
             (name, meaning, (value, u), unit)
             for (name, meaning, _, _, unit), value, u in zip(lines, values, uncertainties, strict=True)
         ),
-        texts.markup("page.effects_explained", runs=with_value[0].runs, days=with_value[0].days)
-        if with_value
-        else Markup(""),
+        _explained(effects, texts),
         texts.markup("page.effects_unknown", effects=", ".join(unknown)) if unknown else Markup(""),
     )
+
+
+def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
+    """What the values are: those among the results, then those by themselves and why these are no results."""
+    joint = [effect for effect in effects if effect.joint]
+    alone = [effect for effect in effects if effect.value is not None and not effect.joint]
+    sentences = []
+    if joint:
+        names = ", ".join(effect.name for effect in joint)
+        sentences.append(
+            texts.markup("page.effects_joint", effects=names, runs=joint[0].runs, days=joint[0].days)
+        )
+    if alone:
+        sentences.append(texts.markup("page.effects_explained", runs=alone[0].runs, days=alone[0].days))
+    outside = {effect.outside for effect in effects if effect.outside is not None}
+    sentences += [texts.markup(f"page.outside_{reason.value}") for reason in sorted(outside)]
+    return Markup(" ").join(sentences)

@@ -33,9 +33,11 @@ class State(StrEnum):
 
 
 class ChangeKind(StrEnum):
-    """How a change is known: found by the statistics, a step at a recorded event, or the event itself."""
+    """How a change is known: found by the statistics, one of those that passes again (and makes no machine's state), a
+    step at a recorded event, or the event itself."""
 
     CHANGE = "change"
+    SETTLING = "settling"
     EVENT_STEP = "event step"
     EVENT = "event"
 

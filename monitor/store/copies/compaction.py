@@ -22,6 +22,7 @@ from monitor.store.copies.backup import begin_copy, copy_all
 from monitor.store.copies.manifest import remove_partial, sync
 from monitor.store.opening import busy, refuse_log_apart, sync_folder
 from monitor.store.turns import turn_to_write
+from monitor.store.unwritable import why_not_written
 
 try:
     import fcntl
@@ -47,6 +48,8 @@ def compact(db: Database) -> Compaction:
     """
     if db.path == ":memory:":
         raise StoreError("a database in memory has no file to be written anew")
+    if (why := why_not_written(db.path)) is not None:
+        raise StoreError(f"{why}; it stays as it was")
     path = Path(db.path).resolve()
     partial = path.with_name(path.name + ".partial")
     db.close()

@@ -13,7 +13,7 @@ from monitor import __version__
 from monitor.exceptions import InputError, StoreError
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
-from monitor.store.copies.workbook_sheets import Sheet, sheets
+from monitor.store.copies.workbook_sheets import ComputedChange, Sheet, sheets
 
 if TYPE_CHECKING:
     from openpyxl.worksheet._write_only import WriteOnlyWorksheet
@@ -25,25 +25,26 @@ _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 
 
 def export_workbook(
-    db: Database, path: Path, tables: Sequence[str] | None = None, machine: str | None = None
+    db: Database,
+    path: Path,
+    tables: Sequence[str] | None = None,
+    machine: str | None = None,
+    changes: Sequence[ComputedChange] = (),
 ) -> Path:
     """Write a workbook with a sheet a table, and one that says what the columns hold.
+
+    ``changes`` are those of the sheet of that name that nobody recorded.
 
     Raises InputError where the file is there already, openpyxl is not installed or a table is too long for a sheet;
     NotFoundError for a table or machine that is not there, StoreError where it cannot be written.
     """
-    try:
-        from openpyxl import Workbook
-    except ImportError as error:
-        raise InputError(
-            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]'; --format csv needs nothing"
-        ) from error
-    if path.exists():
-        raise InputError(f"{path} is there already and is not written over; name another file")
+    check_workbook_path(path)
+    from openpyxl import Workbook
+
     if machine is not None:
         check_machine(db, machine)
     workbook = Workbook(write_only=True)
-    written = sheets(db, tables, machine)
+    written = sheets(db, tables, machine, changes)
     for sheet in (*written, _about(db, written)):
         if len(sheet.rows) >= MOST_ROWS or len(sheet.columns) > MOST_COLUMNS:
             raise InputError(
@@ -57,6 +58,18 @@ def export_workbook(
     except OSError as fault:
         raise StoreError(f"the workbook {path} could not be written: {fault}") from fault
     return path
+
+
+def check_workbook_path(path: Path) -> None:
+    """Raise InputError where no workbook can be written, because openpyxl is not installed or the file is there."""
+    try:
+        import openpyxl  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]'; --format csv needs nothing"
+        ) from error
+    if path.exists():
+        raise InputError(f"{path} is there already and is not written over; name another file")
 
 
 def _about(db: Database, written: tuple[Sheet, ...]) -> Sheet:

@@ -5,9 +5,9 @@ A header says the unit behind a slash (``EXX / µm/m``, ISO 80000-1, 7.1.4); tim
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from datetime import datetime
 from typing import Any
 
 from monitor.exceptions import NotFoundError, did_you_mean
@@ -18,6 +18,8 @@ _UNITS = {
     "mm": "mm", "um": "µm", "deg": "°", "degC": "°C", "degc": "°C", "s": "s", "min": "min", "percent": "%",
     "hPa": "hPa",
 }  # fmt: skip
+#: The sheet of events and of changes that were computed.
+CHANGES = "changes"
 _WHERE = "WHERE $machine IS NULL OR machine = $machine"
 
 
@@ -39,10 +41,31 @@ def header(column: str, comment: str = "") -> str:
     return f"{stem} / {_UNITS[suffix]}" if stem and suffix in _UNITS else column
 
 
-def sheets(db: Database, names: Sequence[str] | None, machine: str | None) -> tuple[Sheet, ...]:
+@dataclass(frozen=True)
+class ComputedChange:
+    """A row of the sheet ``changes`` that no person recorded: a change of a parameter, or that there is none.
+
+    ``at`` is in UTC without an offset; ``what`` says in words what the row means.
+    """
+
+    machine: str
+    at: datetime | None
+    kind: str
+    parameter: str | None = None
+    size: float | None = None
+    u: float | None = None
+    unit: str | None = None
+    p_value: float | None = None
+    what: str = ""
+
+
+def sheets(
+    db: Database, names: Sequence[str] | None, machine: str | None, computed: Sequence[ComputedChange]
+) -> tuple[Sheet, ...]:
     """The sheets of these names, of all machines or one. Without names those that people ask for first.
 
-    Raises NotFoundError, listing what is there, for a name that is neither one of ``SHEETS`` nor a view.
+    ``computed`` are the changes for the sheet of that name. Raises NotFoundError, listing what is there, for a name
+    that is neither one of ``SHEETS``, nor ``changes``, nor a view.
     """
     views = [
         name
@@ -51,14 +74,16 @@ def sheets(db: Database, names: Sequence[str] | None, machine: str | None) -> tu
         )
     ]
     sheets = []
-    for name in SHEETS if names is None else names:
+    for name in (*SHEETS, CHANGES) if names is None else names:
         view = name if name in views else f"v_{name}"
-        if name in SHEETS:
+        if name == CHANGES:
+            sheets.append(_changes(db, machine, computed))
+        elif name in SHEETS:
             sheets.append(SHEETS[name](db, machine))
         elif view in views:
             sheets.append(_view(db, view, machine))
         else:
-            every = [*SHEETS, *views]
+            every = [*SHEETS, CHANGES, *views]
             hint = did_you_mean(name, every)
             raise NotFoundError(f"there is no table {name!r}; {hint}there are {', '.join(every)}")
     return tuple(sheets)
@@ -158,8 +183,8 @@ def _conditions(db: Database, machine: str | None) -> Sheet:
 #: Columns of the changes, and what each holds.
 _CHANGES = {
     "machine": "Machine id",
-    "at / UTC": "When an event happened, or the first run after a change",
-    "kind": "step, bend and others: a change in a parameter; event: what somebody recorded",
+    "at / UTC": "When an event happened, or the first run after a change (of trend and transient the first run of all)",
+    "kind": "step, slope, trend, transient: a change in a parameter; event: what somebody recorded; none: no change",
     "parameter": "Geometric error that changed, empty of an event",
     "size": "Size of the change, empty of an event",
     "u": "Standard uncertainty of the size",
@@ -169,35 +194,23 @@ _CHANGES = {
 }
 
 
-def _changes(db: Database, machine: str | None) -> Sheet:
-    """What people recorded of the machines, and the changes that the last `trend` of each machine found."""
+def _changes(db: Database, machine: str | None, computed: Sequence[ComputedChange]) -> Sheet:
+    """What people recorded of the machines, and the changes that were computed from their runs."""
     events = db.rows(
         "SELECT machine, happened_at, 'event: ' || kind, NULL, NULL, NULL, NULL, NULL, description "
         f"FROM v_events {_WHERE}",
         {"machine": machine},
     )
-    rows: list[tuple[Any, ...]] = []
-    for owner, text in db.rows(
-        "SELECT machine, arg_max(document, analysis_id) FROM v_analyses "
-        "WHERE kind = 'trend' AND ($machine IS NULL OR machine = $machine) GROUP BY machine ORDER BY machine",
-        {"machine": machine},
-    ):
-        for parameter, followed in json.loads(text)["parameters"].items():
-            rows += [
-                (owner, change["at"], change["kind"], parameter, change["size"], change["u"], change["unit"],
-                 change["p_value"], "found by trend")
-                for kind in ("changes", "drifts")
-                for change in followed.get(kind, ())
-            ]  # fmt: skip
-    ordered = sorted([*events, *rows], key=lambda row: (row[0], str(row[1])))
-    return Sheet("changes", tuple(_CHANGES), tuple(ordered), tuple(_CHANGES.values()))
+    rows = [*events, *map(astuple, computed)]
+    # What has no time, that nothing changed, stands behind the rows of its machine.
+    rows.sort(key=lambda row: (row[0], row[1] is None, row[1] or datetime.min, row[3] or ""))
+    return Sheet(CHANGES, tuple(_CHANGES), tuple(rows), tuple(_CHANGES.values()))
 
 
-#: The sheets that people ask for first, by name.
+#: The sheets that people ask for first, by name, but for the last: `changes`.
 SHEETS: dict[str, Callable[[Database, str | None], Sheet]] = {
     "parameters": _parameters,
     "parameters long": _parameters_long,
     "runs": _runs,
     "conditions": _conditions,
-    "changes": _changes,
 }

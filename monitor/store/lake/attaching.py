@@ -118,6 +118,6 @@ def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -
 
 
 def _in_words(address: str, message: str) -> str:
-    if "does not exist" in message:
+    if "does not exist" in message and "FATAL" not in message:
         return f"there is no lake at {address}; `monitor publish --to {address!r} --files FOLDER` makes one"
     return f"the lake {address} cannot be opened: {' '.join(message.split())}"

@@ -23,11 +23,17 @@ SCHEME = "s3://"
 def address_of_files(files: str) -> str:
     """Return where files are said to lie: ``s3://BUCKET/FOLDER``, or the absolute path of a folder.
 
-    Raises InputError for the address of something else, of which DuckDB would make a folder of that name.
+    Raises InputError for the address of something else, of which DuckDB would make a folder of that name, and where no
+    folder can be made.
     """
     scheme = re.match(r"[A-Za-z][\w+.-]*://", files)
     if scheme is None:
-        return str(Path(files).resolve())
+        folder = Path(files).resolve()
+        # Asked before a lake is made that would look for its files there ever after.
+        nearest = next(path for path in (folder, *folder.parents) if path.exists())
+        if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+            raise InputError(f"--files {files}: nothing can be written to {nearest}")
+        return str(folder)
     if scheme[0].lower() != SCHEME:
         raise InputError(
             f"{files}: the files of a lake lie in a folder, or at s3://BUCKET/FOLDER of an object store"

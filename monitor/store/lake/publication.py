@@ -15,13 +15,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
 import duckdb
 
 from monitor import __version__
-from monitor.exceptions import StoreError
+from monitor.exceptions import InputError, StoreError
 from monitor.store.connection import Database, utc_now
 from monitor.store.entries import select_portion
 from monitor.store.kept_blocks import keep_blocks, settle_blocks
@@ -55,6 +56,18 @@ PORTION = 200
 _NOTHING_INLINED = "DATA_INLINING_ROW_LIMIT 0"
 #: How often a transaction is begun, and the first and longest pause in between, in s.
 _TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 40, 0.1, 5.0
+#: What is said of faults that may pass, and of those among them that stay: of a bucket, of PostgreSQL 15 and its client
+#: (who asks, with what password, for which database, by what address and options), of rights and room.
+_PASSING = ("conflict", "connection", "connect to", "failed to commit", "could not set lock", "deadlock")
+_LASTING = re.compile(
+    r"nosuchbucket|accessdenied|\bhttp\b.*\b40[134]\b|\b40[134] \("
+    r"|authentication failed|no password supplied|no pg_hba\.conf entry|fatal: [^:]* does not exist"
+    r"|name or service not known|invalid (connection option|integer value|port number)"
+    r"|does not support ssl|certificate verify failed|root certificate file"
+    r"|permission denied|must be owner|read-only (transaction|file system)|no space left"
+)
+#: How DuckLake names the statement that its catalogue refused.
+_QUERY = re.compile(r'Failed to execute query ".*": (?=ERROR)', re.DOTALL)
 #: After how many seconds of trying somebody who waits is told.
 _SAID_S = 3.0
 
@@ -98,9 +111,9 @@ def publish(
     """Publish everything that a database stored since it last published; ``files`` is the folder or the
     address in an object store (``s3://bucket/folder``) of a new lake.
 
-    ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
-    the last entry that was published and the last that is there, ``away`` with the fault for which a transaction is
-    tried again for long. The database is closed. Raises StoreError, InputError.
+    ``plant`` names the database at its first publication (default: the name of its file), and no other name later;
+    ``progress`` is called with the last entry that was published and the last that is there, ``away`` with the fault
+    for which a transaction is tried again for long. The database is closed. Raises StoreError, InputError.
     """
     if db.path == ":memory:" or is_lake(db.path):
         raise StoreError(f"{db.path} is no database file of a plant; name one with --db")
@@ -109,7 +122,7 @@ def publish(
     # DuckDB's lock belongs to the process: a second opening of the file would end that of the first.
     db.close()
     with contextlib.closing(_Publisher(db.path, db.patience(), address, files, away)) as publisher:
-        return publisher.publish(plant or Path(db.path).stem, progress)
+        return publisher.publish(plant, progress)
 
 
 class _Publisher:
@@ -130,15 +143,17 @@ class _Publisher:
         self._connection = connection_with_extensions()
         self._attached = False
         self._tries = 0
+        # First and last entry and rows of what was committed last, and its moment, until the answer comes.
+        self._sent: tuple[int, int, int, datetime] | None = None
 
     def close(self) -> None:
         self._connection.close()
         self._settle()
 
-    def publish(self, name: str, progress: Callable[[int, int], None]) -> Published:
+    def publish(self, wanted: str | None, progress: Callable[[int, int], None]) -> Published:
         """Publish portion by portion; the file is let go in between, so that those who write get their turn."""
         self._again(self._make)
-        plant_no, name = self._again(lambda: self._registered(name))
+        plant_no, name = self._again(lambda: self._registered(wanted))
         entries = rows = 0
         while True:
             portion = self._again(lambda: self._publish_portion(plant_no, name))
@@ -163,12 +178,12 @@ class _Publisher:
                     if isinstance(fault, StoreError):
                         raise
                     raise StoreError(
-                        f"nothing more could be published to {self._address}: {' '.join(str(fault).split())}; what was "
+                        f"nothing more could be published to {self._address}: {_without_queries(fault)}; what was "
                         "published stays, and the next `monitor publish` goes on behind it"
                     ) from fault
                 if not is_said and time.monotonic() - begin > _SAID_S:
                     is_said = True
-                    self._away(" ".join(str(fault).split()))
+                    self._away(_without_queries(fault))
             # No randomness of a result: only when two processes try again.
             time.sleep(random.uniform(pause / 3, pause))
             pause = min(1.5 * pause, _LONGEST_PAUSE_S)
@@ -234,15 +249,24 @@ class _Publisher:
     def _rows(self, sql: str, *parameters: object) -> list[tuple[Any, ...]]:
         return self._connection.execute(sql, parameters).fetchall()
 
-    def _registered(self, name: str) -> tuple[int, str]:
-        """Return number and name of the plant, registered where it never published."""
+    def _registered(self, wanted: str | None) -> tuple[int, str]:
+        """Return number and name of the plant, registered where it never published.
+
+        Raises InputError where it did under another name than the one that is wanted.
+        """
         with self._origin():
             first = self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = 1")
         if not first:
             raise StoreError(f"{self._path} holds nothing that could be published")
         registered = registered_plant(self._connection, first[0][0])
         if registered is not None:
+            if wanted not in (None, registered[1]):
+                raise InputError(
+                    f"the lake knows {self._path} as plant '{registered[1]}' since it first published, and its names "
+                    f"stand there: leave --plant '{wanted}' out. Another plant has a database of its own, not a copy"
+                )
             return registered
+        name = wanted or Path(self._path).stem
         with self._transaction():
             return register_plant(self._connection, name, first[0][0]), name
 
@@ -254,6 +278,8 @@ class _Publisher:
             first = 1 if published is None else published[0] + 1
             if published is not None:
                 self._check_past(*published)
+            if (arrived := self._arrived(plant_no)) is not None:
+                return _Portion(*arrived[:2], end, sha256, arrived[2])
             last = min(first + PORTION - 1, end)
             rows = None
             if first <= end:
@@ -264,6 +290,16 @@ class _Publisher:
                 self._register_names(plant_no, name)
                 rows = self._insert(plant_no, first, last)
             return _Portion(first, last, end, sha256, rows)
+
+    def _arrived(self, plant_no: int) -> tuple[int, int, int] | None:
+        """Return first and last entry and rows of what the lake took although its answer was lost; None: nothing."""
+        if self._sent is None:
+            return None
+        first, last, rows, moment = self._sent
+        sql = f"SELECT 1 FROM {LAKE}.publication WHERE plant_no = ? AND last_entry = ? AND published_at = ?"
+        is_there = bool(self._rows(sql, plant_no, last, moment))
+        self._sent = None
+        return (first, last, rows) if is_there else None
 
     def _check_past(self, entry: int, expected: str) -> None:
         """Raise StoreError where the entry that the lake holds last has another hash in the plant's audit."""
@@ -307,29 +343,26 @@ class _Publisher:
             self._rows(statement)[0][0]
             for statement in statements(self._connection, plant_no, {kind for kind, _, _ in names})
         )
+        moment = utc_now()
         self._connection.execute(
             f"INSERT INTO {LAKE}.publication VALUES (?, ?, ?, ?, ?, ?, ?)",
-            [plant_no, first, last, sha256, copied, __version__, utc_now()],
+            [plant_no, first, last, sha256, copied, __version__, moment],
         )
+        self._sent = first, last, int(copied), moment
         self._commit()
+        self._sent = None
         return int(copied)
 
 
 def _may_pass(message: str) -> bool:
     """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away.
 
-    A bucket that is not there, or that one may not enter, stays so.
+    Whom a server does not let in, or what it does not have, stays so.
     """
-    if re.search(r"nosuchbucket|accessdenied|\bhttp\b.*\b40[134]\b|\b40[134] \(", message.lower()):
-        return False
-    return any(
-        phrase in message.lower()
-        for phrase in (
-            "conflict",
-            "connection",
-            "connect to",
-            "failed to commit",
-            "could not set lock",
-            "deadlock",
-        )
-    )
+    said = message.lower()
+    return _LASTING.search(said) is None and any(phrase in said for phrase in _PASSING)
+
+
+def _without_queries(fault: Exception) -> str:
+    """Return what a fault says without the statement of DuckLake, which may have pages, and in one line."""
+    return " ".join(_QUERY.sub("", str(fault)).split())

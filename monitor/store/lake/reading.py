@@ -26,7 +26,12 @@ class LakeDatabase(Database):
     cannot be opened, holds nothing, or has another schema than this software.
     """
 
-    keeps_answers = False
+    is_lake = True
+
+    @property
+    def keeps_answers(self) -> bool:
+        """Nothing is written to a lake but by publication."""
+        return False
 
     def __init__(self, address: str, *, threads: int | None = None, actor: str = "") -> None:
         super().__init__(address, read_only=True, threads=threads, actor=actor)

@@ -25,16 +25,43 @@ from monitor.uncertainty.type_b import SourceColumns
 
 
 @dataclass(frozen=True)
+class FurtherOutputs:
+    """Outputs that no run identifies by itself: ``estimate`` (a,), behind the m of the estimator, to first order.
+
+    ``by_inputs`` (m + a, N): what the inputs do to all outputs besides; ``by_values`` (m + a, q) the same of the values
+    of all sources.
+    """
+
+    estimate: Array
+    by_inputs: Array
+    by_values: Array
+
+
+@dataclass(frozen=True)
 class Moves:
-    """What is drawn besides the inputs: ``sources`` move the inputs, normal ``outputs`` (m, r) the outputs."""
+    """What is drawn besides the inputs: ``sources`` move the inputs, normal ``outputs`` (m, r) the outputs.
+
+    ``further`` outputs are no draws, but follow from what is drawn.
+    """
 
     sources: tuple[SourceColumns, ...] = ()
     outputs: Array | None = None
+    further: FurtherOutputs | None = None
 
     @property
     def any(self) -> bool:
         """Whether there is anything."""
-        return bool(self.sources) or self.outputs is not None
+        return bool(self.sources) or self.outputs is not None or self.further is not None
+
+    def of_first(self, count: int) -> Moves:
+        """The same for the first ``count`` outputs, those of the estimator."""
+        outputs = None if self.outputs is None else self.outputs[:count]
+        further = self.further
+        if further is not None:
+            further = FurtherOutputs(
+                further.estimate[:0], further.by_inputs[:count], further.by_values[:count]
+            )
+        return Moves(self.sources, outputs, further)
 
     def with_sources(self, inputs: Inputs) -> Inputs:
         """The inputs with the covariance that they have as drawn, sources included."""
@@ -72,12 +99,19 @@ class _Moved:
     estimator: RunEstimator
     columns: Array
     outputs: Array | None
+    further: FurtherOutputs | None
+    centre: Array
 
     def __call__(self, block: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Outputs (trials, m) and which trials converged (trials,) for a ``block`` as drawn."""
         count, values = self.columns.shape
-        inputs = block[:, :count] + block[:, count : count + values] @ self.columns.T
-        outputs, converged = self.estimator(inputs)
+        drawn = block[:, count : count + values]
+        outputs, converged = self.estimator(block[:, :count] + drawn @ self.columns.T)
+        if self.further is not None:
+            estimate = np.broadcast_to(self.further.estimate, (len(block), len(self.further.estimate)))
+            outputs = np.concatenate([outputs, estimate], axis=1)
+            outputs += (block[:, :count] - self.centre) @ self.further.by_inputs.T
+            outputs += drawn @ self.further.by_values.T
         if self.outputs is not None:
             outputs = outputs + block[:, count + values :] @ self.outputs.T
         return outputs, converged
@@ -91,6 +125,5 @@ def moved_estimator(
     if not moves.any:
         return estimator
     none = np.zeros((len(inputs.names), 0))
-    return _Moved(
-        estimator, np.concatenate([none, *(part.columns for part in moves.sources)], axis=1), moves.outputs
-    )
+    columns = np.concatenate([none, *(part.columns for part in moves.sources)], axis=1)
+    return _Moved(estimator, columns, moves.outputs, moves.further, inputs.estimate)

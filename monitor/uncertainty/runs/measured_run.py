@@ -67,6 +67,13 @@ class MeasuredRun(ABC):
     def repeated(self, inputs: Array) -> Trials:
         """The problem whose runs are the trials ``inputs`` (N, B)."""
 
+    @abstractmethod
+    def by_inputs(self, unknowns: Array, by_residual: Array) -> Array:
+        """Turn derivatives (k, M) by the whitened residuals into derivatives (k, N) by the inputs, to first order.
+
+        The M residuals are those of ``problem.linearise``, the calibrated quantities last; ``unknowns`` (p,) say where.
+        """
+
     @property
     def input_names(self) -> tuple[str, ...]:
         """Names of all inputs."""

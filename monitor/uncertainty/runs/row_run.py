@@ -92,6 +92,11 @@ class RowRun(MeasuredRun):
         sigma = self.problem.sigma.ravel()[self._is_number]
         return np.concatenate([sigma, np.ones(len(self.problem.extra_names))])
 
+    def by_inputs(self, unknowns: Array, by_residual: Array) -> Array:
+        """As ``MeasuredRun.by_inputs``; inputs only add to the residuals."""
+        is_input = np.concatenate([self._is_number, np.ones(len(self.problem.extra_names), dtype=bool)])
+        return np.asarray(by_residual[:, is_input] / self.weighed_by)
+
     def by_input(self, unknowns: Array) -> Array:
         """Derivatives (p, N) of J^T r at ``unknowns`` (p,) by the inputs, exact: they only add to the residuals."""
         at = self.repeated(self.inputs[:, None]).linearise(unknowns[None], self.common)

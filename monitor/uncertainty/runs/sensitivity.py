@@ -26,6 +26,12 @@ Gradient = Callable[[Array, Array], Array]
 
 #: Half the step of the differences, in mm at the tip: truncation falls and rounding grows below it.
 STEP = 3e-3
+#: What is known beforehand is moved by so many standard uncertainties at most: across the direction in which its
+#: readings go a beam would have to turn by 0.1 rad to move them by ``STEP``.
+KNOWN_STEP = 3.0
+#: An expanded gradient may move the least-squares point of trials so many standard uncertainties out by this part of
+#: one: a tenth of what a trial is solved to.
+TRIALS_OUT, SAME_POINT = 3.0, 1e-6
 #: Newton steps to the centre's least-squares point; each gains the digits of the one before.
 _POLISH = 4
 
@@ -83,17 +89,14 @@ def sensitivity_of(run: MeasuredRun, inputs: Array | None = None, start: Array |
     theta = solved[:, 0]
     space, determined, steps = _space(run, x, theta)
     fast = _fast(run, theta, steps)
-    quick = fast is not None and _agree(fast, run.gradient, theta, x, steps)
+    quick = fast is not None and (isinstance(run, RowRun) or _agree(fast, run.gradient, theta, x, steps))
     gradient: Gradient = fast if fast is not None and quick else run.gradient
-    for _ in range(_POLISH):
-        hessian = _differences(gradient, theta, x, np.diag(steps), of_inputs=False) / (2.0 * steps)
-        hessian = 0.5 * (hessian + hessian.T)
-        half = _half(hessian, space)
-        inverse = half @ half.T
-        step = inverse @ gradient(theta[:, None], x[:, None])[:, 0]
-        theta = theta - step
-        if float(np.max(np.abs(step / steps))) < 1e-9:
-            break
+    begin = theta
+    theta, hessian, half = _polished(gradient, begin, x, steps, space)
+    if isinstance(run, RowRun) and not _same_points(gradient, run, theta, x, half):
+        quick, gradient = False, run.gradient
+        theta, hessian, half = _polished(gradient, begin, x, steps, space)
+    inverse = half @ half.T
     if isinstance(run, RowRun):
         by_input = run.by_input(theta)
     else:
@@ -113,6 +116,32 @@ def sensitivity_of(run: MeasuredRun, inputs: Array | None = None, start: Array |
         gradient=gradient,
         compiled=quick and isinstance(run, TouchedRun),
     )
+
+
+def _polished(
+    gradient: Gradient, theta: Array, x: Array, steps: Array, space: Array
+) -> tuple[Array, Array, Array]:
+    """The least-squares point (p,) of a gradient near ``theta``, the Hessian there and the root of its inverse."""
+    for _ in range(_POLISH):
+        hessian = _differences(gradient, theta, x, np.diag(steps), of_inputs=False) / (2.0 * steps)
+        hessian = 0.5 * (hessian + hessian.T)
+        half = _half(hessian, space)
+        step = half @ (half.T @ gradient(theta[:, None], x[:, None])[:, 0])
+        theta = theta - step
+        if float(np.max(np.abs(step / steps))) < 1e-9:
+            break
+    return theta, hessian, half
+
+
+def _same_points(gradient: Gradient, run: RowRun, theta: Array, x: Array, half: Array) -> bool:
+    """Whether trials have the same least-squares point by a gradient as by the exact one; differences are measured by
+    the Hessian, whose inverse has the root ``half`` (p, rank)."""
+    rng = np.random.default_rng(3)
+    thetas = theta[:, None] + TRIALS_OUT * half @ rng.standard_normal((half.shape[1], 3))
+    weighed = np.where(np.isfinite(run.weighed_by), run.weighed_by, 0.0)
+    inputs = x[:, None] + TRIALS_OUT * weighed[:, None] * rng.standard_normal((len(x), 3))
+    off = half.T @ (gradient(thetas, inputs) - run.gradient(thetas, inputs))
+    return bool(np.all(np.linalg.norm(off, axis=0) <= SAME_POINT))
 
 
 def _fast(run: MeasuredRun, theta: Array, steps: Array) -> Gradient | None:
@@ -155,6 +184,11 @@ def _space(run: MeasuredRun, inputs: Array, theta: Array) -> tuple[Array, npt.ND
     sigma = float(np.sqrt(np.mean(run.problem.sigma[weighed] ** 2)))
     largest = np.max(np.abs(jacobian[: run.numbers]), axis=0) * sigma
     steps = STEP / np.where(largest > 0.0, largest, 1.0)
+    if isinstance(run, RowRun):
+        by_prior = np.max(np.abs(jacobian[run.numbers :]), axis=0, initial=0.0)
+        steps = np.where(
+            by_prior * steps > KNOWN_STEP, KNOWN_STEP / np.where(by_prior > 0.0, by_prior, 1.0), steps
+        )
     return (vectors[keep] / scale).T, share < MEMBER_SHARE, steps
 
 

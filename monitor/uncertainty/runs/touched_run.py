@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from monitor.machine import MOTION
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
 from monitor.uncertainty.runs.measured_run import MeasuredRun
@@ -57,6 +58,23 @@ class TouchedRun(MeasuredRun):
         """The inputs (N,) as measured, in mm."""
         readings = self.problem.context.positions[:, self.linear] * self.signs
         return np.concatenate([readings.ravel(), [d.length[0] for d in self.problem.distances]])
+
+    def by_reading(self, by_error: Array) -> Array:
+        """What a reading of each linear axis moves (n, 3, axes), from the derivatives (n, 3, J, 2, 6) by errors."""
+        joints = self.problem.context.chain.joints
+        along = np.array([joints[index].direction for index in self.linear]) * self.signs[:, None]
+        return np.asarray(np.einsum("nrac,ac->nra", by_error[:, :, self.linear, MOTION, :3], along))
+
+    def by_inputs(self, unknowns: Array, by_residual: Array) -> Array:
+        """As ``MeasuredRun.by_inputs``; what a reading does to errors that depend on it is neglected (1e-4)."""
+        pose = self.problem.evaluated(unknowns[None], self.common, jacobian=True)
+        assert pose.by_error is not None
+        moved = self.by_reading(pose.by_error) / self.problem.sigma[:, :, None]
+        of_rows = by_residual[:, : moved.shape[0] * moved.shape[1]].reshape(-1, *moved.shape[:2])
+        readings = np.einsum("knr,nra->kna", of_rows, moved).reshape(len(by_residual), -1)
+        u = np.array([distance.standard_uncertainty for distance in self.problem.distances])
+        lengths = -by_residual[:, by_residual.shape[1] - len(u) :] / u
+        return np.concatenate([readings, lengths], axis=1)
 
     def repeated(self, inputs: Array) -> TouchProblem:
         """The touch problem whose runs are the trials ``inputs`` (N, B)."""

@@ -79,7 +79,7 @@ def routes() -> APIRouter:
             every=all_trends if shown else None, waiting=trends.waiting,
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
-            groupings=GROUPINGS, colour=colour, **period, campaign=campaign,
+            groupings=GROUPINGS, colour=colour, since=period["since"], until=period["until"], campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
             refused=form,
         )  # fmt: skip

@@ -15,6 +15,9 @@ from monitor.exceptions import InputError
 from monitor.store import Database, find_certificate, load_certificate
 from monitor.workflow.file_names import file_name
 
+#: What stands behind the name of a file until its certificate is stored.
+_PART = ".part"
+
 
 @dataclass(frozen=True)
 class HashedFile:
@@ -84,7 +87,7 @@ def prepared(path: Path, content: bytes) -> Path:
 
     Raises InputError where it cannot be written, or ``path`` is a folder.
     """
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(path.name + _PART)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_dir():
@@ -104,11 +107,29 @@ def prepared(path: Path, content: bytes) -> Path:
     return part
 
 
+def finish_left(db: Database, folder: Path) -> None:
+    """Give their names to files in a folder whose certificates are stored, and whose process died before it did so.
+
+    One that is not stored may be another process's, which is about to store it.
+    """
+    for part in folder.glob(f"*.pdf{_PART}"):
+        path = part.with_name(part.name.removesuffix(_PART))
+        # What cannot be read or renamed stays for whoever looks into the folder.
+        with contextlib.suppress(OSError, InputError):
+            if part.is_symlink() or os.path.lexists(path):
+                continue
+            content = read_bounded(part, LARGEST_DOCUMENT)
+            if find_certificate(db, hashlib.sha256(content).hexdigest()) is not None:
+                part.rename(path)
+
+
 def publish(part: Path, path: Path, number: str) -> None:
     """Give a prepared file its name. Raises InputError, saying where the certificate is, where that fails."""
     try:
         part.replace(path)
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and path.is_file():
+            return  # ``finish_left`` of another process was quicker
         raise InputError(
             f"certificate {number} is in the database, but its file cannot be written to {path}: "
             f"{error.strerror or error}; `monitor certificate show {number} --pdf PATH` writes it"

@@ -32,7 +32,7 @@ from monitor.workflow.certificate.answer import CertificateFileAnswer, Certifica
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.effects import effects_of
-from monitor.workflow.certificate.files import keep_issued, path_of, prepared, publish
+from monitor.workflow.certificate.files import finish_left, keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
@@ -118,6 +118,7 @@ def _issued(
     """Render a record, sign it, store it and give its file its name. Raises TakenNumberError, InputError."""
     number = str(record.number)
     path = path_of(request.out, number)
+    finish_left(db, path.parent)
     keep_issued(db, path)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:

@@ -19,6 +19,7 @@ from monitor.workflow.explain.machine_answer import machine_comparison
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
+from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.instruments.drifting import running_with_time
 from monitor.workflow.instruments.instruments import disagreement
 from monitor.workflow.models import label
@@ -60,9 +61,10 @@ def _compare_machine(
         return comparison_figures(comparison, fit, folder)
 
     apart = disagreement(fit.problem, fit.solution, ability)
+    beside = against_others(fit.problem, fit.solution, ability)
     drifting = running_with_time(fit.problem, fit.solution, ability)
     answer = CompareAnswer(
-        machine_comparison(comparison, fit.problem), apart, drifting or None, fit.problem.target_word
+        machine_comparison(comparison, fit.problem), apart, beside, drifting or None, fit.problem.target_word
     )
     return answer, draw
 

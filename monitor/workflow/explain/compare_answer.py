@@ -14,7 +14,7 @@ from monitor.documents import INLINED, OMITTED
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise
-from monitor.workflow.instruments.answer import Disagreement, RunsWithTime
+from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
 
 
 @dataclass(frozen=True)
@@ -142,11 +142,13 @@ class CompareAnswer:
     """The comparison; ``target_word`` is what a machine's method calls its targets, None for a curve.
 
     ``instruments_disagree`` is there where instruments say of one parameter what chance does not explain,
+    ``against_others`` where a setup or instrument contradicts all others together,
     ``run_with_time`` where readings of a setup drift by more than chance explains.
     """
 
     comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
     instruments_disagree: Disagreement | None = field(default=None, metadata=OMITTED)
+    against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
     run_with_time: tuple[RunsWithTime, ...] | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -28,6 +28,7 @@ from monitor.reporting.health.sentences import (
     ScatteringBall,
     SteppedAtEvent,
 )
+from monitor.reporting.health.settling import ParameterSettled
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
@@ -125,6 +126,7 @@ def changes_noted(
                 change.parameter, change.kind, change.size, change.u, parameter.series.unit
             )
             noted.append(Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at)))
+        noted += _settling(parameter, week)
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
         noted.append(Change(ChangeKind.EVENT_STEP, None, at, _stepped(step), step.p_value, week.holds(at)))
@@ -138,6 +140,16 @@ def changes_noted(
             noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)
+
+
+def _settling(parameter: ParameterPast, week: Week) -> Iterator[Change]:
+    """Yield the changes of a parameter that pass again."""
+    series = parameter.series
+    for change in parameter.search.drifts:
+        if change.time_constant is not None:
+            at = moment_of(change.at, series)
+            what = ParameterSettled(series.name, change.size, change.u, series.unit, change.time_constant)
+            yield Change(ChangeKind.SETTLING, None, at, what, change.p_value, week.holds(at))
 
 
 def event_noted(event: MachineEvent, week: Week) -> Change:

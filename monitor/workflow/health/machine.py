@@ -164,7 +164,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     judged = with_effects(conformity_of(stated, limits), parameter_pasts, added, limits)
     judged = with_volumetric(judged, beyond)
     parameters, drifts = [], {}
-    names = () if stated is None else (*stated.parameters, *added)
+    names = () if stated is None else tuple(dict.fromkeys((*stated.parameters, *added)))
     topology = past.name.description.topology if isinstance(past.name.description, MachineNamed) else ""
     for name in names:
         if stated is None or name not in parameter_pasts:

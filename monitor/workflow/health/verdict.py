@@ -79,10 +79,11 @@ def with_effects(
 ) -> Conformity:
     """The judgement with that of the effects of the model that the last run has a value of; as it was without limits.
 
-    An effect is no output of the run's evaluation: its value and u are those of the history. The probability of any to
+    An effect that is no output of the run's evaluation has its value and u from the history. The probability of any to
     be out is at most the sum, which is taken, as for the volumetric error.
     """
-    names = [name for name in added if name in limits and pasts[name].mask[-1]]
+    judged_already = judged.single
+    names = [name for name in added if name in limits and name not in judged_already and pasts[name].mask[-1]]
     if not names:
         return judged
     limit = np.array([limits[name] for name in names])

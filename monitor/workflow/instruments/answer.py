@@ -57,6 +57,28 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
+class AgainstOthers:
+    """A setup, or all setups of one instrument, that contradicts all others of a ``run`` together.
+
+    They can differ in so many ``directions`` and do by ``size`` (root of the mean square in standard uncertainties;
+    ``limit`` is what chance exceeds as often as is doubtful), the least likely of so many ``comparisons``; chance alone
+    makes as much in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound). ``suspects`` are those
+    without which the others agree: one of them is the wrong one, and only one can be where there is only one; none
+    where no single one explains it.
+    """
+
+    run: int
+    name: str
+    setups: tuple[str, ...]
+    directions: int
+    size: float
+    limit: float
+    comparisons: int
+    by_chance: float
+    suspects: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class RunsWithTime:
     """A ``number`` of a ``setup`` that runs off with the time, by ``size`` from its first row of a ``run`` to its last,
     beside what the model says, with standard uncertainty ``u``, both in ``unit``; chance alone makes one as large among

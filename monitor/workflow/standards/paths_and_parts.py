@@ -9,6 +9,7 @@ import numpy as np
 from monitor.documents import Said
 from monitor.methods.standard_test import InterpolationTest, PartTest
 from monitor.reporting.standard_tests import (
+    FewPoints,
     NoDatum,
     NoProfile,
     OneSenseOfTurning,
@@ -53,12 +54,12 @@ def interpolation_answer(test: InterpolationTest, rng: np.random.Generator) -> S
 
 def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
     """Forms, orientations and places of the elements of a part."""
-    of_part = list(part_figures(_elements(test), u_reading=test.u_reading, rng=rng))
+    measures = list(part_figures(_elements(test), u_reading=test.u_reading, rng=rng))
     profiles = _profiles(test)
     for name, profile in profiles.items():
-        of_part += profile.figures(name, test.u_reading, rng)
+        measures += profile.figures(name, test.u_reading, rng)
     figures = []
-    for figure in of_part:
+    for figure in measures:
         unit = MICRORADIAN if figure.kind is FormKind.HALF_ANGLE else MICROMETRE
         figures.append(
             StandardFigure(
@@ -70,12 +71,14 @@ def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
             )
         )
     circles = sum(feature.kind == "circle" for feature in test.features)
-    coaxial = sum(figure.kind is FormKind.CONCENTRICITY for figure in of_part)
+    coaxial = sum(figure.kind is FormKind.CONCENTRICITY for figure in measures)
     has_side = circles < len(test.features)
     notes: tuple[Said, ...] = (NoDatum(),) if circles > 1 + coaxial and not has_side else ()
     without = tuple(path.name for path in test.paths if path.name not in profiles)
-    notes = (*notes, *((NoProfile(without),) if without else ()))
-    names = ", ".join([*(feature.name for feature in test.features), *(path.name for path in test.paths)])
+    few = FewPoints(tuple(test.short), tuple(test.short.values()), *test.needed)
+    notes = (*notes, *((NoProfile(without),) if without else ()), *((few,) if test.short else ()))
+    of_part = [*(feature.name for feature in test.features), *(path.name for path in test.paths)]
+    names = ", ".join(of_part or test.short)
     return StandardTest(test.setup, test.run, "part", names, MICROMETRE.name, tuple(figures), (), notes)
 
 

@@ -94,7 +94,8 @@ class LatestMean:
 class DatedChange:
     """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year.
 
-    ``days`` is the number of days that were searched.
+    ``days`` is the number of days that were searched. ``kind`` is ``step`` or ``slope``; of drifts ``trend``, or
+    ``transient``: off by ``size`` at the first run, it settles with ``time_constant_days``.
     """
 
     at: str | None
@@ -105,6 +106,7 @@ class DatedChange:
     unit: str
     p_value: float
     days: int
+    time_constant_days: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

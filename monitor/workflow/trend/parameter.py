@@ -108,6 +108,7 @@ def dated_change(change: Change, series: Series) -> DatedChange:
         unit=f"{series.unit}/{period}" if slope else series.unit,
         p_value=change.p_value,
         days=series.steady.day_count,
+        time_constant_days=change.time_constant,
     )
 
 

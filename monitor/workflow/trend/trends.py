@@ -74,7 +74,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     refers_to = parameter_frames(db, request.machine, history.parameters)
     is_stored = len(history.run) > 0 and request.is_plain and not db.read_only
     latest = None
-    if is_stored and db.keeps_answers:
+    if is_stored and not db.is_lake:
         latest = latest_text(db, "trend", method=METHOD, machine=request.machine)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
     answer = _answer(db, request, history, events, past, refers_to)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from monitor.discovery import Fit
 from monitor.effects import ChainEffect
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceSource
-from monitor.uncertainty import OutputContribution
-from monitor.uncertainty.monte_carlo.sourced_trials import Moves, output_moves
+from monitor.uncertainty import Inputs, OutputContribution
+from monitor.uncertainty.monte_carlo.sourced_trials import FurtherOutputs, Moves, output_moves
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.sensitivity import Sensitivity
+from monitor.uncertainty.type_b import SourceColumns
 from monitor.units import Unit
 from monitor.workflow.selections.readings import SelectedReadings
 from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
@@ -29,28 +33,45 @@ from monitor.workflow.uncertainty.sources import (
     shown_part,
     stated,
 )
+from monitor.workflow.uncertainty.with_effects import EffectOutputs, scatter_of_effects, source_effect
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """The run at ``index`` of a fit, its sensitivity, and its outputs ``names`` (m) with their ``units``."""
+    """The run at ``index`` of a fit, its sensitivity, and its outputs ``names`` (m) with their ``units``.
+
+    ``effects`` are outputs of the whole campaign behind them.
+    """
 
     run: MeasuredRun
     sensitivity: Sensitivity
     index: int
     names: tuple[str, ...]
     units: tuple[Unit, ...]
+    effects: EffectOutputs | None = None
+
+    @property
+    def own_rows(self) -> Array:
+        """The sensitivity (m, N) of the run's parameters, effects held."""
+        return self.sensitivity.rows(self.names)
+
+    @property
+    def rows(self) -> Array:
+        """The sensitivity (m + a, N) of all outputs to the inputs of the run."""
+        rows = self.own_rows
+        return rows if self.effects is None else self.effects.padded(rows) + self.effects.linear
 
 
 @dataclass(frozen=True)
 class Beside:
     """Lines of the budget beside those of the readings, what a Monte Carlo draws for them, and what is said of them.
 
-    ``axes_covered``: whether a source speaks of every linear axis.
+    ``lines`` of the budget, ``sampled`` the same as trials draw it by ``moves``. ``axes_covered``: whether a source
+    speaks of every linear axis.
     """
 
-    of_sources: tuple[OutputContribution, ...]
-    of_days: tuple[OutputContribution, ...]
+    lines: tuple[OutputContribution, ...]
+    sampled: tuple[OutputContribution, ...]
     moves: Moves
     behind: Behind
     axes_covered: bool
@@ -60,16 +81,17 @@ def beside_readings(
     campaign: Campaign,
     fit: Fit,
     run: Linearised,
+    readings: Inputs,
     source: CovarianceSource,
     asked: Asked,
     selected: SelectedReadings | None,
 ) -> Beside:
-    """What counts beside readings whose covariance is from ``source``, of the ``selected`` runs where there are any.
+    """What counts beside ``readings`` with a covariance from ``source``, of the ``selected`` runs where there are any.
 
     Raises InputError for a source that does not fit or counts twice, DataError where days cannot be known.
     """
     chain, number = fit.problem.context.chain, int(fit.problem.runs[run.index])
-    rows = run.sensitivity.rows(run.names)
+    rows = run.own_rows
     sources = all_sources(campaign, asked.sources)
     refuse_twice(sources, asked.linear_axes, chain)
     components = components_of(fit, campaign, run.run, rows, run.names)
@@ -77,15 +99,25 @@ def beside_readings(
     holds = holding_for(source, len(runs_of_days))
     adds_days = asked.holds_for is HoldsFor.CAMPAIGN and holds is not HoldsFor.CAMPAIGN
     of_days = (between_days(components),) if adds_days else ()
-    counted = counted_columns(
-        run.run, run.sensitivity.unknowns, campaign, number, sources,
-        shown_part(source.kind, runs_of_days, adds_days),
-    )  # fmt: skip
+    shown = shown_part(source.kind, runs_of_days, adds_days)
+    counted = counted_columns(run.run, run.sensitivity.unknowns, campaign, number, sources, shown)
+    if run.effects is None:
+        lines = (*_alone(counted, rows), *of_days)
+        sampled = (*_drawn_alone(counted, rows), *of_days)
+        moves = Moves(counted, output_moves(of_days))
+    else:
+        others = tuple(
+            counted_columns(each, local, campaign, int(other), sources, shown)
+            for each, local, other in zip(
+                run.effects.runs, run.effects.unknowns, fit.problem.runs, strict=True
+            )
+        )
+        lines, sampled, moves = _with_effects(campaign, fit, run, readings, counted, others, of_days)
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
-        tuple(part.contribution(rows) for part in counted),
-        of_days,
-        Moves(counted, output_moves(of_days)),
+        lines,
+        sampled,
+        moves,
         Behind(
             holds_for=HoldsFor.CAMPAIGN if adds_days else holds,
             day_to_day=day_to_day(components, run.names, run.units),
@@ -93,6 +125,60 @@ def beside_readings(
             length=length_reference(campaign, number, _gains(fit, run.names), sources),
         ),
         bool(linear) and linear <= axes_stated(sources, chain),
+    )
+
+
+def _alone(counted: Sequence[SourceColumns], rows: Array) -> tuple[OutputContribution, ...]:
+    """The lines of the sources of a run without effects; ``rows`` (m, N) is its sensitivity."""
+    return tuple(part.contribution(rows) for part in counted)
+
+
+def _drawn_alone(counted: Sequence[SourceColumns], rows: Array) -> tuple[OutputContribution, ...]:
+    """The same by the variance that is drawn, which is larger for Student's t."""
+    lines = _alone(counted, rows)
+    return tuple(
+        replace(line, covariance=part.law_factor**2 * line.covariance)
+        for line, part in zip(lines, counted, strict=True)
+    )
+
+
+def _with_effects(
+    campaign: Campaign,
+    fit: Fit,
+    run: Linearised,
+    readings: Inputs,
+    counted: tuple[SourceColumns, ...],
+    others: tuple[tuple[SourceColumns, ...], ...],
+    of_days: tuple[OutputContribution, ...],
+) -> tuple[tuple[OutputContribution, ...], tuple[OutputContribution, ...], Moves]:
+    """Lines, what is sampled and moves of a run with effects; ``others`` has what every source does to every run."""
+    effects, of_run = run.effects, run.own_rows
+    assert effects is not None
+    day = {each.run: each.day for each in campaign.runs}
+    days = [day[int(number)] for number in fit.problem.runs]
+    moved = [
+        source_effect(effects, of_run, [columns[index] for columns in others], days)
+        for index in range(len(counted))
+    ]
+    of_others = effects.of_other_runs(readings)
+    count = len(run.run.reading_names)
+    rows = run.rows[:, :count]
+    of_readings = rows @ readings.covariance[:count, :count] @ rows.T + of_others.covariance
+    scatter = scatter_of_effects(effects, fit, day, of_readings)
+    on_outputs = (
+        *(effects.contribution(part) for part in of_days),
+        *((of_others,) if effects.others else ()),
+        *(() if scatter is None else (scatter,)),
+    )
+    rest = tuple(each.rest for each in moved)
+    none = np.zeros((len(rows), 0))
+    further = FurtherOutputs(
+        effects.estimate, effects.linear, np.concatenate([none, *(each.beside for each in moved)], axis=1)
+    )
+    return (
+        (*(each.line for each in moved), *on_outputs),
+        (*(each.drawn for each in moved), *on_outputs, *rest),
+        Moves(counted, output_moves((*on_outputs, *rest)), further),
     )
 
 

@@ -19,9 +19,11 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
 from monitor.reporting.certificate.grounds import Ground
+from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
 from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
+    FrameworkResult,
     Inputs,
     MonteCarloOptions,
     MonteCarloResult,
@@ -35,7 +37,7 @@ from monitor.uncertainty import (
 from monitor.uncertainty.monte_carlo.sourced_trials import Moves
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.row_run import measured_run
-from monitor.uncertainty.runs.sensitivity import Sensitivity, sensitivity_of
+from monitor.uncertainty.runs.sensitivity import sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign
@@ -55,6 +57,7 @@ from monitor.workflow.uncertainty.result import Behind, RunUncertainty
 from monitor.workflow.uncertainty.spreading import trials_of
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT, save_uncertainty
+from monitor.workflow.uncertainty.with_effects import EffectOutputs, effect_outputs, why_outside
 
 # A validation compares within a numerical tolerance, so the Monte Carlo result has to be steadier than that. JCGM 101
 # 8.2 recommends a fifth; two fifths need a sixth of the trials, and `validate` says "undecided" where that shows.
@@ -67,22 +70,26 @@ MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
 class _Propagated:
     """What is propagated: a run, its inputs, where it is linearised, and the m outputs ``names`` with their ``units``.
 
-    ``readings`` are the inputs without the errors of the linear axes and without sources, which for the budget are
-    ``contributions`` to the outputs, as lack of fit is. ``on_outputs`` are those of them that no input carries but a
-    Monte Carlo draws besides, ``moves`` what it draws.
+    Those ``of_run`` are parameters of the run, the others effects of the model, which all runs determine. ``rows``
+    (m, N) are their sensitivity, ``estimate`` (m,) is in internal units. ``readings`` are the inputs without the
+    errors of the linear axes and without sources, which for the budget are ``contributions`` to the outputs, as lack of
+    fit is.
+    ``sampled`` are those that a Monte Carlo draws besides, by ``moves``.
     """
 
     run: MeasuredRun
-    sensitivity: Sensitivity
     names: tuple[str, ...]
+    of_run: tuple[str, ...]
     units: tuple[Unit, ...]
+    rows: Array
+    estimate: Array
     readings: Inputs
     inputs: Inputs
     contributions: tuple[OutputContribution, ...]
     source: CovarianceSource
     behind: Behind
     moves: Moves
-    on_outputs: tuple[OutputContribution, ...]
+    sampled: tuple[OutputContribution, ...]
 
     @property
     def unit_names(self) -> tuple[str, ...]:
@@ -90,9 +97,30 @@ class _Propagated:
         return tuple(unit.name for unit in self.units)
 
     @property
-    def estimate(self) -> Array:
-        """The outputs (m,) in internal units."""
-        return np.asarray(self.sensitivity.unknowns[self.sensitivity.places(self.names)])
+    def without_effects(self) -> _Propagated:
+        """The parameters of the run alone, with what is not known of the effects in them."""
+        count = len(self.of_run)
+
+        def alone(parts: tuple[OutputContribution, ...]) -> tuple[OutputContribution, ...]:
+            return tuple(replace(part, covariance=part.covariance[:count, :count]) for part in parts)
+
+        return replace(
+            self,
+            names=self.of_run,
+            units=self.units[:count],
+            rows=self.rows[:count],
+            estimate=self.estimate[:count],
+            contributions=alone(self.contributions),
+            sampled=alone(self.sampled),
+            moves=self.moves.of_first(count),
+        )
+
+    def framework(self, p: float) -> FrameworkResult:
+        """The result of the GUM framework."""
+        return gum_framework(
+            self.readings, self.rows, self.estimate, self.names, self.unit_names, p=p,
+            contributions=self.contributions,
+        )  # fmt: skip
 
 
 def evaluate(db: Database, request: UncertaintyRequest) -> RunUncertainty:
@@ -121,21 +149,19 @@ def evaluate_fit(
 ) -> RunUncertainty:
     """As ``evaluate``, of a campaign with a model fitted to it: nothing is read from the database."""
     number = int(fit.problem.runs[-1]) if request.run is None else request.run
-    # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
     fixed, coefficients = fit.problem.beside_others(fit.solution, number).resolved(fit.solution.common)
     run = measured_run(fixed, number, coefficients)
     _refuse_too_many(len(run.reading_names), request.method)
     index = int(np.flatnonzero(fit.problem.runs == number)[0])
     propagated, causes = _propagated(campaign, fit, run, index, request, selected)
-    framework = gum_framework(
-        propagated.readings,
-        propagated.sensitivity.rows(propagated.names),
-        propagated.estimate,
-        propagated.names,
-        propagated.unit_names,
-        p=request.p,
-        contributions=propagated.contributions,
-    )
+    framework = propagated.framework(request.p)
+    outside = why_outside(fit, linear_axes=request.linear_axes is not None)
+    if propagated.names != propagated.of_run and not np.isfinite(framework.k_p):
+        # With the effects there are more dimensions than so few runs bound; without them there may be an ellipsoid.
+        alone = propagated.without_effects
+        of_run = alone.framework(request.p)
+        if np.isfinite(of_run.k_p):
+            propagated, framework, outside = alone, of_run, Outside.FEW_RUNS
     sampled = None if request.method == "guf" else _sampled(propagated, request)
     validation = _validated(propagated, sampled, request) if sampled and request.method == "both" else None
     advice = campaign_method(campaign).advice
@@ -153,6 +179,8 @@ def evaluate_fit(
         validation=validation,
         causes=causes,
         behind=propagated.behind,
+        effects=propagated.names[len(propagated.of_run) :],
+        effects_outside=outside,
     )
 
 
@@ -172,14 +200,30 @@ def _propagated(
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
     units = _units(fit, names)
-    added = beside_readings(campaign, fit, Linearised(run, at, index, names, units), source, asked, selected)
+    places = [fit.problem.base_names.index(name) for name in names]
+    outside = why_outside(fit, linear_axes=request.linear_axes is not None)
+    effects = effect_outputs(fit, index, places) if outside is None else None
+    linearised = Linearised(run, at, index, names, units, effects)
+    added = beside_readings(campaign, fit, linearised, readings, source, asked, selected)
+    estimate = at.unknowns[at.places(names)]
     propagated = _Propagated(
-        run, at, names, units, inputs, inputs, (*added.of_sources, *added.of_days), source, added.behind,
-        added.moves, added.of_days,
-    )  # fmt: skip
+        run=run,
+        names=names if effects is None else (*names, *effects.names),
+        of_run=names,
+        units=units if effects is None else (*units, *effects.units),
+        rows=linearised.rows,
+        estimate=estimate if effects is None else np.concatenate([estimate, effects.estimate]),
+        readings=inputs,
+        inputs=inputs,
+        contributions=added.lines,
+        source=source,
+        behind=added.behind,
+        moves=added.moves,
+        sampled=added.sampled,
+    )
     causes: tuple[tuple[str, float], ...] = ()
     if request.model_uncertainty:
-        line, causes = _lack_of_fit(campaign, fit, index, names)
+        line, causes = _lack_of_fit(campaign, fit, index, names, effects)
         further = () if line is None else (line,)
         propagated = replace(propagated, contributions=(*propagated.contributions, *further))
     if request.linear_axes is not None:
@@ -200,7 +244,7 @@ def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnow
 
 
 def _lack_of_fit(
-    campaign: Campaign, fit: Fit, index: int, names: tuple[str, ...]
+    campaign: Campaign, fit: Fit, index: int, names: tuple[str, ...], shared: EffectOutputs | None
 ) -> tuple[OutputContribution | None, tuple[tuple[str, float], ...]]:
     """What lack of fit leaves over repeatability, as a covariance of the outputs, and its most probable causes."""
     problem = fit.problem
@@ -214,8 +258,13 @@ def _lack_of_fit(
     )
     if unexplained is None:
         return None, ()
-    outputs = np.array([problem.base_names.index(name) for name in names])
-    covariance = unexplained.covariance[np.ix_(outputs, outputs)]
+    outputs = [problem.base_names.index(name) for name in names]
+    covariance = unexplained.covariance
+    if shared is not None:
+        outputs += [len(problem.local_names) + int(column) for column in shared.columns]
+        scale = np.concatenate([np.ones(len(problem.local_names)), shared.by_logarithm])
+        covariance = covariance * np.outer(scale, scale)
+    covariance = covariance[np.ix_(outputs, outputs)]
     return OutputContribution(LACK_OF_FIT, covariance, dof=unexplained.dof), unexplained.effects
 
 
@@ -240,7 +289,7 @@ def _units(fit: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
 
 def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarloResult:
     tighten = VALIDATION_TIGHTENING if request.method == "both" else 1.0
-    with trials_of(propagated.run, propagated.inputs, propagated.names, request, propagated.moves) as (
+    with trials_of(propagated.run, propagated.inputs, propagated.of_run, request, propagated.moves) as (
         trials,
         sampler,
         threads,
@@ -252,14 +301,14 @@ def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarlo
 def _validated(propagated: _Propagated, sampled: MonteCarloResult, request: UncertaintyRequest) -> Validation:
     """The framework of a known covariance, which is what a Monte Carlo samples, compared with it."""
     plain = gum_framework(
-        propagated.moves.with_sources(propagated.inputs),
-        propagated.sensitivity.rows(propagated.names),
+        propagated.inputs,
+        propagated.rows,
         propagated.estimate,
         propagated.names,
         propagated.unit_names,
         p=request.p,
         finite_dof=False,
-        contributions=propagated.on_outputs,
+        contributions=propagated.sampled,
     )
     return validate(plain, sampled, digits=request.digits)
 

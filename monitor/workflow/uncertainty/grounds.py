@@ -15,6 +15,7 @@ from monitor.effects import ChainEffect
 from monitor.methods import campaign_method
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.instruments.contradiction import STATED_WITHIN
+from monitor.methods.method import Instruments
 from monitor.readers.doubts import (
     AIR_RANGE,
     LARGEST_BAR_DIFFERENCE,
@@ -23,9 +24,10 @@ from monitor.readers.doubts import (
 )
 from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign, Run
-from monitor.reporting.certificate.grounds import SEVERAL, Ground, GroundKind
+from monitor.reporting.certificate.grounds import IN_U, SEVERAL, Ground, GroundKind
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.notes import TOO_SMALL
+from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.instruments.instruments import disagreement, limit_of
 
 #: The residuals over what the stated uncertainties leave. Up to three a probe's statement may be wrong, and lack of fit
@@ -159,10 +161,20 @@ def _work_points(robust: RobustFit, run: int) -> Iterator[Ground]:
 
 
 def _instruments(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
-    """The worst disagreement of two instruments that chance does not explain: one of them was read, placed or stated
-    otherwise than the file says, and the joint fit lies between the two."""
+    """The setup that contradicts all others, and the worst disagreement of two instruments, that chance does not
+    explain: one was read, placed or stated otherwise than the file says, and the joint fit lies between. Setups whose
+    readings scatter far less than stated: they were in another unit."""
     ability = campaign_method(campaign).instruments
-    apart = disagreement(robust.fit.problem, robust.fit.solution, ability, run, DISAGREE)
+    problem, solution = robust.fit.problem, robust.fit.solution
+    beside = against_others(problem, solution, ability, run, DISAGREE)
+    if beside is not None:
+        names = beside.suspects or (beside.name,)
+        yield Ground(GroundKind.INSTRUMENTS, run, SEVERAL.join(names), beside.size, beside.limit, IN_U)
+    if isinstance(ability, Instruments):
+        for scatter in ability.scatters(problem, solution, run):
+            if scatter.times < TOO_SMALL and scatter.p < DISAGREE:
+                yield Ground(GroundKind.UNITS, run, scatter.setup, scatter.times, TOO_SMALL)
+    apart = disagreement(problem, solution, ability, run, DISAGREE)
     if apart is not None:
         subject = f"{apart.parameter}: {apart.first}, {apart.second}"
         limit = limit_of(apart.comparisons, DISAGREE, apart.degrees_of_freedom)

@@ -8,6 +8,7 @@ from monitor.discovery import Fit
 from monitor.records import Campaign
 from monitor.refusal import Refusal
 from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
+from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import StoredModel
 from monitor.uncertainty import FrameworkResult, MonteCarloResult, Validation
@@ -29,7 +30,8 @@ class Behind:
 class RunUncertainty:
     """The evaluated uncertainty of one run; ``units`` are the display units of ``framework.names``.
 
-    ``causes`` are the effects that lack of fit may come from, with their probabilities.
+    ``causes`` are the effects that lack of fit may come from, with their probabilities. ``effects`` are those of the
+    names that were added to the model, ``effects_outside`` says why none of them is an output.
     """
 
     campaign: Campaign
@@ -45,3 +47,5 @@ class RunUncertainty:
     validation: Validation | None
     causes: tuple[tuple[str, float], ...]
     behind: Behind
+    effects: tuple[str, ...] = ()
+    effects_outside: Outside | None = None

@@ -72,6 +72,8 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         day_to_day=result.behind.day_to_day,
         sources=result.behind.sources or None,
         length=result.behind.length,
+        effects=result.effects or None,
+        effects_outside=result.effects_outside,
     )
 
 

@@ -12,6 +12,7 @@ from monitor.effects import ChainEffect
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 from monitor.refusal import Reason, ReasonKind, Refusal
+from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.refused import RefusedParameters, refused_parameters
 from monitor.uncertainty.geometric_errors import GeometricErrors
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -29,13 +30,21 @@ def geometric_errors(
     of_run, left_out = _of_run(evaluated, fit)
     shared, places, reasons = _shared(fit)
     covariance = np.zeros((len(of_run.names) + len(shared.names),) * 2)
-    columns = [evaluated.names.index(name) for name in of_run.names]
-    covariance[: len(columns), : len(columns)] = evaluated.covariance[np.ix_(columns, columns)] * np.outer(
-        of_run.factors, of_run.factors
-    )
     local = [problem.base_names.index(name) for name in of_run.names]
-    if len(solution.common):
-        covariance += _of_shared(fit, run, local, places)
+    joint = [name for name in shared.names if name in (evaluated.answer.effects or ())]
+    units = dict(zip(shared.names, shared.factors, strict=True))
+    columns = [evaluated.names.index(name) for name in (*of_run.names, *joint)]
+    at = [*range(len(of_run.names)), *(len(of_run.names) + shared.names.index(name) for name in joint)]
+    factors = [*of_run.factors, *(units[name] for name in joint)]
+    covariance[np.ix_(at, at)] = evaluated.covariance[np.ix_(columns, columns)] * np.outer(factors, factors)
+    if len(solution.common) and len(joint) < len(shared.names):
+        # Effects outside of the joint region are known by what the readings say of them alone.
+        added = _of_shared(fit, run, local, places)
+        if joint or evaluated.answer.effects_outside is Outside.FEW_RUNS:
+            # What they pull the run's parameters by is in these already, and those inside have their own.
+            inside = [row for row in range(len(added)) if row in at]
+            added[np.ix_(inside, inside)] = 0.0
+        covariance += added
     effects = [*of_run.effects, *shared.effects]
     names = [*of_run.names, *shared.names]
     estimate = [*of_run.estimate, *shared.estimate]
@@ -101,6 +110,7 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
     effects: list[ChainEffect] = []
     names: list[str] = []
     estimate: list[float] = []
+    factors: list[float] = []
     indices: list[int] = []
     left_out: dict[str, RefusedParameters] = {}
     # What is held at zero is in the numbers of others.
@@ -117,9 +127,10 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
             effects.append(plain)
             names += shared.effect.parameters(problem.context)
             estimate += map(float, coefficients[coefficient : coefficient + shared.size])
+            factors += [plain.unit.factor] * shared.size
             indices += unknowns
         coefficient += shared.size
-    return _Known(tuple(effects), tuple(names), tuple(estimate), ()), indices, left_out
+    return _Known(tuple(effects), tuple(names), tuple(estimate), tuple(factors)), indices, left_out
 
 
 def _refused(names: Iterable[str], kind: ReasonKind) -> dict[str, RefusedParameters]:

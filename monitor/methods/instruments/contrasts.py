@@ -1,0 +1,185 @@
+"""What a setup, or all setups of an instrument, say against all others together.
+
+E_n compares two instruments in one parameter that each of them determines alone. A setup that was read with another
+sign contradicts the others in everything that they share, and the setups of its own instrument too. So the readings are
+fitted once together and once in two parts, and what the joint fit leaves more is judged at once (G. C. Chow, Tests of
+equality between sets of coefficients in two linear regressions, Econometrica 28 (1960) 591). Where the readings of a
+setup, fitted by themselves, scatter more than it states, their own scatter counts, with its degrees of freedom; the
+distance of parts that scatter differently has those of K. Krishnamoorthy and J. Yu, Stat. Probab. Lett. 66 (2004) 161,
+eq. 2.5 and 2.6. Less scatter never makes it surer.
+
+Where one is wrong, the others agree without it: whoever has that alone is the one. What several setups have in common
+and is known beforehand (the length of a bar) may be the wrong one as well: without it the setups agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import chdtr, chdtrc, fdtrc
+
+from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.instruments.run_rows import RunRows, instruments_of, run_rows
+from monitor.methods.instruments.shares import scatter_of
+from monitor.methods.method import Contrast, SetupScatter
+from monitor.records import Array
+
+#: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
+ASKED = 0.1
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The ``rows`` of one setup, what is ``remaining`` of the sum of squares of its readings when they are fitted by
+    themselves, with so many ``numbers`` more than unknowns; the ``deviation`` by which they count, and the degrees of
+    ``freedom`` of that, infinite where it is as stated."""
+
+    rows: npt.NDArray[np.int64]
+    remaining: float
+    numbers: float
+    deviation: float
+    freedom: float
+
+
+def contrasts(problem: ChainProblem, solution: Solution, run: int) -> tuple[Contrast, ...]:
+    """What every setup and every instrument of several setups says against all others, in a run."""
+    return contrasts_of(run_rows(problem, solution, run))
+
+
+def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
+    """What every setup and every instrument of several setups says against all others."""
+    blocks = _blocks(at)
+    units = _units(at, blocks)
+    return tuple(_judged(at, blocks, units, frozenset(blocks)))
+
+
+def scatters(problem: ChainProblem, solution: Solution, run: int) -> tuple[SetupScatter, ...]:
+    """What the readings of every setup of a run scatter, fitted by themselves, over what it states."""
+    at = run_rows(problem, solution, run)
+    return tuple(
+        SetupScatter(setup, float(np.sqrt(block.remaining / block.numbers)), _least(block))
+        for setup, block in _blocks(at).items()
+        if block.numbers >= 1.0
+    )
+
+
+def _least(block: _Block) -> float:
+    """How often chance alone leaves so little of readings that scatter as stated."""
+    return float(chdtr(block.numbers, block.remaining))
+
+
+def _blocks(at: RunRows) -> dict[str, _Block]:
+    """The setups that read something in the run, and what several of them have in common that is known beforehand."""
+    blocks: dict[str, _Block] = {}
+    shared = {
+        name: rows
+        for name, (rows, setups) in at.shared_beforehand().items()
+        if sum(bool(at.is_read[at.of_setups((setup,))].any()) for setup in setups) > 1
+    }
+    apart = np.concatenate([np.zeros(0, dtype=np.int64), *shared.values()])
+    for part in at.problem.parts:
+        read = at.of_setups((part.id,))
+        read = read[at.is_read[read]]
+        if not len(read):
+            continue
+        prior = at.known_of((part.id,))
+        rows = np.concatenate([read, prior[~np.isin(prior, apart)]])
+        basis = _basis(at, rows, np.ones(len(rows)))
+        remaining = at.residual[rows] - basis @ (basis.T @ at.residual[rows])
+        numbers = len(read) - float(np.sum(basis[: len(read)] ** 2))
+        square, freedom = scatter_of(remaining[: len(read)], numbers)
+        blocks[part.id] = _Block(
+            rows,
+            float(remaining[: len(read)] @ remaining[: len(read)]),
+            numbers,
+            float(np.sqrt(square)),
+            freedom,
+        )
+    return blocks | {name: _Block(rows, 0.0, 0.0, 1.0, float("inf")) for name, rows in shared.items()}
+
+
+def _units(at: RunRows, blocks: dict[str, _Block]) -> dict[str, frozenset[str]]:
+    """What may be wrong together, by name: every setup, every instrument that has several, what is known beforehand."""
+    units = {name: frozenset({name}) for name in blocks}
+    shared = at.shared_beforehand()
+    for name, setups in instruments_of(at.problem).items():
+        of_it = {what for what, (_, of) in shared.items() if of <= set(setups)}
+        mine = frozenset({*setups, *of_it}) & blocks.keys()
+        if len(mine) > 1:
+            units.setdefault(name, mine)
+    return units
+
+
+def _judged(
+    at: RunRows, blocks: dict[str, _Block], units: dict[str, frozenset[str]], among: frozenset[str]
+) -> Iterator[Contrast]:
+    """Every unit against the others ``among`` setups, where they share something."""
+    for name, mine in units.items():
+        if not mine < among:
+            continue
+        contrast = _apart(at, blocks, name, mine, among - mine)
+        if contrast is None:
+            continue
+        if contrast.p < ASKED and among == frozenset(blocks):
+            within = [other.p for other in _judged(at, blocks, units, among - mine)]
+            contrast = replace(contrast, others_p=min(1.0, len(within) * min(within, default=1.0)))
+        yield contrast
+
+
+def _apart(
+    at: RunRows, blocks: dict[str, _Block], name: str, mine: frozenset[str], others: frozenset[str]
+) -> Contrast | None:
+    """What the unit ``name`` says against others; None where they share nothing."""
+    sides = [[setup for setup in blocks if setup in side] for side in (mine, others)]
+    ordered = [blocks[setup] for side in sides for setup in side]
+    rows = np.concatenate([block.rows for block in ordered])
+    deviation = np.concatenate([np.full(len(block.rows), block.deviation) for block in ordered])
+    residual, jacobian = at.residual[rows] / deviation, at.jacobian[rows] / deviation[:, None]
+    split = sum(len(blocks[setup].rows) for setup in sides[0])
+    first = _basis(at, rows[:split], deviation[:split])
+    second = _basis(at, rows[split:], deviation[split:])
+    within = np.vstack([first.T @ jacobian[:split], second.T @ jacobian[split:]])
+    length = np.linalg.norm(within, axis=0)
+    vectors, strength, _ = np.linalg.svd(within / np.where(length > 0.0, length, 1.0))
+    rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
+    differ = vectors[:, rank:]
+    directions = differ.shape[1]
+    if directions == 0:
+        return None
+    moved = np.vstack([first @ differ[: first.shape[1]], second @ differ[first.shape[1] :]])
+    square, freedom = float(np.sum((moved.T @ residual) ** 2)), _freedom(ordered, moved)
+    size, p = float(np.sqrt(square / directions)), _p(square, directions, freedom)
+    return Contrast(name, tuple(sorted(mine)), directions, size, freedom, p, others_p=1.0)
+
+
+def _freedom(ordered: list[_Block], moved: Array) -> float:
+    """The degrees of freedom of a distance whose parts (q, q) of the covariance, together 1, are by own scatter."""
+    directions, inverse, first = moved.shape[1], 0.0, 0
+    for block in ordered:
+        share = moved[first : first + len(block.rows)]
+        first += len(block.rows)
+        if np.isfinite(block.freedom):
+            part = share.T @ share
+            inverse += (float(np.sum(part**2)) + float(np.trace(part)) ** 2) / block.freedom
+    return (directions + directions**2) / inverse if inverse > 0.0 else float("inf")
+
+
+def _p(square: float, directions: int, freedom: float) -> float:
+    """How often chance makes a squared distance as large: Hotelling's where scatter is by the readings themselves."""
+    if not np.isfinite(freedom):
+        return float(chdtrc(directions, square))
+    rest = freedom - directions + 1.0
+    return 1.0 if rest <= 0.0 else float(fdtrc(directions, rest, square * rest / (freedom * directions)))
+
+
+def _basis(at: RunRows, rows: npt.NDArray[np.int64], deviation: Array) -> Array:
+    """An orthonormal basis (m, r) of what the unknowns that rows (m,) separate do to them, over their ``deviation``."""
+    projector, _, rank = at.separated(rows)
+    columns = at.jacobian[rows] @ projector / deviation[:, None]
+    length = np.linalg.norm(columns, axis=0)
+    vectors, strength, _ = np.linalg.svd(columns / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    return vectors[:, :rank][:, strength[:rank] > RANK_TOLERANCE * strength.max(initial=0.0)]

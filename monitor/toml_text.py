@@ -1,0 +1,46 @@
+"""Says in plain words why a text is no TOML, where the parser's own words would not help."""
+
+from __future__ import annotations
+
+import re
+
+#: What the parser's message ends in.
+_WHERE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+#: A number behind a key with a comma where TOML has a point: ``EC0Y = 20,0``.
+_DECIMAL_COMMA = re.compile(r"[^#=\"']*=\s*([+-]?[0-9]+,[0-9]+)\s*(?:#.*)?")
+
+
+def toml_fault(error: ValueError, text: str) -> tuple[int | None, str]:
+    """Return the line, None where there is none, and the reason why ``text`` could not be parsed.
+
+    Of numbers with a decimal comma all lines are named.
+    """
+    message = str(error)
+    match = _WHERE.search(message)
+    if match is None:
+        return None, f"this is not TOML: {_printable(message)}"
+    lines = text.split("\n")
+    line = int(match[1]) if match[1] else len(lines)
+    commas = {
+        number: number_text[1]
+        for number, row in enumerate(lines, start=1)
+        if (number_text := _DECIMAL_COMMA.fullmatch(row.rstrip("\r")))
+    }
+    if line in commas:
+        others = [str(number) for number in commas if number != line]
+        also = f"; so have line{'s' if len(others) > 1 else ''} {', '.join(others)}" if others else ""
+        shown, point = commas[line][:40], commas[line].replace(",", ".")[:40]
+        return line, f"{shown} has a decimal comma, and TOML has decimal points: write {point}{also}"
+    where = f" at character {match[2]}" if match[2] else ""
+    return line, f"this is not TOML{where}: {_printable(message[: match.start()])}"
+
+
+def toml_refusal(file: object, error: ValueError, text: str) -> str:
+    """Return why a file could not be parsed, with its line."""
+    line, reason = toml_fault(error, text)
+    return f"{file}{'' if line is None else f', line {line}'}: {reason}"
+
+
+def _printable(reason: str) -> str:
+    shown = reason if reason.isprintable() else reason.encode("ascii", "backslashreplace").decode()
+    return shown[:200]

@@ -1,0 +1,64 @@
+"""The changes of machines for the sheet `changes` of a workbook: the search of `trend`, whether it was asked or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+
+from monitor import progress
+from monitor.reporting import messages
+from monitor.store import (
+    ComputedChange,
+    Database,
+    MachineHistory,
+    machine_events,
+    machine_history,
+    machines_with_runs,
+    numbered_by,
+)
+from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
+from monitor.workflow.trend.parameter import dated_change
+
+
+def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange, ...]:
+    """Search the identified runs of every machine, or of one, for changes; a row that says so where there is none.
+
+    Nothing is identified or stored. Times are in UTC without an offset. Raises NotFoundError for an unknown machine.
+    """
+    machines = machines_with_runs(db) if machine is None else [machine]
+    rows: list[ComputedChange] = []
+    for number, name in enumerate(machines):
+        history = machine_history(db, name, followed_by=numbered_by(db, name))
+        past = machine_past(history, splitting_events(machine_events(db, name))) if len(history.run) else {}
+        changes = [row for parameter in past.values() for row in _changes(name, parameter)]
+        rows += changes
+        if not changes and (past or not history.unidentified):
+            rows.append(ComputedChange(name, None, "none", what=_why_none(past)))
+        if history.unidentified:
+            rows.append(ComputedChange(name, None, "not searched", what=_not_identified(history)))
+        progress.told((number + 1) / len(machines))
+    return tuple(rows)
+
+
+def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
+    search = past.search
+    for change in (*search.changes, *search.drifts):
+        dated = dated_change(change, past.series)
+        at = (
+            None
+            if dated.at is None
+            else datetime.fromisoformat(dated.at).astimezone(UTC).replace(tzinfo=None)
+        )
+        yield ComputedChange(
+            machine, at, dated.kind, past.series.name, dated.size, dated.u, dated.unit, dated.p_value,
+            messages.change_in_words(dated.kind),
+        )  # fmt: skip
+
+
+def _why_none(past: dict[str, ParameterPast]) -> str:
+    whys = {str(parameter.search.why_none) for parameter in past.values() if parameter.search.why_none}
+    return messages.no_change(len(past), whys)
+
+
+def _not_identified(history: MachineHistory) -> str:
+    return messages.not_identified_by_model(history.machine, history.unidentified)

@@ -1,0 +1,157 @@
+"""Which setup contradicts all others: against other least squares, over drawn readings, and by who was read wrongly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy
+
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
+from monitor.methods.instruments.contrasts import contrasts, contrasts_of, scatters
+from monitor.methods.instruments.run_rows import RunRows, run_rows
+from monitor.readers import read_campaign
+from monitor.workflow.instruments.against_others import against_others
+from tests.simulator import horizontal_centre as centre
+
+#: Levels of the rates: that of `compare`, and one at which a few hundred draws say something.
+LEVELS = (0.01, 0.1)
+
+
+def _rows(folder: Path, seed: int, otherwise: tuple[str, float] | None = None) -> RunRows:
+    """The run of laser, ball bar and R-test on a horizontal centre of its own."""
+    rng = np.random.default_rng(seed)
+    truth = centre.truth_of(rng)
+    campaign = read_campaign(centre.campaign(folder / "shop", rng, truth, otherwise=otherwise))
+    problem = campaign_method(campaign).problem_of(campaign)
+    return run_rows(problem, solve_problem(problem), 1)
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory: pytest.TempPathFactory) -> RunRows:
+    return _rows(tmp_path_factory.mktemp("centre"), 61)
+
+
+def _left(rows: RunRows, mine: np.ndarray) -> tuple[float, int]:
+    """What least squares leave of the residuals of rows, and the rank: that of a machine without errors, whose products
+    make no direction of their own."""
+
+    def scaled(matrix: np.ndarray) -> np.ndarray:
+        length = np.linalg.norm(matrix, axis=0)
+        return matrix / np.where(length > 1e-9 * length.max(), length, np.inf)
+
+    s = np.linalg.svd(scaled(rows.nominal[mine]), compute_uv=False)
+    rank = int(np.sum(s > 1e-5 * s[0]))
+    u, _, _ = np.linalg.svd(scaled(rows.jacobian[mine]), full_matrices=False)
+    residual = rows.residual[mine]
+    beside = residual - u[:, :rank] @ (u[:, :rank].T @ residual)
+    return float(beside @ beside), rank
+
+
+def test_chow_1960_the_joint_fit_leaves_more_than_two_fits(rows: RunRows) -> None:
+    """Where no setup scatters more than stated, the distance is the difference of three sums of squares."""
+    calm = replace(rows, residual=0.5 * rows.residual)
+    (contrast,) = (each for each in contrasts_of(calm) if each.name == "r-test-A")
+    mine = np.zeros(len(calm.residual), dtype=bool)
+    mine[calm.of_setups(("r-test-A",))] = True
+    joint, rank = _left(calm, mine | ~mine)
+    parts = [_left(calm, side) for side in (mine, ~mine)]
+    assert contrast.directions == sum(of for _, of in parts) - rank
+    square = joint - sum(left for left, _ in parts)
+    assert contrast.size**2 * contrast.directions == pytest.approx(square, rel=1e-6)
+    assert contrast.freedom == np.inf
+    assert contrast.p == pytest.approx(scipy.stats.chi2.sf(square, contrast.directions), rel=1e-6)
+
+
+def _drawn(rows: RunRows, rng: np.random.Generator, times: float, of: str) -> RunRows:
+    """The joint fit of right readings that scatter ``times`` as stated, of all setups or of one instrument's."""
+    scale = np.where(rows.is_read, times if not of else 1.0, 1.0)
+    if of:
+        setups = tuple(part.id for part in rows.problem.parts if part.id.startswith(of))
+        scale[rows.of_setups(setups)] = times
+    noise = scale * rng.standard_normal(len(scale)) * np.any(rows.jacobian != 0.0, axis=1)
+    length = np.linalg.norm(rows.jacobian, axis=0)
+    u, s, _ = np.linalg.svd(rows.jacobian / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    basis = u[:, s > 1e-5 * s[0]]
+    return replace(rows, residual=noise - basis @ (basis.T @ noise))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("times", "of"), [(1.0, ""), (1.1, ""), (1.5, ""), (2.0, ""), (2.0, "bar"), (2.0, "r-test-B")]
+)
+def test_right_readings_contradict_each_other_as_seldom_as_said(rows: RunRows, times: float, of: str) -> None:
+    """Bonferroni's bound over all setups and instruments, for scatter of 1 to 2 times the stated one."""
+    rng = np.random.default_rng([62, int(10 * times), len(of)])
+    draws, least = 150, []
+    for _ in range(draws):
+        every = contrasts_of(_drawn(rows, rng, times, of))
+        least.append(len(every) * min(each.p for each in every))
+    for level in LEVELS:
+        count = int(np.sum(np.array(least) <= level))
+        assert scipy.stats.binomtest(count, draws, level, alternative="greater").pvalue > 1e-3, (level, count)
+
+
+def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
+    """R-test around B with the other sign: its own instrument's R-test around A agrees with laser and bar.
+
+    Where the gains are small only the squareness of Z and X contradicts, which a plane of the bar shows as well: then
+    either may be the wrong one.
+    """
+    suspects = []
+    for seed in range(62, 68):
+        campaign = read_campaign(_campaign(tmp_path / str(seed), seed, ("r-test-B", -1.0)))
+        problem, ability = (
+            campaign_method(campaign).problem_of(campaign),
+            campaign_method(campaign).instruments,
+        )
+        beside = against_others(problem, solve_problem(problem), ability, 1)
+        assert beside is not None
+        assert "r-test-B" in beside.suspects
+        assert beside.by_chance < 1e-3
+        assert beside.size > beside.limit
+        suspects.append(beside.suspects)
+    assert set(suspects) == {("r-test-B",), ("bar-zx", "r-test-B")}
+
+
+def test_a_wrong_length_of_a_bar_is_named_and_no_plane_of_it(tmp_path: Path) -> None:
+    """The length is one number of all three planes: 5 µm too long, each of them contradicts the laser alike."""
+    campaign = read_campaign(_campaign(tmp_path, 65, None))
+    longer = tuple(
+        replace(setup, length=None if setup.length is None else setup.length + 5e-3)
+        for setup in campaign.artefact.setups
+    )
+    campaign = replace(campaign, artefact=replace(campaign.artefact, setups=longer))
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    beside = against_others(problem, solve_problem(problem), ability, 1)
+    assert beside is not None
+    assert beside.suspects == ("the stated length of ball bar",)
+
+
+def _campaign(folder: Path, seed: int, otherwise: tuple[str, float] | None) -> Path:
+    rng = np.random.default_rng(seed)
+    truth = centre.truth_of(rng)
+    return centre.campaign(folder / "shop", rng, truth, otherwise=otherwise)
+
+
+def test_readings_in_another_unit_scatter_too_little(tmp_path: Path) -> None:
+    """A bar in mm under a header of µm scatters a thousandth of what it states, whatever the machine's errors."""
+    campaign = read_campaign(_campaign(tmp_path, 63, ("bar", 1e-3)))
+    problem = campaign_method(campaign).problem_of(campaign)
+    by_setup = {each.setup: each for each in scatters(problem, solve_problem(problem), 1)}
+    for setup, scatter in by_setup.items():
+        if setup.startswith("bar"):
+            assert scatter.times < 2e-3
+            assert scatter.p < 1e-20
+        else:
+            assert 0.5 < scatter.times < 1.6
+
+
+def test_one_instrument_alone_contradicts_nobody(tmp_path: Path) -> None:
+    rng = np.random.default_rng(64)
+    campaign = read_campaign(centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng), only="laser"))
+    problem = campaign_method(campaign).problem_of(campaign)
+    assert contrasts(problem, solve_problem(problem), 1) == ()

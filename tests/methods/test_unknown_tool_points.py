@@ -1,0 +1,118 @@
+"""A tool point that a setup states with an uncertainty is an unknown: a head that turns shows it, and nothing moves.
+
+The simulator shares no code with the package (``tests/simulator/horizontal_centre.py``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.exceptions import CampaignError, NotConvergedError
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
+from monitor.readers import read_campaign
+from monitor.readers.writer import write_campaign
+from monitor.records import Campaign
+from tests.simulator import horizontal_centre as centre
+
+#: What the stated tool point of the R-test is off, mm: along A, across it, and along the tool.
+OFF = np.array([0.3, -0.2, 1.0])
+KEY = "tool_point_standard_uncertainty_mm = 1.0\n"
+
+
+def _campaign(
+    folder: Path, seed: int, off: np.ndarray | None = None, key: str = ""
+) -> tuple[Path, dict[str, float]]:
+    """A horizontal centre of its own; the tool point of the R-test is stated ``off``, with ``key``."""
+    rng = np.random.default_rng(seed)
+    truth = centre.truth_of(rng)
+    path = centre.campaign(folder / "shop", rng, truth)
+    file, point = path / "campaign.toml", f"tool_point_mm = {centre.TOOL.tolist()}\n"
+    stated = point if off is None else f"tool_point_mm = {(centre.TOOL - off).tolist()}\n"
+    setups = file.read_text(encoding="utf-8").split("[[setups]]")
+    changed = [text.replace(point, stated + key) if "r-test" in text else text for text in setups]
+    file.write_text("[[setups]]".join(changed), encoding="utf-8")
+    return path, {**truth, "EZ0B": truth["EZ0B"] - truth["EZ0A"]}
+
+
+def _read(path: Path) -> Campaign:
+    campaign = read_campaign(path)
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+@pytest.mark.parametrize("seed", [9000, 9001])
+def test_a_turning_head_shows_its_tool_point(tmp_path: Path, seed: int) -> None:
+    path, truth = _campaign(tmp_path, seed, OFF, KEY)
+    problem = campaign_method(campaign := _read(path)).problem_of(campaign)
+    solution = solve_problem(problem)
+    u = np.sqrt(np.diag(solution.local_covariance[0]))
+    columns = [index for index, name in enumerate(problem.local_names) if "tool point" in name]
+    assert [problem.local_names[index] for index in columns] == [
+        f"r-test-B tool point {axis}" for axis in "xyz"
+    ]
+    along, *across = columns
+    # Along the axis of the head the point of the work does the same: what is stated stays.
+    assert solution.local[0, along] == pytest.approx(0.0, abs=1e-3)
+    assert u[along] == pytest.approx(1.0, rel=1e-3)
+    for index, off in zip(across, OFF[1:], strict=True):
+        assert u[index] < 3e-4
+        assert abs(solution.local[0, index] - off) < 4.0 * u[index]
+    for index, name in enumerate(problem.base_names):
+        assert solution.local_free[0, index], name
+        assert abs(solution.local[0, index] - truth[name]) < 4.0 * u[index], name
+
+
+def test_a_tool_point_that_is_not_an_unknown_does_not_settle(tmp_path: Path) -> None:
+    """The refusal says what fits, and how to have it solved for."""
+    path, _ = _campaign(tmp_path, 9000, OFF)
+    campaign = _read(path)
+    with pytest.raises(NotConvergedError, match="tool_point_standard_uncertainty_mm"):
+        campaign_method(campaign).identify(campaign)
+
+
+def test_a_stated_uncertainty_where_the_point_is_right_costs_little(tmp_path: Path) -> None:
+    """EYY shares its readings with the tool point: u grows, and the value stays within both."""
+    values = []
+    for key in ("", KEY):
+        path, truth = _campaign(tmp_path / str(len(key)), 9002, np.zeros(3), key)
+        result = campaign_method(campaign := _read(path)).identify(campaign)
+        at, (run,) = result.parameters.index("EYY"), result.runs
+        u = float(np.sqrt(run.covariance[at, at]))
+        assert abs(run.estimate[at] - truth["EYY"]) < 4.0 * u
+        values.append((float(run.estimate[at]), u))
+    (plain, u_plain), (free, u_free) = values
+    assert u_plain <= u_free < 2.0 * u_plain
+    # Difference of an estimate and one of more unknowns (J. A. Hausman, Econometrica 46 (1978) 1251).
+    assert abs(free - plain) < 4.0 * np.sqrt(u_free**2 - u_plain**2) + 1e-9
+
+
+def test_the_uncertainty_is_read_and_written_again(tmp_path: Path) -> None:
+    campaign = _read(_campaign(tmp_path, 9000, OFF, KEY)[0])
+    stated = [setup.tool_point_uncertainty for setup in campaign.artefact.setups]
+    assert stated.count(1.0) == 2
+    assert stated.count(None) == 6
+    named = replace(
+        campaign,
+        artefact=replace(
+            campaign.artefact,
+            setups=tuple(replace(setup, certificate="K 17") for setup in campaign.artefact.setups),
+        ),
+    )
+    write_campaign(named, tmp_path / "again")
+    assert read_campaign(tmp_path / "again").artefact.setups == named.artefact.setups
+
+
+def test_readings_of_angles_have_no_such_key(tmp_path: Path) -> None:
+    path, _ = _campaign(tmp_path, 9000)
+    with (path / "campaign.toml").open("a", encoding="utf-8") as file:
+        file.write(
+            '\n[[setups]]\nid = "level"\nreading = "level"\nstandard_uncertainty_urad = 1.0\ndirection = "X"\n'
+            + KEY
+        )
+    with pytest.raises(CampaignError, match="tool_point_standard_uncertainty_mm"):
+        read_campaign(path)
