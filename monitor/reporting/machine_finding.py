@@ -32,6 +32,10 @@ class MistakeFound:
     rms_undone: float
 
 
+#: What moved where all targets did.
+WHOLE_PIECE = "The piece on the table"
+
+
 @dataclass(frozen=True)
 class Move:
     """A target that moved, or a parameter that stepped, at a run; within it from a ``sequence`` number on, if any."""

@@ -17,6 +17,7 @@ from monitor.records import FrameKind, FrameOfReference, Verdict
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
+    WHOLE_PIECE,
     MachineFinding,
     MissingEffect,
     MistakeFound,
@@ -234,7 +235,7 @@ def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: s
     if isinstance(change, ChangedParameter):
         subject = change.parameter
     elif isinstance(change, MovedTarget) and change.of_all:
-        subject = "The piece on the table"
+        subject = WHOLE_PIECE
     else:
         subject = f"{target_word} {change.target}"
     sequence = change.sequence if isinstance(change, MovedTarget) else None

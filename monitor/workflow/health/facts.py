@@ -24,7 +24,6 @@ from monitor.reporting.health.sentences import (
     BallMoved,
     EventNoted,
     ParameterChanged,
-    PieceMoved,
     ScatteringBall,
     SteppedAtEvent,
 )
@@ -133,10 +132,8 @@ def changes_noted(
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
-            at = starts[move.run]
-            moved: BallMoved | PieceMoved = BallMoved(move.target, move.size, move.unit, move.run)
-            if isinstance(move, MovedTarget) and move.of_all:
-                moved = PieceMoved(move.size, move.unit, move.run)
+            target = "" if isinstance(move, MovedTarget) and move.of_all else move.target
+            moved, at = BallMoved(target, move.size, move.unit, move.run), starts[move.run]
             noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)

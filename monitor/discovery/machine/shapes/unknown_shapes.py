@@ -130,14 +130,7 @@ def _is_free(candidate: ChainCandidate) -> bool:
 def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
     """One part of an error of free shape, or one wave of many periods a turn, that stands out and predicts poses and
     runs that were left out, if any; and the scene with it, with all such waves of its error where it is one."""
-    shapes: dict[str, list[ChainCandidate]] = {}
-    # Over a part of a turn flexure and refraction bend as any shape does.
-    turning = not scene.fit.problem.needs_whole_periods
-    for shape in filter(_is_of_shape, scene.candidates):
-        effect = shape.effect
-        if isinstance(effect, ChainEffect) and effect.joint.turns and not turning:
-            continue
-        shapes.setdefault(error_of(shape), []).append(shape)
+    shapes = _shapes_by_error(scene)
     if not shapes:
         return scene, []
     part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
@@ -151,11 +144,27 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
         more = [slight]
     else:
         return scene, []
-    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([slight]))
-    predicts = before is None or after is None or after < before
-    if not predicts or not _predicts(scene, slight, []):
+    if not _predicts_runs(scene, slight) or not _predicts(scene, slight, []):
         return scene, []
     return replace(scene, candidates=(*scene.candidates, *more)), [slight]
+
+
+def _shapes_by_error(scene: ChainScene) -> dict[str, list[ChainCandidate]]:
+    """The shapes of the catalogue by their error, but for what bends as any shape does: over a part of a turn flexure
+    and refraction."""
+    shapes: dict[str, list[ChainCandidate]] = {}
+    for shape in filter(_is_of_shape, scene.candidates):
+        effect = shape.effect
+        turns = isinstance(effect, ChainEffect) and effect.joint.turns
+        if not (turns and scene.fit.problem.needs_whole_periods):
+            shapes.setdefault(error_of(shape), []).append(shape)
+    return shapes
+
+
+def _predicts_runs(scene: ChainScene, slight: ChainCandidate) -> bool:
+    """Whether an effect alone lowers the error on runs left out; true with too few runs."""
+    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([slight]))
+    return before is None or after is None or after < before
 
 
 def _waves(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[ChainCandidate, ...]:

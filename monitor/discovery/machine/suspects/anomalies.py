@@ -89,6 +89,7 @@ class Deviations:
 
 
 def deviations_of(fit: Fit) -> Deviations:
+    """The deviations of a fit; of a campaign of one or two runs its residuals."""
     problem = fit.problem
     white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
     cells = plan_cells(problem)

@@ -82,8 +82,8 @@ def _likeliest(fit: Fit) -> tuple[BallMove | None, int]:
         inflation = _from_each_on(deviations.inflation[rows])[first] / (len(rows) - first)
         # In parts of what the touches alone would show: a direction that the heights of the points follow is rounding.
         whole = np.sqrt(np.maximum(np.trace(gram, axis1=1, axis2=2), 1e-300))
-        left = (gram - shared @ np.swapaxes(shared, 1, 2)) / whole[:, None, None] ** 2
-        square, rank, parts = statistic(onto / whole[:, None], left)
+        visible = (gram - shared @ np.swapaxes(shared, 1, 2)) / whole[:, None, None] ** 2
+        square, rank, parts = statistic(onto / whole[:, None], visible)
         shifts = parts / whole[:, None]
         chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
         index = int(chi_square.argmax())
