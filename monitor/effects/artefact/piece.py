@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.effects.context import Context
 from monitor.effects.description import OWN_DOCUMENT, Description
@@ -60,7 +61,7 @@ class ArtefactMoved(BuiltIn):
 def rigid_motion(context: Context) -> Array:
     """Return how every target (n, 3, 6) moves with a shift of all along X, Y, Z and a turn about their middle, by as
     much at the farthest. No turn moves a target of which nobody says where it stands."""
-    is_known = np.isfinite(context.nominal).all(axis=1)
+    is_known: npt.NDArray[np.bool_] = np.asarray(np.isfinite(context.nominal).all(axis=1))
     places = np.where(is_known[:, None], context.nominal, 0.0)
     _, first = np.unique(context.target[is_known], return_index=True)
     middle = places[is_known][first].mean(axis=0) if len(first) else np.zeros(3)

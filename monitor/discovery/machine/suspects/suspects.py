@@ -115,9 +115,9 @@ class Suspects:
 
 
 class _LooksForVarying:
-    """Looks for what varies from run to run.
+    """Looks for what varies from run to run, and for slips of the piece.
 
-    It is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads, and once
+    Each is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads, and once
     nothing single is left, not after each of some forty bad points.
     """
 
@@ -126,10 +126,16 @@ class _LooksForVarying:
         self._scene = scene
         self._under: Fit | None = None
         self._latest: Varying | None = None
+        self._may_slip = True
 
     def slip(self, under: Fit) -> BallMove | None:
-        """The slip of the piece under a fit, if any."""
-        return piece_move(under, self._variants, self._scene if self._under is None else None)
+        """The slip of the piece under a fit, if any. Where there was none it is not asked for again: it would be weighed
+        among all variants after each bad point."""
+        if not self._may_slip:
+            return None
+        slip = piece_move(under, self._variants, self._scene if self._under is None else None)
+        self._may_slip = slip is not None
+        return slip
 
     def leading(self, under: Fit, least: float) -> Varying | None:
         """The effect that varies most under a fit, where it gains more than the ``least``; None where it does not."""
