@@ -96,8 +96,8 @@ def who(first: int, seeds: int) -> None:
         among = sum(count for suspects, count in named.items() if wrong in suspects) - alone
         silent = named[()]
         print(
-            f"{name}: {wrong} alone {_rate(alone, seeds)}, with others {among}, others {seeds - alone - among - silent}, "
-            f"nobody {silent}; {dict(named)}",
+            f"{name}: {wrong} alone {_rate(alone, seeds)}, with others {among}, others "
+            f"{seeds - alone - among - silent}, nobody {silent}; {dict(named)}",
             flush=True,
         )
 

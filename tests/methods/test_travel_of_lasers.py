@@ -12,7 +12,7 @@ from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign
-from tests.simulator import four_instruments as shop
+from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 
 def lasers(folder: Path, change: Callable[[dict], None], setups: str = "laser-Z") -> Campaign:
@@ -66,3 +66,33 @@ def test_a_laser_that_reads_no_travel_is_named_with_what_it_reads(
 def test_right_lasers_are_not_named(tmp_path: Path) -> None:
     campaign = lasers(tmp_path, scaled(1.0))
     assert campaign_method(campaign).problem_of(campaign).unsettled == ""
+
+
+def test_exchanged_labels_of_two_lasers_are_refused_with_what_each_reads(tmp_path: Path) -> None:
+    """Beside other instruments the fit settled with both beams turned by a radian, and moved EC0Y by 21 u."""
+    rng = np.random.default_rng(9100)
+    path = centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng))
+    rows = (path / "probings.csv").read_text(encoding="utf-8")
+    for old, new in (("laser-X,", "other,"), ("laser-Y,", "laser-X,"), ("other,", "laser-Y,")):
+        rows = rows.replace(old, new)
+    (path / "probings.csv").write_text(rows, encoding="utf-8")
+    campaign = read_campaign(path)
+    assert isinstance(campaign, Campaign)
+    with pytest.raises(DataError, match=r"laser-X fits only a beam that is turned by .* look at the labels"):
+        campaign_method(campaign).identify(campaign)
+
+
+@pytest.mark.parametrize(
+    ("stated", "what"), [(150.0 / 25.4, ": it is in inches"), (15.0, ": it is in cm"), (100.0, "")]
+)
+def test_a_length_of_a_bar_in_another_unit_is_named(tmp_path: Path, stated: float, what: str) -> None:
+    """The circle of the tool points has the radius of the bar, whatever the readings."""
+    rng = np.random.default_rng(9100)
+    path = centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng), only="bar")
+    file = path / "campaign.toml"
+    text = file.read_text(encoding="utf-8").replace("length_mm = 150.0", f"length_mm = {stated:.6f}")
+    file.write_text(text, encoding="utf-8")
+    campaign = read_campaign(path)
+    assert isinstance(campaign, Campaign)
+    said = f"lie 150 mm from the middle of their circle, and length_mm says {stated:.5g}{what}"
+    assert said in campaign_method(campaign).problem_of(campaign).unsettled

@@ -94,8 +94,8 @@ def _against_others(beside: AgainstOthers) -> None:
         )
     elif len(beside.suspects) == 1:
         who = (
-            f"Without {suspects} the others agree: look at its signs, unit, points and rows first; where they are "
-            "right, the model lacks what the others do not meet"
+            f"Without {suspects} the others agree: look first at signs, unit, points and rows of {suspects}; where "
+            "they are right, the model lacks what the others do not meet"
         )
     else:
         who = f"Without {suspects} the others agree, which cannot tell them apart: look at each of them"

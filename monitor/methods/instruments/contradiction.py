@@ -12,7 +12,8 @@ from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Plain, direction_of
-from monitor.methods.instruments.readings.displacement import Displacement
+from monitor.methods.instruments.readings.displacement import BEAM_ANGLES, Displacement
+from monitor.methods.instruments.readings.distance import FLAT, DistanceReading
 from monitor.methods.instruments.readings.vector import AtWorkPoint, VectorReading
 from monitor.records import Array
 from monitor.units import UNIT_WORDS, mistaken_for_mm
@@ -32,6 +33,19 @@ SAME_TRAVEL, LEAST_TRAVEL = 0.02, 1.0
 # A path that leaves its point by more than this, mm, beside what sensors read is no error of a machine; another point
 # of the tool explains it where it takes away all but this part.
 LEAST_POINT, LEFT_BY_POINT = 0.1, 0.2
+# rad. A beam that the readings turn by more reads another travel: a laser is set up to a milliradian.
+LARGEST_BEAM = 0.05
+# Tool points that lie this part further from the centre of their bar, or nearer, than its length are those of another
+# bar; of a length in another unit the factor is met to the same part.
+OTHER_LENGTH = 0.02
+# What a stated length is to the right one where it is in another unit, or another length of the bar.
+OTHER_LENGTHS = (
+    (1.0 / 25.4, "it is in inches"),
+    (0.1, "it is in cm"),
+    (1e-3, "it is in m"),
+    (1e3, "it is in µm"),
+    (2.0, "it is the diameter of the circle"),
+)
 # What readings of a travel are where they are not µm of it along n: the factor, and what to look at.
 OTHER_TRAVELS = (
     (-1.0, "with the other sign: look at the signs of the readings, of `direction` and of the axis"),
@@ -46,14 +60,33 @@ OTHER_TRAVELS = (
 )
 
 
-def contradiction(parts: Sequence[Part], sigma: Array, vectors: Array, travel: float) -> str | None:
-    """Why the readings are those of another machine, in words, None where they may be this one's; ``sigma`` and
-    ``vectors`` (n, d) after the fit, ``travel`` mm is how far the machine moved. MistakenUnitError where a unit of the
-    positions explains it."""
+def contradiction(
+    parts: Sequence[Part], unknowns: Sequence[Array], sigma: Array, vectors: Array, travel: float
+) -> str | None:
+    """Why the readings are those of another machine, in words, None where they may be this one's; ``unknowns`` (R, q)
+    of the parts, ``sigma`` and ``vectors`` (n, d) after the fit, ``travel`` mm is how far the machine moved.
+    MistakenUnitError where a unit of the positions explains it."""
     unit = _wrong_unit(parts)
     if unit is not None:
         raise MistakenUnitError(f"the readings contradict the machine file: {unit}")
-    return _wrong_length(parts, sigma, vectors, travel) or _wrong_direction(parts, sigma, vectors)
+    return (
+        _wrong_length(parts, sigma, vectors, travel)
+        or _wrong_direction(parts, sigma, vectors)
+        or _turned_beam(parts, unknowns)
+    )
+
+
+def _turned_beam(parts: Sequence[Part], unknowns: Sequence[Array]) -> str | None:
+    """The first laser whose beam the fit turned until it read another travel than along its direction, in words."""
+    for part, values in zip(parts, unknowns, strict=True):
+        beam = [index for index, name in enumerate(part.unknowns) if name in BEAM_ANGLES]
+        turned = float(np.linalg.norm(values[:, beam], axis=1).max(initial=0.0)) if beam else 0.0
+        if turned > LARGEST_BEAM:
+            return (
+                f"setup {part.id} fits only a beam that is turned by {turned:.2g} rad from `direction`; look at the "
+                "labels of its rows and at the axis that they move"
+            )
+    return None
 
 
 def _wrong_direction(parts: Iterable[Part], sigma: Array, vectors: Array) -> str | None:
@@ -109,7 +142,8 @@ def _wrong_unit(parts: Iterable[Part]) -> str | None:
 def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
     """What may keep a fit from settling, as the end of a refusal; ``bars`` kept one direction, so that a centre which
     is stated some millimetres wrong cannot be mended."""
-    suspected = "".join(f"; {what}" for what in (*_other_travels(parts), *_other_tool_points(parts)))
+    hints = (*_other_travels(parts), *_other_lengths(parts), *_other_tool_points(parts))
+    suspected = "".join(f"; {what}" for what in hints)
     return suspected + "".join(
         f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
         "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
@@ -131,6 +165,41 @@ def _other_travels(parts: Iterable[Part]) -> Iterator[str]:
             if what is not None:
                 yield f"the readings of setup {part.id} are {what}"
                 break
+
+
+def _other_lengths(parts: Iterable[Part]) -> Iterator[str]:
+    """The setups of bars whose tool points lie on a circle of another radius than the bar is long, in words."""
+    named: set[float] = set()
+    for part in parts:
+        if not isinstance(part.reading, DistanceReading) or part.reading.setup.length in named:
+            continue
+        length = part.reading.setup.length
+        assert length is not None  # the reader asks for it
+        stated = np.linalg.norm(_nominal(part), axis=1)
+        off = (
+            abs(np.median(long) / length - 1.0) < OTHER_LENGTH for long in (stated, _radii(_nominal(part)))
+        )
+        if any(off):
+            continue
+        named.add(length)
+        radius = float(np.median(_radii(_nominal(part))))
+        meant = (
+            f": {why}" for factor, why in OTHER_LENGTHS if abs(length / radius / factor - 1.0) < OTHER_LENGTH
+        )
+        yield (
+            f"the tool points of setup {part.id} lie {radius:.5g} mm from the middle of their circle, and length_mm "
+            f"says {length:.5g}{next(meant, '')}"
+        )
+
+
+def _radii(points: Array) -> Array:
+    """How far points (n, 3) mm lie from the centre of the circle or sphere through them."""
+    about = points - points.mean(axis=0)
+    _, size, axes = np.linalg.svd(about, full_matrices=False)
+    inside = about @ axes[size > FLAT * size[0]].T
+    right = 0.5 * np.sum(inside**2, axis=1)
+    centre = np.linalg.lstsq(inside - inside.mean(axis=0), right - right.mean(), rcond=None)[0]
+    return np.asarray(np.linalg.norm(inside - centre, axis=1))
 
 
 def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:

@@ -418,4 +418,6 @@ class InstrumentProblem(ChainProblem):
         """Positions in another unit, directions and lengths that are off by more than any machine's errors."""
         vectors = self.vectors(solution.local, solution.common)
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        return contradiction(self.parts, self.sigma, vectors, travel)
+        own = self.own_of(solution.local)
+        unknowns = [own[:, columns] for columns in self.own_columns]
+        return contradiction(self.parts, unknowns, self.sigma, vectors, travel)

@@ -20,6 +20,8 @@ from monitor.records import Array
 
 #: A laser is set up along an axis to a millimetre over a metre.
 BEAM = 1e-3
+#: The unknown angles of a beam, across its stated direction.
+BEAM_ANGLES = ("beam a", "beam b")
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Displacement(Plain):
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        return ("zero",) if self.holds("direction") else ("zero", "beam a", "beam b", COSINE)
+        return ("zero",) if self.holds("direction") else ("zero", *BEAM_ANGLES, COSINE)
 
     @property
     def beam(self) -> float:
