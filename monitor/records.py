@@ -6,8 +6,7 @@ Recorded conditions and channels keep the unit that their name ends in (``ambien
 from __future__ import annotations
 
 import hashlib
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -86,34 +85,6 @@ class ChainAxis:
     sign: int | None = None
 
 
-def topology_of(axes: Sequence[ChainAxis]) -> str:
-    """The names of freely placed axes from the workpiece to the tool, the spindle in brackets: ``w b J1 J2 t``."""
-    work = [axis.name for axis in axes if axis.branch == "work"]
-    tool = [
-        f"({axis.name})" if axis.kind == "spindle" else axis.name for axis in axes if axis.branch == "tool"
-    ]
-    return " ".join(["w", *reversed(work), "b", *tool, "t"])
-
-
-#: ISO 10791-6: H or V (horizontal or vertical spindle), then the code in brackets, a prime behind work axes, S.
-_STRUCTURAL_CODE = re.compile(r"\s*(?P<spindle>[HV])?\s*\[(?P<chain>[^\[\]]*)\]\s*")
-_SPINDLE = re.compile(r"\(?S\d*\)?(?=\s*t)")
-
-
-def plain_topology(text: str) -> tuple[str, Vector | None]:
-    """A topology in the letters of ISO 10791-1, and the direction of gravity where the spelling states it.
-
-    ``V [w C A Y X b Z S t]`` (ISO 10791-6) is ``w C A Y X b Z (C1) t`` with gravity along -Z; of a horizontal
-    spindle (H) gravity is along -Y: ISO 841 gives Z to the spindle and Y to the vertical direction then.
-    """
-    code = _STRUCTURAL_CODE.fullmatch(text)
-    chain = re.sub("(?<=[A-Z0-9])['′’]", "", text if code is None else code["chain"])
-    names = re.findall(r"C\d*", chain)
-    spindle = next(name for name in ("C1", "C2", "C3", "C4", "C5", "C6", "C7") if name not in names)
-    down = {"V": (0.0, 0.0, -1.0), "H": (0.0, -1.0, 0.0)}.get((code["spindle"] or "") if code else "")
-    return _SPINDLE.sub(f"({spindle})", chain), down
-
-
 @dataclass(frozen=True)
 class Machine:
     """A machine as its file describes it. ``tolerances`` are limits of absolute values in display units.
@@ -121,7 +92,7 @@ class Machine:
     ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then
     the tool branch; ``topology`` then only names them in their order. It is empty where the letters of
     ``topology`` say everything. ``gravity`` is the direction of gravity in the machine's frame, None where the
-    file does not state it.
+    file does not state it. A ``virtual`` machine was simulated, nobody measured it.
     """
 
     id: str
@@ -134,6 +105,7 @@ class Machine:
     tolerances: Mapping[str, float] = field(default_factory=dict)
     chain: tuple[ChainAxis, ...] = ()
     gravity: Vector | None = None
+    virtual: bool = False
 
     def is_linear(self, axis: str) -> bool:
         """Whether an axis travels rather than turns."""

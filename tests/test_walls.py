@@ -35,6 +35,7 @@ GROUND = {
     "group_sums",
     "moments",
     "toml_text",
+    "topology_text",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

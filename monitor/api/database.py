@@ -172,6 +172,8 @@ def _no_campaign(name: str, names: Sequence[str]) -> str:
 def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 300.0) -> Database:
     """Open a database file; ``new`` makes one where there is none; another process that has it is waited for.
 
+    ``read_only``: what is stored can be read, and questions that store their answer are refused.
+
     Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use for longer
     than ``wait_s``.
     """

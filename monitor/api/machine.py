@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 
 from monitor.api.arguments import argument, checked
-from monitor.records import Array, plain_topology
+from monitor.records import Array
+from monitor.topology_text import plain_topology
 from monitor.workflow.kinematics import PosesAnswer, PosesRequest, poses
 
 Point = tuple[float, float, float]

@@ -43,14 +43,17 @@ def parse_term(symbol: str, chain: Chain) -> Term:
     names = sorted((joint.name for joint in chain.joints), key=len, reverse=True)
     match = re.fullmatch(rf"E([{COMPONENTS}])(0?)({'|'.join(map(re.escape, names))})", symbol)
     if match is None:
-        symbols = (
+        symbols = [
             f"E{component}{location}{joint}"
             for component in COMPONENTS
             for location in ("0", "")
             for joint in names
-        )
+        ]
+        # ``EX`` is the positioning error of X, whose axis was left out, rather than any other of X.
+        of_itself = f"{symbol}{symbol[1:]}"
+        hint = f"did you mean '{of_itself}'? " if of_itself in symbols else did_you_mean(symbol, symbols)
         raise EffectError(
-            f"'{symbol}' is no geometric error of '{chain.topology}': {did_you_mean(symbol, symbols)}"
+            f"'{symbol}' is no geometric error of '{chain.topology}': {hint}"
             "write E, a direction X Y Z A B C, "
             f"0 for a location error, and one of its axes {', '.join(joint.name for joint in chain.joints)}, "
             f"for example EX0{chain.joints[-1].name} or EY{chain.joints[0].name}"

@@ -14,7 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.exceptions import TopologyError
-from monitor.records import Branch, ChainAxis, Kind, Vector, plain_topology, topology_of
+from monitor.records import Branch, ChainAxis, Kind, Vector
+from monitor.topology_text import plain_topology, topology_of
 
 X: Vector = (1.0, 0.0, 0.0)
 Y: Vector = (0.0, 1.0, 0.0)

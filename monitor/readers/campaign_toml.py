@@ -47,6 +47,8 @@ def _machine(machine: Machine) -> Iterator[str]:
             yield f"{key} = {_text(value)}"
     if not machine.chain:
         yield f"topology = {_text(machine.topology)}"
+    if machine.virtual:
+        yield "virtual = true"
     if machine.gravity is not None:
         yield f"gravity = {_numbers(machine.gravity)}"
     for placed in machine.chain:

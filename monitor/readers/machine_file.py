@@ -11,7 +11,8 @@ from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
 from monitor.readers.chain_tables import read_chain, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.toml_table import Table
-from monitor.records import VOLUMETRIC, AxisSettings, ChainAxis, Machine, plain_topology, topology_of
+from monitor.records import VOLUMETRIC, AxisSettings, ChainAxis, Machine
+from monitor.topology_text import plain_topology, topology_of
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
 TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
@@ -52,6 +53,7 @@ def read_machine(top: Table) -> MachinePart:
     settings, strokes = _settings(table, axes, signed)
     tolerances = _tolerances(table, axes)
     gravity = unit_vector(table, "gravity") if table.raw("gravity", required=False, example="") else down
+    virtual = table.truth("virtual")
     table.finish()
     if identity is None or topology is None or axes is None:
         return MachinePart(None, axes, strokes)
@@ -62,6 +64,7 @@ def read_machine(top: Table) -> MachinePart:
         tolerances=tolerances,
         chain=chain or (),
         gravity=gravity,
+        virtual=virtual,
         **plate,
     )
     return MachinePart(machine, axes, strokes)

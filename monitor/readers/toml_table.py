@@ -101,6 +101,13 @@ class Table:
             return None
         return value
 
+    def truth(self, key: str) -> bool:
+        """Return true or false; false where the key is absent."""
+        value = self.raw(key, required=False, example="true")
+        if value is not None and not isinstance(value, bool):
+            self.fault(key, f"{quoted(value)} is neither true nor false; write {key} = true, or leave it out")
+        return value is True
+
     def table(self, key: str, *, required: bool = False) -> Table | None:
         """Return the table under a key."""
         self._asked_for.append(key)

@@ -36,8 +36,9 @@ class CovarianceSource:
     to one that was stated or is the repeatability, in µm, ``times`` to a repeatability as a multiple of what each
     setup of an instrument states. ``selection`` names the stored selection (or campaign) whose
     runs were taken. ``for_the_run`` is true where repeated runs would have sufficed and an uncertainty of the run
-    itself was asked for. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known``
-    whose errors are no part of u.
+    itself was asked for. ``neighbours`` is the correlation of a reading with the one before it, where the residuals
+    show one. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known`` whose errors are
+    no part of u.
     """
 
     kind: CovarianceKind
@@ -49,6 +50,7 @@ class CovarianceSource:
     taken_as_known: tuple[TakenAsKnown, ...] = ()
     times: float | None = field(default=None, metadata=OMITTED)
     for_the_run: bool | None = field(default=None, metadata=OMITTED)
+    neighbours: float | None = field(default=None, metadata=OMITTED)
 
 
 def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) -> str:
@@ -60,6 +62,9 @@ def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) ->
     times = "" if source.times is None else f"{source.times:.2g}".replace(".", say.decimal_sign)
     key = f"covariance.{source.kind.value}" + "_for_the_run" * bool(source.for_the_run)
     sentence = say(key, runs=source.runs, dof=source.dof, u=u, times=times)
+    if source.neighbours is not None:
+        alike = f"{source.neighbours:.2g}".replace(".", say.decimal_sign)
+        sentence = say("covariance.neighbours", sentence=sentence, correlation=alike)
     if source.selection is not None:
         sentence = say("covariance.selection", name=source.selection, sentence=sentence)
     if source.linear_axes:

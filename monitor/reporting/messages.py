@@ -287,6 +287,12 @@ def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
     )
 
 
+def lacks_campaigns(sheets: Sequence[str], campaigns: Sequence[str]) -> str:
+    """Return which campaigns the sheets of a workbook do not hold, because they are not identified yet."""
+    named = ", ".join(campaigns[:8]) + (f" and {len(campaigns) - 8} more" if len(campaigns) > 8 else "")
+    return f"{', '.join(sheets)}: without {named}, not identified yet; type `monitor identify`"
+
+
 def no_identified_run(machine: str, campaigns: Sequence[str], since: datetime | None) -> str:
     """Return that a trend has no run."""
     when = "yet" if since is None else f"since {since:%Y-%m-%d}"

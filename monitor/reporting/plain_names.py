@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection
 from functools import lru_cache
 
-from monitor.records import plain_topology
 from monitor.reporting.symbols import describe
+from monitor.topology_text import plain_topology
 
 _LOCATION = re.compile(r"E(?P<direction>[ABC])0(?P<axis>[XYZUVWABC]\d*)")
 _AXIS = re.compile(r"\(?([XYZUVWABC]\d*)\)?")

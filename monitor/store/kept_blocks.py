@@ -20,7 +20,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import re
 import stat
 import struct
 from collections.abc import Iterator
@@ -29,6 +28,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from monitor.exceptions import StoreError
+from monitor.store.log import LOG_ENDING, ends_with_mark, has_log, has_torn_log, whole_length
 
 try:
     import fcntl
@@ -50,16 +50,6 @@ _STATE = struct.Struct("<5Q")
 _PARTS, _BLOCK_BITS, _NOWHERE = 64, 56, 2**64 - 1
 #: Multiplier and first value of the checksum over words of 8 bytes (src/common/checksum.cpp).
 _MULTIPLIER, _FIRST = 0xBF58476D1CE4E5B9, 5381
-
-#: What the log is called; how version 2 of it begins, in DuckDB 2.0 with the 16 bytes that name the file and the number
-#: of the checkpoint behind which it was begun; the size and checksum before each further entry; and how the entries of
-#: a checkpoint and of the end of a transaction begin (src/include/duckdb/common/enums/wal_type.hpp: 98 the version, 99
-#: a checkpoint, 100 the end).
-_LOG = ".wal"
-_LOG_BEGIN = re.compile(
-    rb"d\0be\0\x02(f\0\x10([\0-\x7f]|[\x80-\xff]\x01){16})?(g\0[\x80-\xff]*[\0-\x7f])?\xff\xff", re.DOTALL
-)
-_LONGEST_BEGIN, _FRAME, _MARK, _END = 64, struct.Struct("<QQ"), b"d\x00c", b"d\x00d"
 
 #: The copy: this line, the SHA-256 of what follows, the headers, and for each block its number and its bytes.
 _BEGIN = b"blocks before a checkpoint, 1\n"
@@ -127,6 +117,30 @@ def has_torn_blocks(path: str) -> bool:
         return file is not None and len(_torn(path, file)) > 0
 
 
+def settle_log(path: str) -> None:
+    """Cut off what a loss of power left of a log as zeros (``whole_length``). Does nothing while somebody has the file.
+
+    Raises StoreError where the log cannot be written.
+    """
+    if not has_torn_log(path):
+        return
+    with _alone(path, for_writing=True) as file:
+        length = None if file is None else whole_length(path)
+        if length is None:
+            return
+        try:
+            log = os.open(path + LOG_ENDING, os.O_WRONLY)
+            try:
+                os.ftruncate(log, length)
+                os.fsync(log)
+            finally:
+                os.close(log)
+        except OSError as fault:
+            raise StoreError(
+                f"{path}.wal ends in half a write, which could not be cut off: {fault}"
+            ) from fault
+
+
 def has_foreign_log(path: str) -> bool:
     """Whether the log beside a file was written for another state than the file has; nobody writes it now.
 
@@ -144,33 +158,8 @@ def has_foreign_log(path: str) -> bool:
         if _state(headers) == written_for:
             return False
         # A log that others began behind that checkpoint is younger than the file.
-        is_older = os.stat(path + _LOG).st_mtime_ns < os.fstat(file).st_mtime_ns
-        return written_for not in _states(headers) or (is_older and not _ends_with_mark(path))
-
-
-def has_log(path: str) -> bool:
-    """Whether a log with anything in it lies beside a file."""
-    with contextlib.suppress(OSError, ValueError):
-        return os.stat(path + _LOG).st_size > 0
-    return False
-
-
-def _ends_with_mark(path: str) -> bool:
-    """Whether a checkpoint is the last that a log tells; False where it is of a form not known here."""
-    with open(path + _LOG, "rb") as file:
-        begin = _LOG_BEGIN.match(file.read(_LONGEST_BEGIN))
-        if begin is None:
-            return False
-        file.seek(begin.end())
-        last = b""
-        while len(frame := file.read(_FRAME.size)) == _FRAME.size:
-            size, _ = _FRAME.unpack(frame)
-            if size < len(_MARK) or size > os.fstat(file.fileno()).st_size - file.tell():
-                break
-            kind = file.read(len(_MARK))
-            last = last if kind == _END else kind
-            file.seek(size - len(_MARK), os.SEEK_CUR)
-    return last == _MARK
+        is_older = os.stat(path + LOG_ENDING).st_mtime_ns < os.fstat(file).st_mtime_ns
+        return written_for not in _states(headers) or (is_older and not ends_with_mark(path))
 
 
 def metadata_blocks(file: int) -> tuple[int, ...]:

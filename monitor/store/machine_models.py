@@ -153,9 +153,14 @@ ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY camp
 """
 
 
-def not_identified(db: Database) -> tuple[str, ...]:
-    """The campaigns of machines that were not identified by the model which their machine is followed by."""
-    return _campaigns_beside(db, _CHOSEN)
+def not_identified(db: Database, machine: str | None = None) -> tuple[str, ...]:
+    """The campaigns of machines, or of one, that were not identified by the model which their machine is followed
+    by."""
+    beside = _campaigns_beside(db, _CHOSEN)
+    if machine is None:
+        return beside
+    own = {name for (name,) in db.rows("SELECT campaign FROM campaign WHERE machine = ?", [machine])}
+    return tuple(name for name in beside if name in own)
 
 
 def without_part(db: Database) -> tuple[str, ...]:

@@ -19,11 +19,12 @@ from monitor.store import migrations
 from monitor.store.kept_blocks import (
     ENDING,
     has_foreign_log,
-    has_log,
     has_torn_blocks,
     keep_blocks,
     settle_blocks,
+    settle_log,
 )
+from monitor.store.log import has_log, has_torn_log
 from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
@@ -97,10 +98,16 @@ def _opened(path: str, read_only: bool, config: Config) -> duckdb.DuckDBPyConnec
         raise StoreError(_of_foreign_log(path))
     if not read_only:
         settle_blocks(path)
+        settle_log(path)
     elif has_torn_blocks(path):
         raise UnfinishedLogError(
             f"{path} holds half a block of a write that was cut off; what was there before lies beside it, and is put "
             f"back by the next verb of somebody who may write: `monitor --db {path} verify`"
+        )
+    elif has_torn_log(path):
+        raise UnfinishedLogError(
+            f"{path}.wal ends in half a write that was cut off, which is removed by the next verb of somebody who may "
+            f"write: `monitor --db {path} verify`"
         )
     connection = duckdb.connect(path, read_only=read_only, config=config)
     show_no_progress(connection)

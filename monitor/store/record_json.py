@@ -63,6 +63,8 @@ def machine_json(machine: Machine) -> str:
     }
     if machine.chain:
         document["chain"] = [asdict(axis) for axis in machine.chain]
+    if machine.virtual:
+        document["virtual"] = True
     if machine.gravity is not None:
         document["gravity"] = machine.gravity
     return _text(document)

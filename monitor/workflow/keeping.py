@@ -24,6 +24,7 @@ from monitor.store import (
     export_tables,
     export_workbook,
     last_entries,
+    not_identified,
     restore,
     take_backup,
     take_increment,
@@ -32,6 +33,8 @@ from monitor.store import (
 )
 from monitor.workflow.recomputed import Recomputation, recompute
 
+#: Sheets of a workbook that hold what was identified.
+OF_PARAMETERS = ("parameters", "parameters long")
 #: Words that entries of the audit are looked through for at once.
 _MOST_WORDS = 20
 
@@ -337,11 +340,13 @@ def _workbook(db: Database, request: ExportRequest) -> ExportAnswer:
     file = request.folder if is_file else request.folder / "monitor.xlsx"
     check_workbook_path(file)
     # Loaded here: nothing else of this file computes.
-    from monitor.workflow.trend.workbook_changes import NOT_SEARCHED, workbook_changes
+    from monitor.workflow.trend.workbook_changes import workbook_changes
 
-    is_wanted = request.tables is None or CHANGES in request.tables
+    tables = (*OF_PARAMETERS, CHANGES) if request.tables is None else request.tables
     # Outside of `reading`: nobody waits for a search of years.
-    changes = workbook_changes(db, request.machine) if is_wanted else ()
+    changes = workbook_changes(db, request.machine) if CHANGES in tables else ()
     with db.reading():
         written = export_workbook(db, file, request.tables, request.machine, changes)
-    return ExportAnswer((written,), tuple(row.what for row in changes if row.kind == NOT_SEARCHED))
+    of_parameters = [name for name in (*OF_PARAMETERS, CHANGES) if name in tables]
+    lacking = not_identified(db, request.machine) if of_parameters else ()
+    return ExportAnswer((written,), (messages.lacks_campaigns(of_parameters, lacking),) if lacking else ())

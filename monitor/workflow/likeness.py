@@ -27,7 +27,7 @@ from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.file_names import file_name
 from monitor.workflow.sight import EffectSight, effect_sight
-from monitor.workflow.simulation import PEAK_UM
+from monitor.workflow.simulation import PEAK_UM, as_virtual
 from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
 
 #: The mean month of the Gregorian calendar, in days.
@@ -80,8 +80,11 @@ class LikeRequest:
                 "--machine: name one machine or more; their campaigns are folders of that name, "
                 r'so it has none of \ / : * ? " < > |'
             )
-        if len(set(self.machines)) < len(self.machines):
-            raise InputError("--machine: each machine is named once")
+        if len({name.casefold() for name in self.machines}) < len(self.machines):
+            raise InputError(
+                "--machine: each machine is named once; names that differ in capital letters alone are one folder on "
+                "Windows and macOS"
+            )
         if self.months < 1 or self.months * len(self.machines) > MOST_CAMPAIGNS:
             raise InputError(
                 f"--months {self.months}: 1 or more, and at most {MOST_CAMPAIGNS} campaigns together"
@@ -170,7 +173,7 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
             local = _errors(request, likeness, dated, units, rng)
             written = likeness.campaign_with(local, rng, added)
             folder = request.out / name
-            write_campaign(replace(dated, probings=written.probings), folder)
+            write_campaign(as_virtual(replace(dated, probings=written.probings)), folder)
             folders.append(str(folder))
             truth += _true_values(dated, likeness, local, units)
             if request.effect is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError, did_you_mean
 from monitor.methods import Rehearsal, campaign_method, methods
 from monitor.readers import write_campaign
+from monitor.records import Campaign
 from monitor.reporting import messages
 from monitor.units import MICROMETRE
 from monitor.workflow.sight import EffectSight, effect_sight
@@ -89,6 +90,11 @@ class SimulateAnswer:
     sight: EffectSight | None = field(default=None, metadata=OMITTED)
 
 
+def as_virtual(campaign: Campaign) -> Campaign:
+    """Return a campaign whose file says that nobody measured it."""
+    return replace(campaign, machine=replace(campaign.machine, virtual=True))
+
+
 def simulate(request: SimulateRequest) -> SimulateAnswer:
     """Write a virtual campaign folder. Raises InputError for an effect that the machine or robot does not have."""
     campaign = request.rehearsal.virtual_campaign(
@@ -98,7 +104,7 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         peak=MICROMETRE.to_internal(request.peak),
         noise=MICROMETRE.to_internal(request.noise),
     )
-    write_campaign(campaign, request.out)
+    write_campaign(as_virtual(campaign), request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
     hidden = (request.effect, request.peak) if request.effect else None
     message = messages.virtual_written(request.out, runs, probings // runs, hidden)
@@ -198,7 +204,7 @@ def simulate_machine(request: SimulateMachineRequest) -> SimulateMachineAnswer:
         days=request.days,
         noise=MICROMETRE.to_internal(noise),
     )
-    write_campaign(campaign, request.out)
+    write_campaign(as_virtual(campaign), request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
     return SimulateMachineAnswer(
         folder=str(request.out),

@@ -257,6 +257,10 @@ def test_campaigns_like_one_of_yours_are_written(tmp_path: Path) -> None:
             "there is no option 'month'; did you mean 'months'",
         ),
         ({"machines": "M1", "start": "2026-01-12", "months": 0}, "months 0: 1 or more"),
+        (
+            {"machines": ("M1", "m1"), "start": "2026-01-12"},
+            "that differ in capital letters alone are one folder",
+        ),
         ({"topology": "w b X t"}, "leave out topology and errors"),
     ):
         with pytest.raises(InputError, match=said):

@@ -16,9 +16,11 @@ import numpy as np
 from monitor.records import Artefact, AxisSettings, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
 
 TOPOLOGY = "w C B X b Z Y (C1) t"
-#: From the bed outwards: name, direction, and which way its reading moves the branch.
-WORK = (("X", 0, 1.0), ("B", 1, 1.0), ("C", 2, 1.0))
-TOOL = (("Z", 2, 1.0), ("Y", 1, 1.0), ("C1", 2, 1.0))
+#: From the bed outwards: name and direction.
+WORK = (("X", 0), ("B", 1), ("C", 2))
+TOOL = (("Z", 2), ("Y", 1), ("C1", 2))
+#: Which way a reading moves its branch.
+SIGNS = dict.fromkeys(("X", "Y", "Z", "B", "C", "C1"), 1)
 BALLS = {
     "1": (116.0, 9.0, 171.0), "2": (-7.0, 118.0, 149.0), "3": (-119.0, -4.0, 98.0), "4": (12.0, -121.0, 81.0),
     "S1": (-148.0, 151.5, 57.0), "S2": (-148.0, -151.5, 57.0),
@@ -49,15 +51,18 @@ class Plan:
         return len(self.target)
 
 
-def plan() -> Plan:
-    """Four balls at every indexation, the bar once, three turns of the spindle."""
+def plan(signs: Mapping[str, int] = SIGNS) -> Plan:
+    """Four balls at every indexation, the bar once, three turns of the spindle; the same places whatever the signs."""
     rows = [(ball, b, c, 0.0) for b, c in INDEXATIONS for ball in "1234"]
     rows[12:12] = [("S1", 0, 0, 0.0), ("S2", 0, 0, 0.0)]
     rows += [(ball, 0, 0, turn) for turn in SPINDLE for ball in "1234"]
     columns = list(zip(*rows, strict=True))
     return Plan(
         np.array(columns[0]),
-        {name: np.array(column, float) for name, column in zip(("B", "C", "C1"), columns[1:], strict=True)},
+        {
+            name: signs[name] * np.array(column, float)
+            for name, column in zip(("B", "C", "C1"), columns[1:], strict=True)
+        },
     )
 
 
@@ -90,10 +95,10 @@ class OwnMachine:
     motions: Mapping[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = field(
         default_factory=dict
     )
+    signs: Mapping[str, int] = field(default_factory=lambda: SIGNS)
 
-    def _axis(
-        self, name: str, axis: int, sign: float, reading: np.ndarray, side: np.ndarray, warm: np.ndarray
-    ):
+    def _axis(self, name: str, axis: int, reading: np.ndarray, side: np.ndarray, warm: np.ndarray):
+        sign = self.signs[name]
         location, motion = np.zeros((len(reading), 6)), np.zeros((len(reading), 6))
         for index, letter in enumerate("XYZABC"):
             unit = 1e-3 if index < 3 else 1e-6
@@ -112,8 +117,8 @@ class OwnMachine:
         count = len(warm)
         matrix = np.tile(np.eye(4), (count, 1, 1))
         none = np.zeros(count)
-        for name, axis, sign in axes:
-            matrix = matrix @ self._axis(name, axis, sign, readings[name], sides.get(name, none), warm)
+        for name, axis in axes:
+            matrix = matrix @ self._axis(name, axis, readings[name], sides.get(name, none), warm)
         return matrix
 
     def away(self, readings, sides, warm, ball) -> np.ndarray:
@@ -165,6 +170,7 @@ def recorded(
     bar_mm: float = BAR_MM,
     ambient: np.ndarray | None = None,
     name: str = "own",
+    signs: Mapping[str, int] = SIGNS,
 ) -> Campaign:
     """The record of readings (R, n, 3) in mm of runs on ``days`` (R,), as a reader of files makes it.
 
@@ -193,7 +199,7 @@ def recorded(
     )
     expansion = {} if ambient is None else {"expansion_coefficient": BAR_PER_K, "reference_temperature": 20.0}
     bar = ScaleBar(("S1", "S2"), bar_mm, BAR_U_MM, "own", **expansion)
-    axes = {axis: AxisSettings(axis, 1) for axis in ("X", "Y", "Z", "B", "C", "C1")}
+    axes = {axis: AxisSettings(axis, sign) for axis, sign in signs.items()}
     balls = tuple(Ball(ball, place, 19.05) for ball, place in BALLS.items())
     return Campaign(
         name, "samba", Machine("OWN", TOPOLOGY, axes=axes), Probe("P", "p", stated_um * 1e-3),

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from monitor.api.arguments import argument
 from monitor.cli.moments import moment
 from monitor.exceptions import InputError
 
@@ -81,3 +82,14 @@ def test_every_option_with_a_moment_reads_the_same_forms(typed: Any, db: Path, a
     trend = ["trend", "HU40-T", "--parameter", "EXX", "--campaign", "cold-cold", "--since", at]
     answer = typed(*trend, "--reference", f"{at}..2026-03-04", "--next-check", "2026-09-01", db=db)
     assert (answer.status, answer.err) == (0, "")
+
+
+def test_the_command_line_and_python_read_the_same_forms(new_york: None) -> None:
+    """Python read 20260305 and weeks, which the command line refuses."""
+    for text in ("2025-07-20", "2025-01-20 7:05", "2025-07-20 14:00 +02:00", "2025-07-20T14:00Z"):
+        assert argument("at", text, datetime) == moment(text, "--at")
+    for text in ("20250720", "2025-W10-1", "soon"):
+        with pytest.raises(InputError, match=re.escape(f"at={text!r}: write a day or a time as 2026-03-05")):
+            argument("at", text, datetime)
+    with pytest.raises(InputError, match="start='2025-02-30': there is no such day"):
+        argument("start", "2025-02-30", date)

@@ -52,3 +52,9 @@ def test_what_is_no_term_is_refused_with_the_axes_there_are(symbol: str) -> None
     )
     with pytest.raises(EffectError, match=words):
         parse_term(symbol, CHAIN)
+
+
+def test_an_axis_that_was_left_out_is_named() -> None:
+    """``EX`` was answered with EZX."""
+    with pytest.raises(EffectError, match=r"'EX' is no geometric error of .*: did you mean 'EXX'\?"):
+        parse_term("EX", parse_topology("w C B X b Z Y (C1) t"))

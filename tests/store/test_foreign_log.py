@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -265,3 +266,57 @@ def test_a_new_database_whose_log_could_not_be_moved_into_it_gets_no_name(
     with pytest.raises(StoreError, match="could not be moved from its log"):
         Database(tmp_path / "new.duckdb")
     assert list(tmp_path.glob("new.duckdb*")) in ([], [tmp_path / "new.duckdb.lock"])
+
+
+@pytest.mark.parametrize("kind", [SharedDatabase, Database])
+@pytest.mark.parametrize(
+    "place", ["in the last entry", "behind one", "in the head of one", "all", "behind the head"]
+)
+def test_a_log_that_ends_in_zeros_is_replayed_as_one_that_is_cut_off(
+    shop: Shop, kind: type[Database], place: str
+) -> None:
+    """As a loss of power leaves it: DuckDB 1.5.5 calls it damaged, and nothing that was stored is missing."""
+    log = Path(f"{shop.path}.wal")
+    content = log.read_bytes()
+    begins = [found.start() for found in re.finditer(re.escape(b"d\0\x19"), content)]
+    kept = {
+        "in the last entry": len(content) - 3, "behind one": begins[-1] - 16, "in the head of one": begins[-1] - 5,
+        "all": 0, "behind the head": len(_BEGIN_1_5),
+    }[place]  # fmt: skip
+    assert len(begins) > 1
+    log.write_bytes(content[:kept] + bytes(len(content) - kept + 5000))
+    with pytest.raises(duckdb.IOException, match="WAL") if kept else nullcontext():
+        duckdb.connect(str(shop.path), read_only=True).close()
+    with pytest.raises(StoreError, match="ends in half a write that was cut off"):
+        Database(shop.path, read_only=True)
+    with kind(shop.path) as db:
+        assert verify_audit(db).faults == ()
+        # The first event lies in the file.
+        assert db.rows("SELECT count(*) FROM event") == [(1,)]
+        shop._record(db, 5)
+    with Database(shop.path) as db:
+        assert verify_audit(db).faults == ()
+        assert db.rows("SELECT count(*) FROM event") == [(2,)]
+
+
+def test_zeros_behind_whole_transactions_take_none_of_them(shop: Shop) -> None:
+    with Path(f"{shop.path}.wal").open("ab") as log:
+        log.write(bytes(2**20 + 77))
+    with SharedDatabase(shop.path) as db:
+        assert db.rows("SELECT count(*) FROM event") == [(2,)]
+
+
+@pytest.mark.parametrize("damage", ["a bit", "another form"])
+def test_a_log_that_is_damaged_otherwise_stays_as_it_is(shop: Shop, damage: str) -> None:
+    log = Path(f"{shop.path}.wal")
+    content = bytearray(log.read_bytes())
+    if damage == "a bit":
+        content[len(content) // 2] ^= 4
+    else:
+        content[: len(_BEGIN_1_5)] = _BEGIN_OF_ANOTHER
+        content += bytes(100)
+    log.write_bytes(content)
+    for kind in (SharedDatabase, Database):
+        with pytest.raises(StoreError, match="cannot be read, it may be damaged"), kind(shop.path):
+            pass
+    assert log.read_bytes() == content

@@ -23,7 +23,7 @@ from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import Ground, GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
-from monitor.store import Database, StoredModel, import_campaign, load_certificate
+from monitor.store import Database, StoredModel, import_campaign, load_campaign, load_certificate
 from monitor.uncertainty.coverage_regions.coverage import ellipsoid_factor
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
@@ -32,7 +32,9 @@ from monitor.workflow.certificate.request import CertificateRequest, RemakeReque
 from monitor.workflow.certificate.results import _lacking
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.likeness import LikeRequest, simulate_like
 from monitor.workflow.models import resolve
+from monitor.workflow.simulation import SimulateRequest, simulate
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES, _units
 from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
@@ -425,3 +427,26 @@ def test_positions_in_inches_are_refused_by_the_work_point(axes: str, said: str)
         import_campaign(db, inches)
         with pytest.raises(DataError, match=f"if {said} in inches; positions are in mm$"):
             identify(db, IdentifyRequest("r-test"))
+
+
+def test_what_was_simulated_is_a_ground_also_behind_the_database(tmp_path: Path, five_days: Campaign) -> None:
+    """A certificate of a rehearsal was issued without a word."""
+    made = simulate(SimulateRequest(tmp_path / "rehearsal"))
+    assert "virtual = true" in (tmp_path / "rehearsal/campaign.toml").read_text("utf-8")
+    like = simulate_like(
+        LikeRequest(tmp_path / "shop", str(EXAMPLES / "tilting-table"), ("M1",), DAY, months=1)
+    )
+    for folder in (made.folder, *like.folders):
+        campaign = read_campaign(Path(folder))
+        assert campaign.machine.virtual
+        with Database(":memory:") as db:
+            import_campaign(db, campaign)
+            assert load_campaign(db, campaign.name).machine == campaign.machine
+    assert not five_days.machine.virtual
+    virtual = replace(five_days, machine=replace(five_days.machine, virtual=True))
+    (ground,) = grounds(virtual)
+    assert ground == Ground(GroundKind.SIMULATED, 20, "HU40-T")
+    assert "machine HU40-T was not measured" in ground_sentence(ground, texts_of())
+    assert "Maschine HU40-T wurde nicht gemessen" in ground_sentence(ground, texts_of("de"))
+    with pytest.raises(RefusedResultError, match="simulated: the readings were simulated"):
+        accepted_grounds((ground,), {})

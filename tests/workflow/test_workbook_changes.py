@@ -51,7 +51,15 @@ def test_the_sheet_is_computed_and_says_what_it_lacks(
     (row,) = rows(tmp_path / "before.xlsx")
     assert (row["machine"], row["kind"], row["at / UTC"]) == ("HU40-T", "not searched", None)
     assert "not identified by the model that HU40-T is followed by" in row["what"]
-    assert answer.notes == (row["what"],)
+    assert answer.notes == (
+        "parameters, parameters long, changes: without cold-cold, five-days, hot-cold, not identified yet; "
+        "type `monitor identify`",
+    )
+    alone = export(changed, ExportRequest(tmp_path / "alone.xlsx", "xlsx", ("runs", "parameters"), "HU40-T"))
+    assert alone.notes == (
+        "parameters: without cold-cold, five-days, hot-cold, not identified yet; type `monitor identify`",
+    )
+    assert export(changed, ExportRequest(tmp_path / "runs.xlsx", "xlsx", ("runs",))).notes == ()
 
     for campaign in CAMPAIGNS:
         identify(changed, IdentifyRequest(campaign))

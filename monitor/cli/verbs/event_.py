@@ -1,7 +1,8 @@
 """Record what happened to a machine (crash, repair, compensation, another probe), or list what was recorded.
 
 An event splits the history of all parameters: `trend`, `fleet` and the health report follow the machine from its
-last event on. A note is only shown with the history. Neither can be undone.
+last event on. A note is only shown with the history. Neither can be undone, so the same twice and a usual kind that is
+misspelt are refused.
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ from monitor.records import (
     Probings,
     Reflector,
     Run,
-    topology_of,
 )
+from monitor.topology_text import topology_of
 from monitor.units import DEGREE
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -30,6 +30,7 @@ class GroundKind(StrEnum):
     UNITS = "units"
     WORK_POINT = "work-point"
     INSTRUMENTS = "instruments"
+    SIMULATED = "simulated"
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ class Ground:
 
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
     them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and
-    none where the residuals are a ``size`` of what the statements leave, or the setup of which they are. Of instruments
+    none where the residuals are a ``size`` of what the statements leave, or the setup of which they are. Of what was
+    simulated the subject is the machine. Of instruments
     the subject is a parameter with the two that disagree, and ``size`` is their E_n; or it is who contradicts all
     others, by ``size`` in standard uncertainties.
     """

@@ -31,8 +31,11 @@ def grounds_against(
 
         robust = robust_fit(machine_problem(campaign, model))
         by_run = [grounds_of(campaign, robust, run) for run in stored]
+    simulated = (
+        [Ground(GroundKind.SIMULATED, min(stored), campaign.machine.id)] if campaign.machine.virtual else []
+    )
     # Gross readings and units of any run speak against each: once each, before what is the runs' own.
-    grounds = dict.fromkeys(ground for of_run in by_run for ground in of_run or ())
+    grounds = dict.fromkeys([*simulated, *(ground for of_run in by_run for ground in of_run or ())])
     return tuple(sorted(grounds, key=lambda ground: ground.kind not in OF_ANY_RUN))
 
 

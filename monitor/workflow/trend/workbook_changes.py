@@ -19,9 +19,6 @@ from monitor.store import (
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.trend.parameter import dated_change
 
-#: The kind of a row that names the campaigns of a machine that were left out.
-NOT_SEARCHED = "not searched"
-
 
 def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange, ...]:
     """Search the identified runs of every machine, or of one, for changes; a row that says so where there is none.
@@ -38,7 +35,7 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         if not changes and (past or not history.unidentified):
             rows.append(ComputedChange(name, None, "none", what=_why_none(past)))
         if history.unidentified:
-            rows.append(ComputedChange(name, None, NOT_SEARCHED, what=_not_identified(history)))
+            rows.append(ComputedChange(name, None, "not searched", what=_not_identified(history)))
         progress.told((number + 1) / len(machines))
     return tuple(rows)
 

@@ -1,7 +1,8 @@
 """What the uncertainty of a run propagates: its readings, the calibrated quantities, the errors of the linear axes.
 
 The covariance of the readings is pooled by day from the repeated runs where there are enough of them, else all runs
-together, else the stated standard uncertainty, uncorrelated.
+together, else the stated standard uncertainty, uncorrelated but where the residuals show that neighbours of a run
+resemble each other.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from monitor.uncertainty.runs.row_run import repeated_readings
 from monitor.uncertainty.runs.sensitivity import Sensitivity
 from monitor.uncertainty.runs.touched_run import TouchedRun
 from monitor.workflow.selections.readings import SelectedReadings
+from monitor.workflow.uncertainty.neighbours import resemblance_of
 
 READINGS = "readings"
 BAR = "scale bar"
@@ -80,8 +82,16 @@ def reading_inputs(
         several = bool(campaign.artefact.setups)
         stated = fit.sigma if several else campaign.probe.standard_uncertainty
         u = max(stated, lack_of_fit(fit)[1] or 0.0)
-        inputs = uncorrelated(names, units, run.inputs[:count], run.stated * (u / stated), source=READINGS)
+        alike = None if selected is not None or several else resemblance_of(fit, run)
+        if alike is not None:
+            u = max(u, stated * alike.scale)
+        deviation = run.stated * (u / stated)
+        inputs = uncorrelated(names, units, run.inputs[:count], deviation, source=READINGS)
         source = _stated_source(u, stated, several=several, selection=name)
+        if alike is not None:
+            inputs = replace(inputs, covariance=alike.matrix * np.outer(deviation, deviation))
+            neighbours = alike.correlation.rho * alike.correlation.share
+            source = replace(source, neighbours=round(neighbours, 3))
         source = replace(source, for_the_run=_chose_the_run(holds_for, len(values)))
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source

@@ -91,8 +91,8 @@ class EffectOutputs:
         evaluated = self.runs[self.index]
         readings = len(evaluated.reading_names)
         of_readings = inputs.covariance[:readings, :readings]
-        alike = inputs.sources[0]
-        estimated = inputs.estimated_of(alike)
+        source = inputs.sources[0]
+        estimated = inputs.estimated_of(source)
         known_each = estimated is Estimated.SCALE
         with np.errstate(invalid="ignore", divide="ignore"):
             scale = np.sqrt(np.diag(of_readings)) / evaluated.stated
@@ -100,14 +100,16 @@ class EffectOutputs:
         covariance = np.zeros((len(self.by_run[0]),) * 2)
         for run in self.others:
             rows = self.by_run[run][:, : len(self.runs[run].reading_names)]
-            if known_each:
-                spread = rows * (factor * self.runs[run].stated)
+            stated = self.runs[run].stated
+            alike = stated.shape == evaluated.stated.shape and bool(np.allclose(stated, evaluated.stated))
+            if known_each and not alike:
+                spread = rows * (factor * stated)
                 covariance += spread @ spread.T
             else:
                 covariance += rows @ of_readings @ rows.T
         covariance = 0.5 * (covariance + covariance.T)
         return OutputContribution(
-            EffectLine.OTHER_RUNS.value, covariance, inputs.degrees_of_freedom(alike), estimated
+            EffectLine.OTHER_RUNS.value, covariance, inputs.degrees_of_freedom(source), estimated
         )
 
 
