@@ -15,6 +15,7 @@ from monitor.reporting.budget import HoldsFor
 from monitor.reporting.budget import LengthReference
 from monitor.reporting.budget import StatedSource
 from monitor.reporting.certificate.grounds import Ground
+from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.health.comparison import ResidualAgainst
 from monitor.reporting.health.comparison import ResidualMap
@@ -566,6 +567,10 @@ class TypedUncertaintyAnswer(Answer[UncertaintyAnswer]):
     def length(self) -> LengthReference | None: ...
     @property
     def grounds(self) -> tuple[Ground, ...] | None: ...
+    @property
+    def effects(self) -> tuple[str, ...] | None: ...
+    @property
+    def effects_outside(self) -> Outside | None: ...
     @property
     def covariance(self) -> Array: ...
 

@@ -32,15 +32,20 @@ class MistakeFound:
     rms_undone: float
 
 
+#: What moved where all targets did.
+WHOLE_PIECE = "The piece on the table"
+
+
 @dataclass(frozen=True)
 class Move:
-    """A target that moved, or a parameter that stepped, at a run."""
+    """A target that moved, or a parameter that stepped, at a run; within it from a ``sequence`` number on, if any."""
 
     subject: str
     stepped: bool
     size: float
     unit: str
     run: int
+    sequence: int | None = None
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,10 @@ def machine_sentences(finding: MachineFinding) -> str:
         )
     for move in finding.moves:
         verb = "stepped" if move.stepped else "moved"
-        sentences.append(f"{move.subject} {verb} by {move.size:.1f} {move.unit} at run {move.run}.")
+        at = f"at run {move.run}"
+        if move.sequence is not None:
+            at = f"within run {move.run}, from sequence {move.sequence} on"
+        sentences.append(f"{move.subject} {verb} by {move.size:.1f} {move.unit} {at}.")
     sentences += [LIMITS[limit].format(most=finding.most_bad_points) for limit in finding.limits]
     if finding.unfitted:
         sentences.append(

@@ -84,3 +84,30 @@ def test_displacement_is_against_the_target(make: Callable[..., Context]) -> Non
     target = np.zeros((1, 3))
     basis.apply(np.array([0.1]), np.zeros((1, 6, 2, 6)), target)
     np.testing.assert_allclose(target, [[1.0, 0.0, 0.0]], rtol=1e-15)
+
+
+def test_a_piece_that_slipped_is_shifted_and_turned_to_the_end_of_its_run(
+    make: Callable[..., Context],
+) -> None:
+    places = [[30.0, 0.0, 0.0], [-30.0, 0.0, 0.0], [0.0, 40.0, 0.0], [0.0, -40.0, 0.0], [30.0, 0.0, 0.0]]
+    context = make({"X": [0.0] * 5}, run=[1, 1, 1, 1, 2], target=["1", "2", "3", "4", "1"], nominal=places)
+    found = shifts("artefact:moved(run 1, sequence 2)", context)
+    assert found.shape == (5, 3, 6)
+    np.testing.assert_array_equal(found[[0, 4]], 0.0)
+    np.testing.assert_array_equal(found[1, :, :3], np.eye(3))
+    # A turn about Z by 1 at the farthest, 40 mm off the middle: at 30 mm three quarters, across.
+    np.testing.assert_allclose(found[1, :, 5], [0.0, -0.75, 0.0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[2, :, 5], [-1.0, 0.0, 0.0], rtol=0, atol=1e-15)
+
+
+def test_a_piece_of_unknown_places_is_shifted_only(make: Callable[..., Context]) -> None:
+    context = make({"X": [0.0] * 2}, nominal=[[np.nan] * 3] * 2)
+    found = shifts("artefact:moved(run 1, sequence 1)", context)
+    np.testing.assert_array_equal(
+        found, np.tile(np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1), (2, 1, 1))
+    )
+
+
+def test_a_slip_must_say_when(make: Callable[..., Context]) -> None:
+    with pytest.raises(EffectError, match=r"write artefact:moved\(run 7, sequence 23\)"):
+        parse_effect("artefact:moved", make({"X": [0.0]}).chain)

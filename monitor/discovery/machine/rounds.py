@@ -29,6 +29,7 @@ from monitor.discovery.machine.suspects.suspects import (
     find_suspects,
     with_effects,
     with_scatter_of,
+    with_slip_of,
 )
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rounds import Turns, in_rounds
@@ -158,6 +159,8 @@ class _Rounds:
         self.initial = search.gross if beside_curves is None else beside_curves
         # A ball that shakes hides effects and makes others; runs that do not share it show it before any is known.
         self.suspects = self.initial if self.beside_curves else self._with_scatter()
+        if self.suspects.same_as(self.initial) and not self.beside_curves:
+            self.suspects = with_slip_of(first, search.problem, self.initial, search.variants)
         self.correlation = correlation
         self.shared = correlation is not None
         self.unfitted: dict[str, None] = {}

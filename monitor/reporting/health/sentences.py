@@ -72,7 +72,7 @@ class SteppedAtEvent(Sentence):
 
 @dataclass(frozen=True)
 class BallMoved(Sentence):
-    """A ball stands elsewhere since a run."""
+    """A ball stands elsewhere since a run; the whole piece where no ``target`` is named."""
 
     target: str
     size: float
@@ -80,7 +80,8 @@ class BallMoved(Sentence):
     run: int
 
     def __str__(self) -> str:
-        return f"ball {self.target} moved by {self.size:.1f} {self.unit} (run {self.run})"
+        what = f"ball {self.target}" if self.target else "the piece on the table"
+        return f"{what} moved by {self.size:.1f} {self.unit} (run {self.run})"
 
 
 @dataclass(frozen=True)

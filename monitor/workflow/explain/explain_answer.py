@@ -174,7 +174,8 @@ class ScatteringTarget:
 
 @dataclass(frozen=True)
 class MovedTarget:
-    """A target that stands elsewhere from a probing of a run on."""
+    """A target that stands elsewhere from a probing of a run on; ``of_all`` where the whole piece moved, by this much
+    in its middle."""
 
     target: str
     run: int
@@ -183,6 +184,7 @@ class MovedTarget:
     shift_um: tuple[float, ...]
     unit: str
     p_value: float
+    of_all: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from monitor.records import FrameKind, FrameOfReference, Verdict
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
+    WHOLE_PIECE,
     MachineFinding,
     MissingEffect,
     MistakeFound,
@@ -180,7 +181,7 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     moved = (
         MovedTarget(
             move.target, move.run, move.sequence, um(move.size), tuple(um(part) for part in move.shift),
-            MICROMETRE.name, move.p_value,
+            MICROMETRE.name, move.p_value, move.of_all or None,
         )
         for move in explanation.moves
     )  # fmt: skip
@@ -231,8 +232,14 @@ def _as_said(effect: MachineMissing) -> MissingEffect:
 def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: str) -> Move:
     """A change as a sentence says it."""
     stepped = isinstance(change, ChangedParameter)
-    subject = change.parameter if isinstance(change, ChangedParameter) else f"{target_word} {change.target}"
-    return Move(subject, stepped, change.size, change.unit, change.run)
+    if isinstance(change, ChangedParameter):
+        subject = change.parameter
+    elif isinstance(change, MovedTarget) and change.of_all:
+        subject = WHOLE_PIECE
+    else:
+        subject = f"{target_word} {change.target}"
+    sequence = change.sequence if isinstance(change, MovedTarget) else None
+    return Move(subject, stepped, change.size, change.unit, change.run, sequence)
 
 
 def _undecided(explanation: Explanation) -> tuple[str, ...]:

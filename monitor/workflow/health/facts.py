@@ -32,7 +32,7 @@ from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
-from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
+from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation, MovedTarget
 from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
@@ -132,7 +132,8 @@ def changes_noted(
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
-            moved, at = BallMoved(move.target, move.size, move.unit, move.run), starts[move.run]
+            target = "" if isinstance(move, MovedTarget) and move.of_all else move.target
+            moved, at = BallMoved(target, move.size, move.unit, move.run), starts[move.run]
             noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)

@@ -1,26 +1,29 @@
-"""A slight error of unknown shape: one part of a flexible basis that stands out of what an empty catalogue leaves.
+"""A slight error of unknown shape: what alone stands out of what an empty catalogue leaves.
 
 Lack of fit asks all poses at once whether anything is missing, and a shape of a few standard deviations is lost among
-them. Here every part of the flexible basis of every error is asked for itself, some 1 700 in all, and the largest one
-has to stand against that number twice: in the whitened residual, and, where runs are many enough, under sign flips of
-whole runs, which holds whatever the noise within a run depends on (A. M. Winkler et al., NeuroImage 92 (2014) 381).
+them. Here every part of the flexible basis of every error is asked for itself, some 1 700 in all, and every wave of
+more periods a turn than the catalogue has, cosine and sine together, some 80. The most certain one has to stand
+against that number twice: in the whitened residual, and, where runs are many enough, under sign flips of whole runs,
+which holds whatever the noise within a run depends on (A. M. Winkler et al., NeuroImage 92 (2014) 381).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from monitor.discovery.machine.evidence.poses import poses_of_rows
-from monitor.discovery.machine.scene import ChainScene, ChainVariant, scene_of
-from monitor.discovery.search.projection import without
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.sign_flips import signs
 from monitor.records import Array
 
-# The search may be wrong in one empty campaign of a hundred; this is its part of that, and that of the flips.
-LEVEL, FLIP_LEVEL = 5e-4, 5e-2
+# The search may be wrong in one empty campaign of a hundred; these are its parts of that, and that of the flips. Waves
+# are few, and bearings and gears make them: they have as large a part as so many families of the catalogue.
+LEVEL, LEVEL_OF_WAVES, FLIP_LEVEL = 5e-4, 2.5e-3, 5e-2
 # With fewer runs than this no flip is rare enough: two runs to the power of six are 1 in 64 and more.
 FEWEST_RUNS = 8
 # Fewer runs than this have no other run to speak of, and a correlation of neighbours is an estimate: what stands
@@ -30,12 +33,21 @@ FEWEST, LEVEL_OF_FEW = 3, 1e-6
 SMALLEST_SHARE = 1e-2
 
 
-def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str, int] | None:
-    """The error, and the part from 0 of its flexible basis, that stands out alone; None where none does.
+@dataclass(frozen=True)
+class SlightShape:
+    """What stands out alone: the ``number``-th part from 0 of an error in any shape, of this ``family``, or the
+    ``number``-th wave. ``p_value`` counts all that were tried."""
+
+    family: str
+    number: int
+    p_value: float
+
+
+def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> SlightShape | None:
+    """The part of the flexible basis of an error that stands out alone; None where none does.
 
     ``wholes`` are the errors in any shape, their symbols as families.
     """
-    runs = len(scene.fit.problem.runs)
     if poses_of_rows(scene.fit) is not None:
         return None
     beside = scene.remainders.beside([])
@@ -50,25 +62,54 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
         columns.append((remainder[:, able] / length[able]).astype(np.float32))
     if not parts:
         return None
-    every = np.concatenate(columns, axis=1)
-    sizes = every.T @ beside.residual
-    best = int(np.abs(sizes).argmax())
-    squares, dof = float(sizes[best]) ** 2, beside.degrees_of_freedom - 1
-    rest = float(beside.residual @ beside.residual) - squares
+    best = _most_certain(scene, np.concatenate(columns, axis=1)[:, :, None], LEVEL)
+    return None if best is None else SlightShape(*parts[best[0]], best[1])
+
+
+def slight_wave(scene: ChainScene, waves: Sequence[ChainCandidate]) -> SlightShape | None:
+    """The wave that stands out alone; None where none does. Those of which the data see cosine or sine alone are none:
+    at such angles a wave is as well one of fewer periods."""
+    if poses_of_rows(scene.fit) is not None:
+        return None
+    beside = scene.remainders.beside([])
+    able: list[int] = []
+    columns: list[Array] = []
+    for number, wave in enumerate(waves):
+        remainder = without(beside.basis, wave.columns)
+        before = wave.raw_lengths / scene.fit.sigma
+        if np.linalg.svd(remainder / np.maximum(before, 1e-300), compute_uv=False).min() > SMALLEST_SHARE:
+            able.append(number)
+            columns.append(orthonormal(remainder).astype(np.float32))
+    if not able:
+        return None
+    best = _most_certain(scene, np.stack(columns, axis=1), LEVEL_OF_WAVES)
+    return None if best is None else SlightShape(waves[able[best[0]]].family, able[best[0]], best[1])
+
+
+def _most_certain(scene: ChainScene, columns: Array, level: float) -> tuple[int, float] | None:
+    """Index and p-value, times their number, of the most certain of G shapes with orthonormal ``columns`` (M, G, k);
+    None where it does not stand out at a level, beyond any doubt of the noise where that is an estimate."""
+    beside = scene.remainders.beside([])
+    count, size = columns.shape[1:]
+    runs = len(scene.fit.problem.runs)
+    explained = np.sum(np.tensordot(columns, beside.residual, (0, 0)) ** 2, axis=1)
+    best = int(explained.argmax())
+    dof = beside.degrees_of_freedom - size
+    rest = float(beside.residual @ beside.residual) - float(explained[best])
     if dof < 1 or rest <= 0.0:
         return None
-    p_value = float(scipy.special.fdtrc(1, dof, squares / (rest / dof)))
+    p_value = count * float(scipy.special.fdtrc(size, dof, float(explained[best]) / size / (rest / dof)))
     is_white = runs >= FEWEST and scene.fit.whitening is None
-    if p_value * len(parts) > (LEVEL if is_white else LEVEL_OF_FEW):
+    if p_value > (level if is_white else LEVEL_OF_FEW):
         return None
-    if runs >= FEWEST_RUNS and _share_of_flips(scene, every, beside.residual, abs(sizes[best])) > FLIP_LEVEL:
+    if runs >= FEWEST_RUNS and _share_of_flips(runs, columns, beside.residual, explained[best]) > FLIP_LEVEL:
         return None
-    return parts[best]
+    return best, p_value
 
 
-def _share_of_flips(scene: ChainScene, columns: Array, residual: Array, largest: float) -> float:
-    """The share of sign flips of whole runs under which the largest of all parts (M, C) is as large."""
-    count = len(scene.fit.problem.runs)
-    shares = (columns * residual[:, None].astype(np.float32)).reshape(count, -1, columns.shape[1]).sum(axis=1)
-    flipped = np.abs(shares.T @ signs(count)).max(axis=0)
+def _share_of_flips(runs: int, columns: Array, residual: Array, largest: float) -> float:
+    """The share of sign flips of whole runs under which the most certain of all shapes (M, G, k) explains as much."""
+    products = (columns * residual[:, None, None].astype(np.float32)).reshape(runs, -1, *columns.shape[1:])
+    shares = products.sum(axis=1)
+    flipped = np.sum(np.tensordot(shares, signs(runs), (0, 0)) ** 2, axis=1).max(axis=0)
     return float((1 + np.sum(flipped >= largest)) / (1 + len(flipped)))

@@ -18,7 +18,7 @@ from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.slight_shapes import slight_shape
+from monitor.discovery.machine.shapes.slight_shapes import slight_shape, slight_wave
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
@@ -29,12 +29,14 @@ from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings
 from monitor.discovery.search.scene import family_count
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import Always
-from monitor.effects.shapes.free import Free
+from monitor.effects.shapes.free import HARMONICS, Free
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
 
 # The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
 LEVEL = 1e-3
+# Waves of fewer periods a turn are in the catalogue, or are the motion itself.
+FEWEST_PERIODS = 4
 # More parts than this of one shape are beyond what a plan can separate.
 MOST_PARTS = 8
 # The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
@@ -57,10 +59,9 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     not."""
     selected = result.candidates
     if not selected and not _lacks_something(scene):
-        selected = _slight(scene)
+        scene, selected = _slight(scene)
         if not selected:
             return scene, result
-        scene = _with_candidate(scene, selected[0])
     scene, selected = _with_free(scene, selected)
     margin = _margin(scene, selected)
     alone = [] if margin is None else _alone(scene, selected, margin)
@@ -126,25 +127,56 @@ def _is_free(candidate: ChainCandidate) -> bool:
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
 
 
-def _slight(scene: ChainScene) -> list[ChainCandidate]:
-    """One part of an error of free shape that stands out, and predicts poses and runs that were left out, if any."""
+def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
+    """One part of an error of free shape, or one wave of many periods a turn, that stands out and predicts poses and
+    runs that were left out, if any; and the scene with it, with all such waves of its error where it is one."""
+    shapes = _shapes_by_error(scene)
+    if not shapes:
+        return scene, []
+    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
+    waves = [wave for of in shapes.values() for wave in _waves(scene, of)]
+    wave = slight_wave(scene, waves)
+    if wave is not None and (part is None or wave.p_value <= part.p_value):
+        slight = waves[wave.number]
+        more = [other for other in waves if error_of(other) == error_of(slight) and other.visible]
+    elif part is not None:
+        slight = _of_parts(scene, part.family, [part.number], shapes[part.family], [])
+        more = [slight]
+    else:
+        return scene, []
+    if not _predicts_runs(scene, slight) or not _predicts(scene, slight, []):
+        return scene, []
+    return replace(scene, candidates=(*scene.candidates, *more)), [slight]
+
+
+def _shapes_by_error(scene: ChainScene) -> dict[str, list[ChainCandidate]]:
+    """The shapes of the catalogue by their error, but for what bends as any shape does: over a part of a turn flexure
+    and refraction."""
     shapes: dict[str, list[ChainCandidate]] = {}
-    # Over a part of a turn flexure and refraction bend as any shape does.
-    turning = not scene.fit.problem.needs_whole_periods
     for shape in filter(_is_of_shape, scene.candidates):
         effect = shape.effect
-        if isinstance(effect, ChainEffect) and effect.joint.turns and not turning:
-            continue
-        shapes.setdefault(error_of(shape), []).append(shape)
-    if not shapes:
-        return []
-    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
-    if part is None:
-        return []
-    free = _of_parts(scene, part[0], [part[1]], shapes[part[0]], [])
-    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([free]))
-    predicts = before is None or after is None or after < before
-    return [free] if predicts and _predicts(scene, free, []) else []
+        turns = isinstance(effect, ChainEffect) and effect.joint.turns
+        if not (turns and scene.fit.problem.needs_whole_periods):
+            shapes.setdefault(error_of(shape), []).append(shape)
+    return shapes
+
+
+def _predicts_runs(scene: ChainScene, slight: ChainCandidate) -> bool:
+    """Whether an effect alone lowers the error on runs left out; true with too few runs."""
+    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([slight]))
+    return before is None or after is None or after < before
+
+
+def _waves(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[ChainCandidate, ...]:
+    """The waves of an error with more periods a turn than its ``shapes`` have, up to those of the flexible basis."""
+    effect = shapes[0].effect
+    if not isinstance(effect, ChainEffect) or not effect.joint.turns:
+        return ()
+    present = {shape.family for shape in shapes}
+    symbol, chain = error_of(shapes[0]), scene.fit.problem.context.chain
+    texts = [f"{symbol}:harmonic{order}" for order in range(FEWEST_PERIODS, HARMONICS + 1)]
+    variants = [Variant(text, parse_effect(text, chain)) for text in texts if text not in present]
+    return scene_of(scene.fit, variants).candidates
 
 
 def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> list[ChainCandidate]:

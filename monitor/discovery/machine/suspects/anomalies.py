@@ -48,7 +48,8 @@ class BadPoint:
 
 @dataclass(frozen=True)
 class BallMove:
-    """A ball that stands elsewhere from a probing on; ``shift`` (3,) mm in the frame of the last work axis."""
+    """A ball, or the whole piece where it is ``of_all``, that stands elsewhere from a probing on; ``shift`` (3,) mm in
+    the frame of the last work axis."""
 
     target: str
     run: int
@@ -56,15 +57,22 @@ class BallMove:
     shift: tuple[float, float, float]
     p_value: float
     chi_square: float = 0.0
+    of_all: bool = False
 
     @property
     def size(self) -> float:
         """Length of the shift in mm."""
         return float(np.linalg.norm(self.shift))
 
+    @property
+    def text(self) -> str:
+        """The move as an effect."""
+        what = "artefact" if self.of_all else f"ball:{self.target}"
+        return f"{what}:moved(run {self.run}, sequence {self.sequence})"
+
 
 @dataclass(frozen=True)
-class _Deviations:
+class Deviations:
     """Deviation (n, d) of every probing from the other runs', in standard uncertainties, and its spread."""
 
     vectors: Array
@@ -80,7 +88,8 @@ class _Deviations:
         return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
 
 
-def _deviations(fit: Fit) -> _Deviations:
+def deviations_of(fit: Fit) -> Deviations:
+    """The deviations of a fit; of a campaign of one or two runs its residuals."""
     problem = fit.problem
     white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
     cells = plan_cells(problem)
@@ -107,7 +116,7 @@ def _deviations(fit: Fit) -> _Deviations:
             of_run = np.median(squares[members][weighted[members]]) / share
             scale[members] = np.maximum(scale[members], of_run)
     scale = np.sqrt(scale)
-    return _Deviations(vectors, inflation, rows, bases, parts, scale)
+    return Deviations(vectors, inflation, rows, bases, parts, scale)
 
 
 def checked_parts(fit: Fit) -> Array:
@@ -140,7 +149,7 @@ def statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], A
 
 def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
-    deviations = _deviations(fit)
+    deviations = deviations_of(fit)
     context = fit.problem.context
     tests = int((~fit.left_out).sum())
     points = []
@@ -179,7 +188,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
 
 def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
     """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
-    deviations = _deviations(fit)
+    deviations = deviations_of(fit)
     context = fit.problem.context
     moves = []
     tests = 0
@@ -200,9 +209,7 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
     ]
 
 
-def _ball_move(
-    fit: Fit, deviations: _Deviations, run: int, touches: npt.NDArray[np.int64]
-) -> BallMove | None:
+def _ball_move(fit: Fit, deviations: Deviations, run: int, touches: npt.NDArray[np.int64]) -> BallMove | None:
     """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test."""
     context, rows, basis = fit.problem.context, deviations.rows[run], deviations.of_run(run)
     first = np.arange(TOUCHES_EACH_SIDE, len(touches) - TOUCHES_EACH_SIDE + 1)

@@ -21,6 +21,7 @@ from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEff
 from monitor.discovery.machine.shapes.variants import each_run
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove, bad_points, ball_moves
 from monitor.discovery.machine.suspects.bad_poses import bad_poses
+from monitor.discovery.machine.suspects.piece_moves import piece_move
 from monitor.discovery.machine.suspects.scatter import Scatter, scattering, settled
 from monitor.discovery.machine.suspects.varying import Varying, most_varying
 from monitor.effects import parse_effect
@@ -105,12 +106,7 @@ class Suspects:
 
     def move_effects(self, problem: ChainProblem) -> list[MachineEffect]:
         """The moves as effects."""
-        return [
-            parse_effect(
-                f"ball:{move.target}:moved(run {move.run}, sequence {move.sequence})", problem.context.chain
-            )
-            for move in self.moves.values()
-        ]
+        return [parse_effect(move.text, problem.context.chain) for move in self.moves.values()]
 
     def effects(self, problem: ChainProblem) -> list[MachineEffect]:
         """Moves and varying effects, each with coefficients of its runs."""
@@ -119,9 +115,9 @@ class Suspects:
 
 
 class _LooksForVarying:
-    """Looks for what varies from run to run.
+    """Looks for what varies from run to run, and for slips of the piece.
 
-    It is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads, and once
+    Each is weighed among all variants, seconds where there are hundreds of touches: at first, where it leads, and once
     nothing single is left, not after each of some forty bad points.
     """
 
@@ -130,6 +126,16 @@ class _LooksForVarying:
         self._scene = scene
         self._under: Fit | None = None
         self._latest: Varying | None = None
+        self._may_slip = True
+
+    def slip(self, under: Fit) -> BallMove | None:
+        """The slip of the piece under a fit, if any. Where there was none it is not asked for again: it would be weighed
+        among all variants after each bad point."""
+        if not self._may_slip:
+            return None
+        slip = piece_move(under, self._variants, self._scene if self._under is None else None)
+        self._may_slip = slip is not None
+        return slip
 
     def leading(self, under: Fit, least: float) -> Varying | None:
         """The effect that varies most under a fit, where it gains more than the ``least``; None where it does not."""
@@ -184,9 +190,23 @@ def with_scatter_of(under: Fit, problem: ChainProblem, suspects: Suspects) -> Su
         return suspects
 
 
+def with_slip_of(
+    under: Fit, problem: ChainProblem, suspects: Suspects, variants: Sequence[ChainVariant]
+) -> Suspects:
+    """The suspects with the slip of the piece that a fit of a problem shows, if any: errors of the machine come near
+    it, so it is looked for before any is known."""
+    slip = piece_move(under, variants)
+    return suspects if slip is None else suspects.with_single([slip])
+
+
 def _with_most_certain(suspects: Suspects, current: Fit, look: _LooksForVarying) -> Suspects | None:
     """The suspects with what explains most of what a fit leaves; None where nothing does."""
-    single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
+    slip = look.slip(current)
+    single: list[BadPoint | BallMove] = [
+        *bad_points(current),
+        *ball_moves(current),
+        *([slip] if slip else []),
+    ]
     single.sort(key=lambda suspect: -suspect.chi_square)
     least = single[0].chi_square if single else 0.0
     scatter = scattering(current, suspects.scatter)
