@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from monitor.api.pictures import Pictures
-from monitor.api.tables import as_html, as_text, main_table
+from monitor.api.tables import as_html, as_text, facts, main_table
 from monitor.documents import inlined_parts, to_document
 from monitor.exceptions import InputError
 
@@ -85,7 +85,9 @@ class Answer(Generic[Content]):
         try:
             rows = main_table(self.content)
         except InputError:
-            return self._sentence()
+            return self._sentence() or "\n".join(
+                f"{name}: {value}" for name, value in facts(self.content).items()
+            )
         if rows.empty and self._sentence():
             return self._sentence()
         return f"{self._sentence()}\n{as_text(rows)}".strip()
@@ -100,7 +102,8 @@ class Answer(Generic[Content]):
             if not (rows.empty and parts):
                 parts.append(as_html(rows))
         except InputError:
-            parts.append(f"<p>{escape(self._summary())}</p>")
+            lines = [f"{name}: {value}" for name, value in facts(self.content).items()]
+            parts += [] if parts else [f"<p>{escape(line)}</p>" for line in lines or [self._summary()]]
         if self._draw is not None:
             parts.append(self.plot().first())
         return "\n".join(parts)

@@ -161,8 +161,7 @@ def _fixed(name: str, value: Any, members: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def _mapping(name: str, value: Any, key_kind: Any, kind: Any) -> dict[Any, Any]:
     if not isinstance(value, Mapping):
-        pairs = f"names, each with {_words(kind)}"
-        raise refused(name, value, f"a dict of {pairs}, such as {{'EXX': 12.0}}")
+        raise refused(name, value, f"a dict of names, each with {_words(kind)}")
     return {
         argument(f"the name {shown(key)} in {name}", key, key_kind): argument(
             f"{name}[{key!r}]", element, kind

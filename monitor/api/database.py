@@ -69,6 +69,8 @@ class Database:
         Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
         others are imported.
         """
+        if len(folders) == 1 and isinstance(folders[0], (list, tuple)):
+            (folders,) = folders
         if not folders:
             raise InputError("name a campaign folder or more")
         answer = self._ask(

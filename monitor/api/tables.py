@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Where the main rows of an answer are, the first that it has.
 MAIN_ROWS = (
     "missing", "table", "parameters", "versions", "models", "effects", "runs", "campaigns", "imported",
-    "selections", "certificates", "machines", "entries", "history",
+    "selections", "certificates", "machines", "entries", "history", "events",
 )  # fmt: skip
 #: A table of so few rows and so many columns is wider than a notebook and is shown turned.
 FEW_ROWS, MANY_COLUMNS = 5, 12
@@ -167,6 +167,14 @@ def _uncertainties(answer: Any) -> pd.DataFrame:
     frame["unit"] = [answer.units[name] for name in answer.parameters]
     frame.attrs["correlation"] = answer.guf.correlation
     return frame
+
+
+def facts(content: object) -> dict[str, str]:
+    """Return what an answer without rows says of itself: its fields of one value, and the files that it names."""
+    files = _field(content, "files")
+    named = {"files": ", ".join(map(str, files))} if isinstance(files, tuple) and files else {}
+    plain = {name: value for name, value in _scalars(content).items() if value not in (None, "")}
+    return {name: _in_digits(v) if isinstance(v, float) else str(v) for name, v in plain.items()} | named
 
 
 def _scalars(record: object) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.configuration import configuration
 from monitor.cli.parser import add_model
 from monitor.cli.secret_files import warn_of_readers
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, did_you_mean
 from monitor.moments import day_of
 from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.grounds import GroundKind
@@ -121,7 +121,8 @@ def _accepted(text: str) -> tuple[GroundKind, str]:
         return GroundKind(name.strip()), reason.strip()
     except ValueError as error:
         raise ArgumentTypeError(
-            f"there is no ground '{name}'; there are {', '.join(kind.value for kind in GroundKind)}; "
+            f"there is no ground '{name}'; {did_you_mean(name, [kind.value for kind in GroundKind])}there are "
+            f"{', '.join(kind.value for kind in GroundKind)}; "
             "write --accept GROUND=REASON"
         ) from error
 

@@ -48,8 +48,8 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
     if sheets is None and (folder / name).is_file():
         faults.add(
             WORKBOOK, None, None,
-            "this is no workbook of Excel (.xlsx) that can be read; take it away, or save it anew and take away "
-            f"{name}",
+            "this is no workbook of Excel (.xlsx) that can be read; take it away, or save it anew and take away the "
+            "tables that it holds",
         )  # fmt: skip
     holding = [file for file in (name, f"{stem}.xlsx") if (folder / file).is_file()]
     holding += [WORKBOOK] if sheets is not None and stem in sheets else []

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from monitor.exceptions import StoreError
-from monitor.store.log import LOG_ENDING, ends_with_mark, has_log, has_torn_log, whole_length
+from monitor.store.log import LOG_ENDING, ends_in_zero, ends_with_mark, has_log, whole_length
 
 try:
     import fcntl
@@ -122,7 +122,7 @@ def settle_log(path: str) -> None:
 
     Raises StoreError where the log cannot be written.
     """
-    if not has_torn_log(path):
+    if not ends_in_zero(path):
         return
     with _alone(path, for_writing=True) as file:
         length = None if file is None else whole_length(path)
@@ -139,6 +139,14 @@ def settle_log(path: str) -> None:
             raise StoreError(
                 f"{path}.wal ends in half a write, which could not be cut off: {fault}"
             ) from fault
+
+
+def has_torn_log(path: str) -> bool:
+    """Whether a log ends in zeros that a loss of power left; nobody writes it now."""
+    if not ends_in_zero(path):
+        return False
+    with _alone(path, for_writing=False) as file:
+        return file is not None and whole_length(path) is not None
 
 
 def has_foreign_log(path: str) -> bool:

@@ -47,13 +47,13 @@ def ends_with_mark(path: str) -> bool:
     return last == _MARK
 
 
-def has_torn_log(path: str) -> bool:
+def ends_in_zero(path: str) -> bool:
     """Whether a log ends in a zero, as none does that was written to its end."""
     if not has_log(path):
         return False
     with contextlib.suppress(OSError), open(path + LOG_ENDING, "rb") as file:
         file.seek(-1, os.SEEK_END)
-        return file.read(1) == b"\0" and whole_length(path) is not None
+        return file.read(1) == b"\0"
     return False
 
 

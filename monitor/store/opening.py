@@ -20,11 +20,12 @@ from monitor.store.kept_blocks import (
     ENDING,
     has_foreign_log,
     has_torn_blocks,
+    has_torn_log,
     keep_blocks,
     settle_blocks,
     settle_log,
 )
-from monitor.store.log import has_log, has_torn_log
+from monitor.store.log import has_log
 from monitor.store.turns import Holder, Patience, holder_in, ticket_to_read, turn_to_write, writer_at_work
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:

@@ -93,8 +93,8 @@ class VolumetricError:
 
     @property
     def least_certain(self) -> int:
-        """The point whose vector has the largest total variance."""
-        return int(np.argmax(np.trace(self.covariance, axis1=1, axis2=2)))
+        """The point whose length has the largest uncertainty."""
+        return int(np.argmax(self.u_lengths))
 
     def factor(self, p: float = 0.95) -> float:
         """Return k of one length or one component, with the degrees of freedom of the parameters."""

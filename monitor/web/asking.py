@@ -178,6 +178,8 @@ def _fault(fault: Any) -> str:
     path = ".".join(str(part) for part in fault["loc"]) or "the document"
     if fault["type"] == "missing":
         return f"'{path}' is missing"
+    if str(fault["type"]).startswith(("datetime_", "date_")):
+        return f"'{path}' is a moment, such as 2026-03-05T07:00:00-05:00, not '{fault['input']}'"
     return f"'{path}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}"
 
 

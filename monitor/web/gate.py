@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from html import escape
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -77,8 +78,9 @@ class Gate:
             name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
         }
         refusal = self._refusal(scope, headers)
+        from_form = _is_form(scope, headers)
         if refusal is not None:
-            await _plain(send, *refusal)
+            await _plain(send, *refusal, as_page=from_form)
             return
         user, session, cookie = self._visitor(scope, headers)
         limit, too_large = _limit(scope["path"]), _too_large(scope["path"])
@@ -102,14 +104,14 @@ class Gate:
             await self._app(scope, _counted(receive, limit, too_large), send_with_headers)
         except TooLargeError:
             if not started:
-                await _plain(send, 413, too_large)
+                await _plain(send, 413, too_large, as_page=from_form)
         except TooSlowError as error:
             if not started:
-                await _plain(send, 408, str(error))
+                await _plain(send, 408, str(error), as_page=from_form)
         except Exception:
             # It was logged and answered where it happened; what follows would only be said twice.
             if not started:
-                await _plain(send, 500, OUR_FAULT)
+                await _plain(send, 500, OUR_FAULT, as_page=from_form)
 
     def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
@@ -234,15 +236,17 @@ def _counted(receive: Receive, limit: int, text: str) -> Receive:
     return counting
 
 
-async def _plain(send: Send, status: int, text: str, *headers: tuple[str, str]) -> None:
-    """Send a sentence as JSON, which a program reads and a person too."""
+async def _plain(
+    send: Send, status: int, text: str, *headers: tuple[str, str], as_page: bool = False
+) -> None:
+    """Send a sentence as JSON, which a program reads and a person too; to who sent a form as a page, ``as_page``."""
     every = {
-        "Content-Type": "application/json; charset=utf-8",
+        "Content-Type": f"{'text/html' if as_page else 'application/json'}; charset=utf-8",
         **HEADERS,
         "Cache-Control": "no-store",
         **dict(headers),
     }
-    body = json.dumps({"error": text}, ensure_ascii=False).encode()
+    body = (_page(text) if as_page else json.dumps({"error": text}, ensure_ascii=False)).encode()
     await send(
         {
             "type": "http.response.start",
@@ -251,3 +255,15 @@ async def _plain(send: Send, status: int, text: str, *headers: tuple[str, str]) 
         }
     )
     await send({"type": "http.response.body", "body": body})
+
+
+def _page(text: str) -> str:
+    """A page of its own: what stands before the application knows none of its templates."""
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>refused</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<link rel="stylesheet" href="/static/pages.css"></head><body><main><h1>Refused</h1>'
+        f'<p class="refusal" role="alert">{escape(text)}</p><p>The browser leads back to what was filled in; '
+        '<a href="/">or go to the fleet</a>.</p>'
+        "</main></body></html>"
+    )

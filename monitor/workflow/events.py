@@ -9,6 +9,9 @@ from monitor.exceptions import InputError, did_you_mean
 from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
 from monitor.store.catalogue import check_machine
 
+#: Before it nobody recorded what happened to a machine that is measured today.
+FIRST_YEAR = 1900
+LONGEST_TEXT = 2000
 #: The kinds that most events are of; any other word is one, too.
 USUAL_KINDS = ("crash", "repair", "compensation", "probe")
 
@@ -39,6 +42,15 @@ class EventRequest:
             raise InputError(
                 f"'{word}' is a kind of event; a note would not split the history, and none can be undone: give "
                 f"--kind {word} and say in words what happened, for example 'spindle hit the vice'"
+            )
+        if len(self.text) > LONGEST_TEXT:
+            raise InputError(
+                f"what happened is said in {LONGEST_TEXT} letters at most, not {len(self.text)}: it stands in tables, "
+                "on charts and in reports"
+            )
+        if self.at is not None and self.at.year < FIRST_YEAR:
+            raise InputError(
+                f"{self.at.isoformat()} lies before {FIRST_YEAR}, and an event cannot be undone; give the time it had"
             )
         if self.at is not None and self.at > datetime.now(UTC) + timedelta(hours=1):
             raise InputError(

@@ -156,3 +156,17 @@ def test_other_forms_that_mean_one_thing_are_taken() -> None:
 def test_one_campaign_may_be_named_alone(db: mm.Database) -> None:
     """Its letters were taken for campaigns."""
     assert db.trend("TILT-500", campaigns="tilting-table").campaigns == ("tilting-table",)
+
+
+def test_a_list_of_folders_is_taken(db: mm.Database) -> None:
+    assert db.add([EXAMPLES / "tilting-table"]).imported[0].state == "unchanged"
+    with pytest.raises(InputError, match="name a campaign folder or more"):
+        db.add([])
+
+
+def test_an_answer_without_rows_says_what_it_has(db: mm.Database, tmp_path: Path) -> None:
+    """It was an empty line."""
+    answer = db.ask("export", folder=tmp_path / "out.xlsx", format="xlsx")
+    assert f"files: {tmp_path / 'out.xlsx'}" in repr(answer)
+    assert f"<p>files: {tmp_path / 'out.xlsx'}</p>" in answer._repr_html_()
+    assert len(db.ask("event", machine="TILT-500").table()) == 0

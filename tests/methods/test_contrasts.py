@@ -15,7 +15,7 @@ from monitor.methods.instruments.contrasts import contrasts, contrasts_of, scatt
 from monitor.methods.instruments.run_rows import RunRows, run_rows
 from monitor.readers import read_campaign
 from monitor.workflow.instruments.against_others import against_others
-from tests.simulator import horizontal_centre as centre
+from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 #: Levels of the rates: that of `compare`, and one at which a few hundred draws say something.
 LEVELS = (0.01, 0.1)
@@ -129,6 +129,21 @@ def test_a_wrong_length_of_a_bar_is_named_and_no_plane_of_it(tmp_path: Path) -> 
     beside = against_others(problem, solve_problem(problem), ability, 1)
     assert beside is not None
     assert beside.suspects == ("the stated length of ball bar",)
+
+
+def test_of_two_that_share_something_either_may_be_wrong(tmp_path: Path) -> None:
+    """Laser and bar alone: without the bar nothing is compared, which is no contradiction."""
+    rng, chain = np.random.default_rng(31), shop.machine(0.0)
+    laser, bar = shop.laser(chain, rng, 1), shop.ball_bar(chain, rng, 30.0)
+    for row in bar[1]:
+        row["reading_um"] = -float(row["reading_um"])  # type: ignore[arg-type]
+    chain.write(tmp_path / "week", laser[0] + bar[0], [*laser[1], *bar[1]])
+    campaign = read_campaign(tmp_path / "week")
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    beside = against_others(problem, solve_problem(problem), ability, 1)
+    assert beside is not None
+    assert "ball bar" in beside.suspects
+    assert len(beside.suspects) > 1
 
 
 def _campaign(folder: Path, seed: int, otherwise: tuple[str, float] | None) -> Path:

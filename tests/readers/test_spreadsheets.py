@@ -169,6 +169,7 @@ def test_a_workbook_that_is_none_beside_whole_tables_is_named(tmp_path: Path, co
     with pytest.raises(CampaignError, match=r"campaign\.xlsx: this is no workbook of Excel") as refusal:
         read_campaign(folder)
     assert "take it away" in str(refusal.value)
+    assert len(refusal.value.faults) == 1
 
 
 def test_a_workbook_whose_sheet_is_damaged_is_refused_in_words(tmp_path: Path) -> None:

@@ -5,9 +5,12 @@ DuckDB 1.5 replays whatever lies beside a file. A crash is made of the files as 
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from datetime import UTC, datetime
@@ -21,7 +24,7 @@ from monitor.exceptions import StoreError
 from monitor.records import Campaign
 from monitor.store import Database, SharedDatabase, import_campaign, record_event, restore, take_backup
 from monitor.store.copies.increment import take_increment
-from monitor.store.kept_blocks import has_foreign_log
+from monitor.store.kept_blocks import has_foreign_log, has_torn_log
 from monitor.store.opening import connect
 from monitor.store.verification import verify_audit
 
@@ -320,3 +323,17 @@ def test_a_log_that_is_damaged_otherwise_stays_as_it_is(shop: Shop, damage: str)
         with pytest.raises(StoreError, match="cannot be read, it may be damaged"), kind(shop.path):
             pass
     assert log.read_bytes() == content
+
+
+def test_a_log_that_somebody_is_writing_is_no_torn_one(shop: Shop) -> None:
+    """Half of an entry may be seen that ends in a zero; whoever has the file is waited for."""
+    with Path(f"{shop.path}.wal").open("ab") as log:
+        log.write(bytes(3))
+    assert has_torn_log(str(shop.path))
+    look = "import sys; from monitor.store.kept_blocks import has_torn_log; print(has_torn_log(sys.argv[1]))"
+    with shop.path.open("r+b") as file:
+        fcntl.lockf(file, fcntl.LOCK_EX)  # as DuckDB locks what it writes
+        said = subprocess.run(
+            [sys.executable, "-c", look, str(shop.path)], capture_output=True, text=True, check=False
+        )
+    assert said.stdout == "False\n", said.stderr

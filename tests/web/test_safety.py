@@ -205,6 +205,19 @@ def test_log_in_and_out(guarded: Any) -> None:
     assert guarded.client.get("/").status_code == 303
 
 
+def test_a_form_that_is_too_large_is_answered_by_a_page(local: Any) -> None:
+    """A browser was left on bare JSON, without a way on."""
+    answer = local.client.post(
+        "/import",
+        content=iter([b"x" * 2**20] * 65),
+        headers={"Content-Type": "multipart/form-data; boundary=x"},
+    )
+    assert answer.status_code == 413
+    assert answer.headers["content-type"].startswith("text/html")
+    assert "64 MiB may be sent at a time" in answer.text
+    assert 'href="/"' in answer.text
+
+
 def test_too_much_is_refused_before_it_is_read(local: Any) -> None:
     big = b"x" * (DOCUMENT_BYTES + 1)
     assert local.client.post("/model/add", content=big).status_code == 413

@@ -126,7 +126,8 @@ def _judged(
             continue
         if contrast.p < ASKED and among == frozenset(blocks):
             within = [other.p for other in _judged(at, blocks, units, among - mine)]
-            contrast = replace(contrast, others_p=min(1.0, len(within) * min(within, default=1.0)))
+            # Others that share nothing cannot contradict each other.
+            contrast = replace(contrast, others_p=min(1.0, len(within) * min(within)) if within else 1.0)
         yield contrast
 
 

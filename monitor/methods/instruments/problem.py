@@ -418,6 +418,6 @@ class InstrumentProblem(ChainProblem):
         """Positions in another unit, directions and lengths that are off by more than any machine's errors."""
         vectors = self.vectors(solution.local, solution.common)
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        own = self.own_of(solution.local)
-        unknowns = [own[:, columns] for columns in self.own_columns]
+        first = len(self.base_names)
+        unknowns = [solution.local[:, first + columns] for columns in self.own_columns]
         return contradiction(self.parts, unknowns, self.sigma, vectors, travel)

@@ -41,10 +41,13 @@ def routes() -> APIRouter:
 
     @router.get("/model")
     def model(
-        request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", note: str = "",
-        overtaken: str = "",
+        request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", changed: bool = False,
+        overtaken: bool = False,
     ) -> Response:  # fmt: skip
-        """Compare a model with a campaign; with an effect tried beside it."""
+        """Compare a model with a campaign; with an effect tried beside it.
+
+        What was ``changed``, here or, ``overtaken``, elsewhere, is read from the version: no link can say it.
+        """
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.explain.explain_answer import MachineExplanation
 
@@ -58,12 +61,13 @@ def routes() -> APIRouter:
         residuals, steps = answers.residuals, answers.steps
         label = model if compare is None else compare.comparison.model
         versions = ask(user, "models").models
+        current = _version(versions, label)
         return page(
             request, "model.html",
             row=row, campaign=campaign, compare=compare, explanation=explanation,
             missing=() if explanation is None else explanation.missing, refusals=answers.refusals,
             model=label, asked=model,
-            effect=effect, note=note, overtaken=overtaken, effects=[candidate.effect for candidate in missing],
+            effect=effect, changed=changed, overtaken=overtaken, effects=[candidate.effect for candidate in missing],
             scene=None if residuals is None else scene_chart(residuals),
             vectors=None if residuals is None else scene_vectors(residuals),
             residuals=residuals, magnifications=MAGNIFICATIONS,
@@ -73,7 +77,8 @@ def routes() -> APIRouter:
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if len(missing) > 1 else None,
             falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
-            versions=versions, current=_version(versions, label), latest=_latest(versions, label), pinned=pinned,
+            versions=versions, current=current, latest=_latest(versions, label), pinned=pinned,
+            changes=changes,
             waiting=answers.waiting,
         )  # fmt: skip
 
@@ -89,9 +94,7 @@ def routes() -> APIRouter:
         overtaken = None if form.filled("new_name") else _overtaken(request, form)
         if overtaken is not None:
             return overtaken
-        answer = await asked_once(request, form, "add effect", document)
-        added = f"{effect} was added" if not beside else f"{', '.join((effect, *beside))} were added"
-        return _back(campaign, answer, added)
+        return _back(campaign, await asked_once(request, form, "add effect", document))
 
     @router.post("/model/undo")
     async def undo(request: Request) -> Response:
@@ -102,8 +105,7 @@ def routes() -> APIRouter:
         overtaken = _overtaken(request, form)
         if overtaken is not None:
             return overtaken
-        answer = await asked_once(request, form, "remove effect", document)
-        return _back(campaign, answer, f"{effect} was taken out")
+        return _back(campaign, await asked_once(request, form, "remove effect", document))
 
     return router
 
@@ -191,19 +193,18 @@ def _overtaken(request: Request, form: Form) -> Response | None:
     latest = _latest(request.app.state.asker(request.state.user, "models").models, shown)
     if latest is None or pinned(latest.model) == shown:
         return None
-    changes = listed([*(f"+ {name}" for name in latest.added), *(f"− {name}" for name in latest.removed)], 3)
-    overtaken = (
-        f"Nothing was changed: since this page was opened, somebody or another window has made {latest.model} "
-        f"({changes}). It is shown now; see whether the change is still wanted here."
-    )
-    address = link("/model", campaign=form.text("campaign"), model=pinned(latest.model), overtaken=overtaken)
+    address = link("/model", campaign=form.text("campaign"), model=pinned(latest.model), overtaken=1)
     return RedirectResponse(address, status_code=303)
 
 
-def _back(campaign: str, answer: ChangeModelAnswer, what: str) -> Response:
-    name = answer.model.version.model
-    note = f"{what}: the model is now {name}"
-    return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
+def changes(version: Any) -> str:
+    """Return what a version adds to its parent and takes out of it, three of them at most."""
+    return listed([*(f"+ {name}" for name in version.added), *(f"− {name}" for name in version.removed)], 3)
+
+
+def _back(campaign: str, answer: ChangeModelAnswer) -> Response:
+    address = link("/model", campaign=campaign, model=answer.model.version.model, changed=1)
+    return RedirectResponse(address, status_code=303)
 
 
 def _latest(versions: Any, label: str) -> Any:

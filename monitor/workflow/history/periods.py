@@ -15,6 +15,7 @@ from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_
 from monitor.store import Database, MachineHistory, machine_history, numbered_by
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series
+from monitor.workflow.moments import check_offsets
 
 #: False discovery rate over the parameters of a comparison.
 RATE = 0.05
@@ -31,11 +32,7 @@ class Period:
     until: datetime
 
     def __post_init__(self) -> None:
-        for moment in (self.since, self.until):
-            if moment.tzinfo is None:
-                raise InputError(
-                    f"{moment.isoformat()} has no offset from UTC; write for example {moment.isoformat()}+01:00"
-                )
+        check_offsets(self.since, self.until)
         if self.since >= self.until:
             raise InputError(
                 f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"

@@ -13,6 +13,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError, NotFoundError
 from monitor.store import Database, machine_history, machine_topology, numbered_by, older_numbers
 from monitor.workflow.models import resolve
+from monitor.workflow.moments import check_offsets
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,7 @@ class ValuesRequest:
     model: str | None = None
 
     def __post_init__(self) -> None:
-        for moment in (self.since, self.until):
-            if moment is not None and moment.tzinfo is None:
-                raise InputError(
-                    f"{moment.isoformat()} has no offset from UTC; write for example {moment.isoformat()}+01:00"
-                )
+        check_offsets(self.since, self.until)
         if self.since is not None and self.until is not None and self.since >= self.until:
             raise InputError(
                 f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"

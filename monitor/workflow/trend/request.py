@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from monitor.exceptions import InputError
+from monitor.workflow.moments import check_offsets
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class TrendRequest:
     weekly_looks: bool = False
 
     def __post_init__(self) -> None:
+        check_offsets(self.since, self.next_check, *(self.reference or ()))
         if not 0.0 < self.reliability < 1.0:
             raise InputError(f"--reliability {self.reliability:g}: a probability lies between 0 and 1")
         limit = self.volumetric_limit_um

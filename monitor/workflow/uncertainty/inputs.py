@@ -78,23 +78,35 @@ def reading_inputs(
             "three days or more are needed (write --holds-for run)"
         )
     else:
-        # Readings of several instruments each have their own: what repeats worse than stated does so in proportion.
-        several = bool(campaign.artefact.setups)
-        stated = fit.sigma if several else campaign.probe.standard_uncertainty
-        u = max(stated, lack_of_fit(fit)[1] or 0.0)
-        alike = None if selected is not None or several else resemblance_of(fit, run)
-        if alike is not None:
-            u = max(u, stated * alike.scale)
-        deviation = run.stated * (u / stated)
-        inputs = uncorrelated(names, units, run.inputs[:count], deviation, source=READINGS)
-        source = _stated_source(u, stated, several=several, selection=name)
-        if alike is not None:
-            inputs = replace(inputs, covariance=alike.matrix * np.outer(deviation, deviation))
-            neighbours = alike.correlation.rho * alike.correlation.share
-            source = replace(source, neighbours=round(neighbours, 3))
+        inputs, source = _stated_inputs(fit, campaign, run, name)
         source = replace(source, for_the_run=_chose_the_run(holds_for, len(values)))
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source
+
+
+def _stated_inputs(
+    fit: Fit, campaign: Campaign, run: MeasuredRun, selection: str | None
+) -> tuple[Inputs, CovarianceSource]:
+    """Inputs of the readings of a run from what is stated of them, or their repeatability where that is larger.
+
+    They are uncorrelated where the residuals do not show that neighbours of the run resemble each other.
+    """
+    # Readings of several instruments each have their own: what repeats worse than stated does so in proportion.
+    several = bool(campaign.artefact.setups)
+    stated = fit.sigma if several else campaign.probe.standard_uncertainty
+    u = max(stated, lack_of_fit(fit)[1] or 0.0)
+    alike = None if selection is not None or several else resemblance_of(fit, run)
+    if alike is not None:
+        u = max(u, stated * alike.scale)
+    names = run.reading_names
+    deviation = run.stated * (u / stated)
+    inputs = uncorrelated(names, ("mm",) * len(names), run.inputs[: len(names)], deviation, source=READINGS)
+    source = _stated_source(u, stated, several=several, selection=selection)
+    if alike is None:
+        return inputs, source
+    neighbours = round(alike.correlation.rho * alike.correlation.share, 3)
+    covariance = alike.matrix * np.outer(deviation, deviation)
+    return replace(inputs, covariance=covariance), replace(source, neighbours=neighbours)
 
 
 def _chose_the_run(holds_for: HoldsFor | None, repeated: int) -> bool | None:
