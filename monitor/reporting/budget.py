@@ -126,6 +126,7 @@ _LINES = {
     "lack of fit of the model": "lack_of_fit",
     "between days": "between_days",
     "readings of the other runs": "other_runs",
+    "calibrated quantities of the other runs": "other_known",
     "scatter of the added effects": "effects_scatter",
 }
 

@@ -84,3 +84,13 @@ def interpolated(position: Array, spacing: tuple[float, float]) -> Array:
         weights[rows, lower + 1] += nodes - lower
         parts.append(weights / np.sqrt(_SPACINGS))
     return np.concatenate(parts, axis=1)
+
+
+def node_names(position: Array, spacing: tuple[float, float]) -> tuple[tuple[int, int], ...]:
+    """Number of the spacing and of the node on the axis, of every column of ``interpolated``."""
+    names = []
+    for number, pitch in enumerate(np.linspace(*spacing, _SPACINGS)):
+        lowest = int(np.floor(position.min() / pitch))
+        count = int(np.floor(position / pitch - lowest).max()) + 2
+        names += [(number, lowest + node) for node in range(count)]
+    return tuple(names)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,15 @@ from monitor.exceptions import InputError
 from monitor.machine import LOCATION, MOTION
 from monitor.records import Array, Campaign
 from monitor.sources import Quantity, Source
-from monitor.uncertainty.linear_axes import interpolated
+from monitor.uncertainty.linear_axes import interpolated, node_names
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 
 #: Angles (rad) and parts of a unit vector that differ by less are one pose and one direction: 1 µrad, half a degree.
 _SAME_ANGLE, _SAME_DIRECTION = 1e-6, 1e-2
+
+
+#: What the values of a source are of, by row: rows of one target, pose or angle share them, in every run alike.
+Groups = tuple[tuple[Any, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -52,14 +57,14 @@ class Scene:
         raise InputError(f"the machine has no axis '{name}'; it has {', '.join(j.name for j in joints)}")
 
     @property
-    def one_for_all(self) -> npt.NDArray[np.int64]:
+    def one_for_all(self) -> Groups:
         """All rows share the values of the source."""
-        return np.zeros(self.rows, dtype=np.int64)
+        return ((),) * self.rows
 
-    def alike(self, *columns: Array) -> npt.NDArray[np.int64]:
-        """Rows (n,) with equal entries of ``columns``, (n,) or (n, k) each, share a number."""
-        table = np.column_stack([np.asarray(column) for column in columns])
-        return np.unique(table, axis=0, return_inverse=True)[1].ravel().astype(np.int64)
+    def alike(self, *columns: npt.NDArray[Any]) -> Groups:
+        """Rows with equal entries of ``columns``, (n,) or (n, k) each, share values, which these entries name."""
+        tables = [column.reshape(self.rows, -1).tolist() for column in columns]
+        return tuple(tuple(entry for part in parts for entry in part) for parts in zip(*tables, strict=True))
 
     @property
     def poses(self) -> Array:
@@ -69,13 +74,13 @@ class Scene:
         return np.round(context.positions[:, turning] / _SAME_ANGLE)
 
     @property
-    def targets(self) -> Array:
-        """A number (n,) for every row's target."""
-        return np.unique(self.run.problem.context.target, return_inverse=True)[1].astype(np.float64)
+    def targets(self) -> npt.NDArray[Any]:
+        """The name (n,) of every row's target."""
+        return np.asarray(self.run.problem.context.target).astype(str)
 
 
-#: What a source of size 1 does to the rows, and which rows share its values.
-Shared = tuple[Array, npt.NDArray[np.int64]]
+#: What a source of size 1 does to the rows (n, d, q), and which rows share its values.
+Shared = tuple[Array, Groups]
 
 
 def _needs_touches(scene: Scene, source: Source) -> None:
@@ -237,3 +242,14 @@ _ROWS: Mapping[Quantity, Callable[[Scene, Source], Shared]] = {
 def rows_of(scene: Scene, source: Source) -> Shared:
     """What a source of size 1 does to the rows, and which rows share its values. Raises InputError, EffectError."""
     return _ROWS[source.quantity](scene, source)
+
+
+def names_of_values(scene: Scene, source: Source, count: int) -> tuple[Any, ...]:
+    """What tells the ``count`` values of rows of one group apart, the same in every run: their number, or the node of
+    an error of a linear axis."""
+    if source.quantity not in (Quantity.LINEAR_POSITIONING, Quantity.LINEAR_STRAIGHTNESS):
+        return tuple(range(count))
+    assert source.node_spacing is not None  # the reader asks for it
+    position = scene.run.problem.context.positions[:, scene.joint(source.axis)]
+    nodes = node_names(position, source.node_spacing)
+    return tuple((direction, *node) for direction in range(count // len(nodes)) for node in nodes)

@@ -9,11 +9,11 @@ two sources (of the uncertainties of an expansion coefficient, 1e-6 1/K, and of 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.exceptions import InputError
 from monitor.methods.bar_temperature import bar_temperature
@@ -25,7 +25,7 @@ from monitor.uncertainty.parts import Estimated, OutputContribution
 from monitor.uncertainty.roots import covariance_root
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.touched_run import TouchedRun
-from monitor.uncertainty.source_rows import Scene, rows_of
+from monitor.uncertainty.source_rows import Groups, Scene, names_of_values, rows_of
 
 _STANDARD = (Quantity.STANDARD_TEMPERATURE, Quantity.STANDARD_EXPANSION)
 #: More independent values than this are drawn in the rank of their covariance, which the normal law alone allows.
@@ -34,10 +34,15 @@ _MOST_COLUMNS = 400
 
 @dataclass(frozen=True)
 class SourceColumns:
-    """A source and what one standard deviation of each of its q values does to the inputs (N, q) of a run."""
+    """A source and what one standard deviation of each of its q values does to the inputs (N, q) of a run.
+
+    ``values`` (q) name them by what they are of (target, pose, angle, node), in every run alike; None where they are
+    those of the covariance of this run alone.
+    """
 
     source: Source
     columns: Array
+    values: tuple[Hashable, ...] | None = None
 
     def contribution(self, rows: Array) -> OutputContribution:
         """Its line of the budget; ``rows`` (m, N) is the sensitivity of the outputs."""
@@ -97,11 +102,11 @@ def source_columns(
     pose = run.problem.evaluated(unknowns[None], run.common, jacobian=True)
     assert pose.by_error is not None
     scene = Scene(run, campaign, pose.by_error, pose.by_tip)
-    return tuple(SourceColumns(source, _columns(scene, number, source) * source.u) for source in sources)
+    return tuple(_columns(scene, number, source) for source in sources)
 
 
-def _columns(scene: Scene, number: int, source: Source) -> Array:
-    """What values of size 1 do to the inputs (N, q)."""
+def _columns(scene: Scene, number: int, source: Source) -> SourceColumns:
+    """What its values do to the inputs of run ``number``."""
     run = scene.run
     calibrated = len(run.calibrated[0])
     if source.quantity in _STANDARD:
@@ -111,25 +116,29 @@ def _columns(scene: Scene, number: int, source: Source) -> Array:
                 f"source '{source.name}': no calibrated length gives this campaign its unit of length, so "
                 f"{source.quantity.value} does nothing; leave it out"
             )
-        return np.concatenate([np.zeros(len(run.reading_names)), growth])[:, None]
+        columns = np.concatenate([np.zeros(len(run.reading_names)), growth])[:, None]
+        return SourceColumns(source, columns * source.u, ((),))
     rows, groups = rows_of(scene, source)
     if source.shared_by is Sharing.PROBING:
-        groups = np.arange(scene.rows)
-    spread = _by_group(_as_readings(run, scene.by_error, rows), groups)
-    columns = np.concatenate([spread, np.zeros((calibrated, spread.shape[1]))])
+        groups = scene.alike(np.arange(scene.rows))
+    names = names_of_values(scene, source, rows.shape[2])
+    spread, values = _by_group(_as_readings(run, scene.by_error, rows), groups, names)
+    columns = np.concatenate([spread, np.zeros((calibrated, spread.shape[1]))]) * source.u
     if source.law is Law.NORMAL and columns.shape[1] > _MOST_COLUMNS:
-        return covariance_root(columns @ columns.T).root
-    return columns
+        return SourceColumns(source, covariance_root(columns @ columns.T).root)
+    return SourceColumns(source, columns, values)
 
 
-def _by_group(rows: Array, groups: npt.NDArray[np.int64]) -> Array:
-    """Columns (n d, G q): rows (n, d, q) of a group share its q values."""
+def _by_group(rows: Array, groups: Groups, names: tuple[Hashable, ...]) -> tuple[Array, tuple[Hashable, ...]]:
+    """Columns (n d, G q) and their names: rows (n, d, q) of a group share its q values, which have ``names``."""
     count, width, values = rows.shape
-    _, group = np.unique(groups, return_inverse=True)
-    spread = np.zeros((count, width, int(group.max()) + 1, values))
-    spread[np.arange(count), :, group.ravel()] = rows
+    number = {group: index for index, group in enumerate(sorted(set(groups)))}
+    spread = np.zeros((count, width, len(number), values))
+    spread[np.arange(count), :, [number[group] for group in groups]] = rows
     columns = spread.reshape(count * width, -1)
-    return np.asarray(columns[:, np.any(columns != 0.0, axis=0)])
+    acts = np.any(columns != 0.0, axis=0)
+    all_names = [(*group, name) for group in number for name in names]
+    return np.asarray(columns[:, acts]), tuple(compress(all_names, acts))
 
 
 def _as_readings(run: MeasuredRun, by_error: Array, rows: Array) -> Array:

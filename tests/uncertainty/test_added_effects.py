@@ -6,6 +6,7 @@ References: fits of readings moved by hand on a machine of plain matrices (``own
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,14 +16,19 @@ from by_path import load
 
 from monitor.discovery import fit
 from monitor.methods import campaign_method
+from monitor.readers import read_campaign
+from monitor.sources import Quantity, Sharing, Source
 from monitor.store.models import StoredModel
-from monitor.uncertainty.runs.row_run import measured_run, repeated_readings
+from monitor.uncertainty import measured_run, sensitivity_of
+from monitor.uncertainty.runs.row_run import repeated_readings
+from monitor.uncertainty.type_b import source_columns
 from monitor.workflow.models import as_model
 from monitor.workflow.selections.readings import SelectedReadings
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
 from monitor.workflow.uncertainty.inputs import reading_inputs, readings_of_runs
 from monitor.workflow.uncertainty.request import UncertaintyRequest
-from monitor.workflow.uncertainty.with_effects import _beyond
+from monitor.workflow.uncertainty.with_effects import _beyond, effect_outputs, source_effect
+from tests.simulator import horizontal_centre as centre
 
 own = load("own_machine", Path(__file__).resolve().parents[1] / "benchmarks" / "own_machine.py")
 
@@ -165,3 +171,87 @@ def test_a_run_cut_short_keeps_the_resemblance_of_its_neighbours(touched) -> Non
     assert count == len(first) - 24
     np.testing.assert_allclose(cut, first[:count, :count], rtol=0.05, atol=0.02 * first.max())
     assert abs(cut[0, 3]) > 0.2 * cut[0, 0]
+
+
+def test_values_of_a_source_are_added_over_runs_by_what_they_are_of(touched) -> None:
+    """Run 1 leaves out a ball at some poses, run 2 another at as many: each has a form of its own at each of them."""
+    campaign = campaign_of(touched, np.full(2, 2.0), np.zeros(2))
+    told = campaign.probings
+    third, fourth = (np.flatnonzero((told.run == 1) & (told.target == ball))[-3:] for ball in "34")
+    left_out = np.concatenate([fourth, third + len(PLAN)])
+    campaign = replace(campaign, probings=told.rows(~np.isin(np.arange(2 * len(PLAN)), left_out)))
+    source = Source(name="form", quantity=Quantity.BALL_FORM, size=1e-3, shared_by=Sharing.ALL_RUNS)
+    of_all = fitted(campaign)
+    at = sensitivity_of(measured_run(*_held(of_all, 1)), start=of_all.solution.local[0])
+    names = [name for name in of_all.problem.base_names if at.determined[at.names.index(name)]]
+    effects = effect_outputs(of_all, 0, [of_all.problem.base_names.index(name) for name in names])
+    parts = [
+        source_columns(run, local, campaign, number, (source,))[0]
+        for run, local, number in zip(effects.runs, effects.unknowns, (1, 2), strict=True)
+    ]
+    of_run = at.rows(tuple(names))
+    moved: dict[tuple, np.ndarray] = {}
+    for run, part in enumerate(parts):
+        rows = effects.by_run[run] + (effects.padded(of_run) if run == 0 else 0.0)
+        context, times = effects.runs[run].problem.context, Counter()
+        for column in part.columns.T:
+            touch = int(np.flatnonzero(column)[0]) // 3
+            turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+            pose = (str(context.target[touch]), *np.round(context.positions[touch, turning], 6).tolist())
+            name = (*pose, times[pose])
+            times[pose] += 1
+            moved[name] = moved.get(name, 0.0) + rows @ column
+    expected = sum(np.outer(each, each) for each in moved.values())
+    assert parts[0].columns.shape == parts[1].columns.shape
+    assert len(moved) == parts[0].columns.shape[1] + 9
+    line = source_effect(effects, of_run, parts, [0, 0]).line.covariance
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(line / np.outer(size, size), expected / np.outer(size, size), atol=1e-9)
+
+
+def _held(of_all, number):
+    fixed, coefficients = of_all.problem.resolved(of_all.solution.common)
+    return fixed, number, coefficients
+
+
+def test_a_tool_point_of_every_run_is_no_quantity_of_all_runs(tmp_path) -> None:
+    """All unknowns of both runs side by side, solved at once with numpy: what is stated of either run's tool point."""
+    rng = np.random.default_rng(9003)
+    folder = centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng), only="r-test")
+    file, point = folder / "campaign.toml", f"tool_point_mm = {centre.TOOL.tolist()}\n"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(
+        text.replace(point, f"{point}tool_point_standard_uncertainty_mm = 0.01\n"), encoding="utf-8"
+    )
+    header, *rows = (folder / "probings.csv").read_text(encoding="utf-8").splitlines()
+    again = ["2" + row[1:] for row in rows]
+    (folder / "probings.csv").write_text("\n".join([header, *rows, *again, ""]), encoding="utf-8")
+    header, first, *_ = (folder / "runs.csv").read_text(encoding="utf-8").splitlines()
+    second = first.replace("1,2026-03-02T20", "2,2026-03-02T22", 1)
+    (folder / "runs.csv").write_text("\n".join([header, first, second, ""]), encoding="utf-8")
+    campaign = read_campaign(folder)
+    text = "EAA:harmonic1"
+    base = as_model(StoredModel("own", 1, None, (text,), (text,), (), "", None))
+    of_all = fit(campaign_method(campaign).problem_of(campaign, base))
+    solution, unknowns = of_all.solution, len(of_all.problem.local_names)
+    extras = len(of_all.problem.extra_names)
+    assert extras > 0
+    at = of_all.problem.linearise(solution.local, solution.common)
+    numbers, common = at.local.shape[1], at.common.shape[2]
+    dense = np.zeros((2, numbers, 2 * unknowns + common))
+    for run in range(2):
+        dense[run, :, run * unknowns : (run + 1) * unknowns] = at.local[run]
+    dense[..., 2 * unknowns :] = at.common[..., :common]
+    dense = dense.reshape(2 * numbers, -1)
+    scale = np.linalg.norm(dense, axis=0)
+    scale[scale == 0.0] = 1.0
+    answer = (np.linalg.pinv(dense / scale, rcond=1e-9) / scale[:, None]).reshape(-1, 2, numbers)
+    of_stated = answer[2 * unknowns :, :, numbers - extras :].reshape(common, -1)
+    effects = effect_outputs(of_all, 0, [])
+    assert effects.names
+    own_run = effects.linear[:, len(effects.runs[0].reading_names) :]
+    together = own_run @ own_run.T + effects.known_in_other_runs.covariance
+    expected = (of_stated @ of_stated.T)[np.ix_(effects.columns, effects.columns)]
+    # The cosine is a shift of the tool point across the head's axis, the sine hardly any.
+    assert math.sqrt(expected[0, 0]) > 0.01 * math.sqrt(solution.common_covariance[0, 0])
+    np.testing.assert_allclose(together, expected, rtol=1e-3, atol=1e-6 * expected[0, 0])

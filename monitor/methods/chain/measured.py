@@ -122,6 +122,11 @@ class MeasuredChain(ABC):
         """Names of the e calibrated quantities that every run has besides its rows."""
         return ()
 
+    @property
+    def extras_in_common(self) -> npt.NDArray[np.bool_]:
+        """Which (e,) of the calibrated quantities have one value in all runs; the others have another in each."""
+        return np.ones(len(self.extra_names), dtype=bool)
+
     def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """Whitened residuals (R, e) of the calibrated quantities and derivatives (R, e, q) by the own unknowns."""
         return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, nuisance.shape[1]))

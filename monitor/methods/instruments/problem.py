@@ -373,15 +373,20 @@ class InstrumentProblem(ChainProblem):
         """The lengths of bars that are known beforehand: one bar has one length in all runs."""
         if not self.shares_bars or len(self.runs) < 2:
             return None
+        rows = np.flatnonzero(self.extras_in_common)
+        columns = np.array([self._priors[row][0] for row in rows], dtype=np.int64) + len(self.base_names)
+        return Stays(columns, rows) if len(rows) else None
+
+    @property
+    def extras_in_common(self) -> npt.NDArray[np.bool_]:
+        """The lengths of bars; how an instrument is set up and drifts is another in each run."""
         staying = {
             int(columns[index])
             for part, columns in zip(self.parts, self.own_columns, strict=True)
             for index, name in enumerate(part.unknowns)
             if name in part.reading.staying
         }
-        rows = [number for number, (index, _) in enumerate(self._priors) if index in staying]
-        columns = np.array([self._priors[row][0] for row in rows], dtype=np.int64) + len(self.base_names)
-        return Stays(columns, np.array(rows)) if rows else None
+        return np.array([index in staying for index, _ in self._priors], dtype=bool)
 
     def beside_others(self, solution: Solution, run: int) -> Self:
         """The problem for ``run`` by itself, which knows of its bars what the other runs say."""

@@ -45,8 +45,9 @@ def normal_tails(outputs: int) -> Callable[[float], float]:
 def tails_of(parts: Sequence[PartTails], p: float, shift: float = 0.5) -> tuple[Tails, Tails]:
     """Return the sum of tails beyond k where the ``parts`` are true, and where an estimate of them is taken for true.
 
-    Fastest for k between that of one output and that at which the sum is 1 - ``p``. Both are of the same points, so that what
-    they have in common falls out of a quotient of their factors; another ``shift`` of the points says how well they do.
+    Fastest for k between that of one output and that at which the sum is 1 - ``p``. Both are of the same points, so
+    that what they have in common falls out of a quotient of their factors; another ``shift`` of the points says how
+    well they do.
     """
     estimated = [part for part in parts if math.isfinite(part.dof)]
     points = spread_points(_POINTS, 2 * len(estimated), shift)

@@ -51,9 +51,7 @@ def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
     return {**names, **{text: (text,) for text in problem.left_out if text not in names}}
 
 
-def _from_history(
-    db: Database, evaluated: StatedUncertainty, names: Sequence[str]
-) -> dict[str, ModelEffect]:
+def _from_history(db: Database, evaluated: StatedUncertainty, names: Sequence[str]) -> dict[str, ModelEffect]:
     """Coefficients as the runs of the campaign have them stored; without those of which none has a value."""
     if not names:
         return {}

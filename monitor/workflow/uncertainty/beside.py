@@ -112,11 +112,11 @@ def beside_readings(
                 run.effects.runs, run.effects.unknowns, fit.problem.runs, strict=True
             )
         )
-        covariances = readings_of_runs(
-            fit, campaign, run.effects.runs, run.index, readings, source.selection
-        )
+        covariances = readings_of_runs(fit, campaign, run.effects.runs, run.index, readings, source.selection)
         of_others = run.effects.of_other_runs(readings, covariances)
-        lines, sampled, moves = _with_effects(campaign, fit, run, readings, of_others, counted, others, of_days)
+        lines, sampled, moves = _with_effects(
+            campaign, fit, run, readings, of_others, counted, others, of_days
+        )
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
         lines,
@@ -170,10 +170,10 @@ def _with_effects(
     rows = run.rows[:, :count]
     of_readings = rows @ readings.covariance[:count, :count] @ rows.T + of_others.covariance
     scatter = scatter_of_effects(effects, fit, day, of_readings, of_others.dof)
+    of_model = (of_others if effects.others else None, effects.known_in_other_runs, scatter)
     on_outputs = (
         *(effects.contribution(part) for part in of_days),
-        *((of_others,) if effects.others else ()),
-        *(() if scatter is None else (scatter,)),
+        *(part for part in of_model if part is not None),
     )
     rest = tuple(each.rest for each in moved)
     none = np.zeros((len(rows), 0))

@@ -112,7 +112,12 @@ def _stated_inputs(
 
 
 def readings_of_runs(
-    fit: Fit, campaign: Campaign, runs: Sequence[MeasuredRun], index: int, inputs: Inputs, selection: str | None
+    fit: Fit,
+    campaign: Campaign,
+    runs: Sequence[MeasuredRun],
+    index: int,
+    inputs: Inputs,
+    selection: str | None,
 ) -> tuple[Array, ...]:
     """The covariance of the readings of every run of a fit, of which that of the one at ``index`` is in ``inputs``.
 

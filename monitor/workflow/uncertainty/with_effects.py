@@ -7,7 +7,7 @@ of them moves the run's own parameters, too. ``monitor.uncertainty.runs.shared_e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -23,7 +23,7 @@ from monitor.sources import Sharing
 from monitor.statistics.tails import chi_square_quantile, f_quantile
 from monitor.uncertainty import Inputs, OutputContribution
 from monitor.uncertainty.parts import Estimated
-from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun, same_plan
 from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.runs.shared_effects import shared_answer
 from monitor.uncertainty.type_b import SourceColumns
@@ -34,6 +34,7 @@ class EffectLine(StrEnum):
     """Lines of the budget: readings of the other runs, and effects that scatter more than readings do."""
 
     OTHER_RUNS = "readings of the other runs"
+    OTHER_KNOWN = "calibrated quantities of the other runs"
     SCATTER = "scatter of the added effects"
 
 
@@ -81,13 +82,29 @@ class EffectOutputs:
     def linear(self) -> Array:
         """What the inputs (N,) of the evaluated run do to all outputs through the common unknowns (m + a, N).
 
-        A calibrated quantity is the same in every run, so its columns are those of all runs.
+        A calibrated quantity that is the same in every run has the columns of all runs.
         """
         readings = len(self.runs[self.index].reading_names)
         linear = self.by_run[self.index].copy()
         for run in self.others:
-            linear[:, readings:] += self.by_run[run][:, len(self.runs[run].reading_names) :]
+            of_run = self.by_run[run][:, len(self.runs[run].reading_names) :]
+            linear[:, readings:] += np.where(self.runs[run].problem.extras_in_common, of_run, 0.0)
         return linear
+
+    @property
+    def known_in_other_runs(self) -> OutputContribution | None:
+        """What is stated of quantities that every other run has by itself (a tool point, a drift); None where nothing
+        is."""
+        columns = []
+        for run in self.others:
+            measured = self.runs[run]
+            by_itself = ~measured.problem.extras_in_common
+            of_run = self.by_run[run][:, len(measured.reading_names) :] * measured.calibrated[2]
+            columns.append(of_run[:, by_itself])
+        moved = np.concatenate([np.zeros((len(self.by_run[0]), 0)), *columns], axis=1)
+        if not moved.size:
+            return None
+        return OutputContribution(EffectLine.OTHER_KNOWN.value, moved @ moved.T)
 
     def of_other_runs(self, inputs: Inputs, covariances: Sequence[Array]) -> OutputContribution:
         """What the readings of the other runs add, of which each has one of the ``covariances`` (R).
@@ -171,26 +188,27 @@ def source_effect(
     """What a source adds, of which every run has one of the ``parts``; ``of_run`` (m, N) are the rows of the run at
     held effects, ``days`` (R,) those of the runs.
 
-    Runs that share its values are moved together. Where their plans differ, so that its values are not the same ones,
-    they count as others.
+    Runs that share its values are moved together by those that are the same: of one target, pose or angle.
     """
     part = parts[effects.index]
     through = effects.padded(of_run @ part.columns)
     sharing = part.source.shared_by
     beside = effects.by_run[effects.index] @ part.columns
-    groups: dict[object, Array] = {}
+    column_of = {name: column for column, name in enumerate(_value_names(effects, parts, effects.index))}
+    others: dict[Hashable, Array] = {}
     for run in effects.others:
         moved = effects.by_run[run] @ parts[run].columns
-        together = sharing is Sharing.ALL_RUNS or (
-            sharing is Sharing.DAY and days[run] == days[effects.index]
-        )
-        if together and moved.shape == beside.shape:
-            beside = beside + moved
-            continue
-        group = ("day", days[run], moved.shape) if sharing is Sharing.DAY else ("run", run)
-        groups[group] = groups[group] + moved if group in groups else moved
+        of_day = sharing is Sharing.DAY
+        together = sharing is Sharing.ALL_RUNS or (of_day and days[run] == days[effects.index])
+        group: Hashable = "together" if together else ("day", days[run]) if of_day else ("run", run)
+        for name, column in zip(_value_names(effects, parts, run), moved.T, strict=True):
+            if together and name in column_of:
+                beside[:, column_of[name]] += column
+            else:
+                others[group, name] = others.get((group, name), 0.0) + column
     both = through + beside
-    rest = sum((moved @ moved.T for moved in groups.values()), np.zeros((len(both), len(both))))
+    elsewhere = np.array(list(others.values())).reshape(-1, len(both))
+    rest = elsewhere.T @ elsewhere
     plain = part.contribution(of_run)
     return SourceEffect(
         replace(plain, covariance=both @ both.T + rest),
@@ -198,6 +216,19 @@ def source_effect(
         beside,
         replace(plain, source=f"{plain.source} in other runs", covariance=rest),
     )
+
+
+def _value_names(effects: EffectOutputs, parts: Sequence[SourceColumns], run: int) -> tuple[Hashable, ...]:
+    """The names of the values of a source in a run: those of the evaluated run where it follows the same plan (angles
+    as read differ in their last digits), else its own."""
+    of_run, evaluated = parts[run], parts[effects.index]
+    count = of_run.columns.shape[1]
+    problems = effects.runs[run].problem, effects.runs[effects.index].problem
+    if count == evaluated.columns.shape[1] and same_plan(*problems):
+        return tuple(range(count)) if evaluated.values is None else evaluated.values
+    if of_run.values is None:
+        return tuple((run, number) for number in range(count))
+    return of_run.values
 
 
 @dataclass(frozen=True)
@@ -212,8 +243,8 @@ class _Beyond:
     has_run: bool
 
     def added(self, of_run: Array, of_effect: Array) -> Array:
-        """What it adds to all outputs (m + a, m + a), of which the parameters of the run answer the effect by ``of_run``
-        and the effects by ``of_effect`` (m + a,).
+        """What it adds to all outputs (m + a, m + a), of which the parameters of the run answer the effect by
+        ``of_run`` and the effects by ``of_effect`` (m + a,).
 
         The fit gives the run the mean of all, so that its own parameters take up what its own value is off that mean:
         nearly all of what one scatters. The mean itself has the part of the number of them.
@@ -235,8 +266,8 @@ def scatter_of_effects(
 ) -> OutputContribution | None:
     """What runs and days scatter in the effects beyond their readings, or poses that share what no model has.
 
-    ``of_readings`` (m + a, m + a) is what the readings of all runs give, estimated with ``dof`` degrees of freedom. None
-    where they scatter no more than chance makes of readings in ``_BY_CHANCE`` of campaigns.
+    ``of_readings`` (m + a, m + a) is what the readings of all runs give, estimated with ``dof`` degrees of freedom.
+    None where they scatter no more than chance makes of readings in ``_BY_CHANCE`` of campaigns.
     """
     problem, solution = fit.problem, fit.solution
     followed = followed_effects(problem, solution)
