@@ -69,13 +69,14 @@ class Database:
         Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
         others are imported.
         """
-        if len(folders) == 1 and isinstance(folders[0], (list, tuple)):
-            (folders,) = folders
-        if not folders:
+        named: tuple[Any, ...] = folders
+        if len(named) == 1 and isinstance(named[0], (list, tuple)):
+            named = tuple(named[0])
+        if not named:
             raise InputError("name a campaign folder or more")
         answer = self._ask(
             "import",
-            folders=folders,
+            folders=named,
             mapping=mapping,
             **options,
         )
