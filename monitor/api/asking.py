@@ -35,7 +35,7 @@ class Ask:
                     f"'{question}' has no options; there is none to give as '{next(iter(values))}'"
                 )
             arguments = [] if asked.request is None else [request_of(asked.request, values)]
-            self.db.forget_campaigns()
+            self.db.begin_question()
             return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
 
 

@@ -145,6 +145,7 @@ if TYPE_CHECKING:
     from monitor.store.past.fleet import (
         BlockCut as BlockCut,
         FleetSums as FleetSums,
+        GroupHours as GroupHours,
         fleet_sums as fleet_sums,
     )
     from monitor.store.past.history import (
@@ -242,7 +243,7 @@ else:
             "import_notes": "campaign_notes run_fingerprints",
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
             "save_model",
-            "past.fleet": "BlockCut FleetSums fleet_sums",
+            "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
