@@ -159,8 +159,8 @@ def not_identified(db: Database, machine: str | None = None) -> tuple[str, ...]:
     beside = _campaigns_beside(db, _CHOSEN)
     if machine is None:
         return beside
-    own = {name for (name,) in db.rows("SELECT campaign FROM campaign WHERE machine = ?", [machine])}
-    return tuple(name for name in beside if name in own)
+    of_machine = {name for (name,) in db.rows("SELECT campaign FROM campaign WHERE machine = ?", [machine])}
+    return tuple(name for name in beside if name in of_machine)
 
 
 def without_part(db: Database) -> tuple[str, ...]:
