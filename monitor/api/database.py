@@ -69,6 +69,7 @@ class Database:
         Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
         others are imported.
         """
+        # A list of folders in place of several arguments means the same.
         named: tuple[Any, ...] = folders
         if len(named) == 1 and isinstance(named[0], (list, tuple)):
             named = tuple(named[0])
