@@ -35,7 +35,7 @@ def why_not_written(path: str) -> str | None:
 def state_of_file(path: str) -> tuple[tuple[int, ...], ...]:
     """Return what differs once somebody wrote a file or its log, or put another in its place; empty of what is not
     there."""
-    states = []
+    states: list[tuple[int, ...]] = []
     for name in (path, path + ".wal"):
         try:
             status = os.stat(name)
