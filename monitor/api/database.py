@@ -55,7 +55,8 @@ class Database:
         self.close()
 
     def close(self) -> None:
-        """Close the file; other processes can open it then."""
+        """Close the file; other processes can open it then. Nothing more is answered."""
+        self._ask.is_closed = True
         self._store.close()
 
     @checked

@@ -298,6 +298,19 @@ def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
     )
 
 
+def before_all_runs(machine: str, first: datetime) -> str:
+    """Return that an event lies before the first run of its machine, in UTC."""
+    return (
+        f"recorded, and it lies before the first run of {machine} ({first:%Y-%m-%d %H:%M} UTC): it splits nothing "
+        "until earlier runs are imported; an event cannot be undone"
+    )
+
+
+def without_rows(tables: Sequence[str], machine: str | None) -> str:
+    """Return which tables of an export have their head alone."""
+    return f"{', '.join(tables)}: no row" + ("" if machine is None else f" of {machine}")
+
+
 def lacks_campaigns(sheets: Sequence[str], campaigns: Sequence[str]) -> str:
     """Return which campaigns the sheets of a workbook do not hold, because they are not identified yet."""
     named = ", ".join(campaigns[:8]) + (f" and {len(campaigns) - 8} more" if len(campaigns) > 8 else "")

@@ -89,7 +89,10 @@ if TYPE_CHECKING:
         Compaction as Compaction,
         compact as compact,
     )
-    from monitor.store.copies.export import export_tables as export_tables
+    from monitor.store.copies.export import (
+        export_tables as export_tables,
+        tables_without_rows as tables_without_rows,
+    )
     from monitor.store.copies.increment import take_increment as take_increment
     from monitor.store.copies.manifest import (
         Backup as Backup,
@@ -229,7 +232,7 @@ else:
             "connection": "Database",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
-            "copies.export": "export_tables",
+            "copies.export": "export_tables tables_without_rows",
             "copies.increment": "take_increment",
             "copies.manifest": "Backup list_backups",
             "copies.restoring": "Restored restore",

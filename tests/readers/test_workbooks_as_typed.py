@@ -205,3 +205,12 @@ def test_blanks_around_a_label_are_refused(tmp_path: Path) -> None:
         "data.xlsx, line 4, column operator: the label ' anna' has blanks around it, and would be another than 'anna'; "
         "remove them"
     ]
+
+
+def test_a_missing_column_is_answered_in_the_order_of_the_manual(tmp_path: Path) -> None:
+    def change(book: openpyxl.Workbook) -> None:
+        for cell in book["probings"][1]:
+            cell.value = {"x_mm": "x_um"}.get(cell.value, cell.value)
+
+    (fault,) = refusal_of(as_campaign(tmp_path / "folder", change))
+    assert fault.endswith("the header needs run, sequence, time_s, target, x_mm, y_mm, z_mm, c_deg, a_deg")
