@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
 from monitor.exceptions import DataError
@@ -180,23 +181,36 @@ class SharesOf(Protocol):
     ) -> tuple[tuple[InstrumentShare, ...], Array]: ...
 
 
+class ContrastKind(StrEnum):
+    """What is held against all others: a setup, an instrument of several, or a number that several setups share and
+    that is stated beforehand (the length of a bar)."""
+
+    SETUP = "setup"
+    INSTRUMENT = "instrument"
+    STATED = "stated"
+
+
 @dataclass(frozen=True)
 class Contrast:
-    """What the ``setups`` of one instrument, one of them, or what several have in common that is known beforehand, say
-    against all others of a run, by ``name``.
+    """What one of a ``kind`` says against all others of a run, by ``name``: it goes with ``setups``, and consists of
+    ``members``, which are setups and stated numbers.
 
     They can differ in so many ``directions``, do by ``size`` (root of the mean square in standard uncertainties), and
     chance alone makes ``p`` as much; ``freedom`` are the degrees of freedom of the scatter, infinite where it is as
-    stated. ``others_p`` is how often at most chance makes the others contradict each other as they do without it.
+    stated. Without it the others have so many comparisons left, ``others_left``, and contradict each other as chance
+    makes them in at most ``others_p``; both are None where ``p`` is too large to ask.
     """
 
     name: str
+    kind: ContrastKind
     setups: tuple[str, ...]
+    members: frozenset[str]
     directions: int
     size: float
     freedom: float
     p: float
-    others_p: float
+    others_left: int | None = None
+    others_p: float | None = None
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,9 @@ def suspects_of(
         campaign = read_campaign(path)
     problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
     beside = against_others(problem, solve_problem(problem), ability, 1)
-    return () if beside is None else (beside.suspects or ("no single one",))
+    if beside is None:
+        return ()
+    return tuple(suspect.name for suspect in beside.suspects) or ("no single one",)
 
 
 def who(first: int, seeds: int) -> None:

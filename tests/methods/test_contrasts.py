@@ -13,8 +13,10 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.instruments.contrasts import contrasts, contrasts_of, scatters
 from monitor.methods.instruments.run_rows import RunRows, run_rows
+from monitor.methods.method import Contrast, ContrastKind
 from monitor.readers import read_campaign
 from monitor.workflow.instruments.against_others import against_others
+from monitor.workflow.instruments.answer import AgainstOthers
 from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 #: Levels of the rates: that of `compare`, and one at which a few hundred draws say something.
@@ -110,10 +112,10 @@ def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
         )
         beside = against_others(problem, solve_problem(problem), ability, 1)
         assert beside is not None
-        assert "r-test-B" in beside.suspects
+        assert "r-test-B" in _names(beside)
         assert beside.by_chance < 1e-3
         assert beside.size > beside.limit
-        suspects.append(beside.suspects)
+        suspects.append(_names(beside))
     assert set(suspects) == {("r-test-B",), ("bar-zx", "r-test-B")}
 
 
@@ -128,7 +130,14 @@ def test_a_wrong_length_of_a_bar_is_named_and_no_plane_of_it(tmp_path: Path) -> 
     problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
     beside = against_others(problem, solve_problem(problem), ability, 1)
     assert beside is not None
-    assert beside.suspects == ("the stated length of ball bar",)
+    (suspect,) = beside.suspects
+    assert suspect.name == beside.name == "the stated length of ball bar"
+    assert suspect.kind is beside.kind is ContrastKind.STATED
+    assert suspect.setups == beside.setups == ("bar-xy", "bar-yz", "bar-zx")
+
+
+def _names(beside: AgainstOthers) -> tuple[str, ...]:
+    return tuple(suspect.name for suspect in beside.suspects)
 
 
 def test_of_two_that_share_something_either_may_be_wrong(tmp_path: Path) -> None:
@@ -142,8 +151,49 @@ def test_of_two_that_share_something_either_may_be_wrong(tmp_path: Path) -> None
     problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
     beside = against_others(problem, solve_problem(problem), ability, 1)
     assert beside is not None
-    assert "ball bar" in beside.suspects
+    assert "ball bar" in _names(beside)
     assert len(beside.suspects) > 1
+
+
+def _of_setups(
+    folder: Path, seed: int, setups: tuple[str, ...], grown: float
+) -> tuple[tuple[Contrast, ...], AgainstOthers | None]:
+    """What is said of the run of some setups; the bar meets a machine whose X has ``grown`` by so much of it."""
+    rng = np.random.default_rng(seed)
+    truth = centre.truth_of(rng)
+    text, rows = "", []
+    for measure, of in ((centre.laser, truth), (centre.ball_bar, {**truth, "EXX": truth["EXX"] + grown})):
+        part, read = measure(centre.machine(of), rng, rng)
+        text, rows = text + part, rows + read
+    campaign = read_campaign(
+        centre.machine(truth).write(folder / "shop", *centre.only_of(setups, text, rows))
+    )
+    problem, ability = campaign_method(campaign).problem_of(campaign), campaign_method(campaign).instruments
+    solution = solve_problem(problem)
+    return contrasts(problem, solution, 1), against_others(problem, solution, ability, 1)
+
+
+def test_of_two_setups_that_contradict_each_other_either_may_be_wrong(tmp_path: Path) -> None:
+    """Without one of them nothing is compared, which is no contradiction."""
+    _, beside = _of_setups(tmp_path, 3, ("laser-X", "bar-xy"), 30e-6)
+    assert beside is not None
+    assert beside.is_of_two
+    assert _names(beside) == ("laser-X", "bar-xy")
+    assert not any(suspect.others_agree for suspect in beside.suspects)
+
+
+def test_the_others_are_compared_as_if_they_were_measured_alone(tmp_path: Path) -> None:
+    """Laser Y and bar share one direction, hidden before by what only laser X separates: they agree without it."""
+    three, beside = _of_setups(tmp_path / "three", 4, ("laser-X", "laser-Y", "bar-xy"), 15e-6)
+    alone, nobody = _of_setups(tmp_path / "alone", 4, ("laser-Y", "bar-xy"), 15e-6)
+    assert nobody is None
+    by_name = {each.name: each for each in three}
+    (without,) = {(each.directions, each.p) for each in alone if each.name == "laser-Y"}
+    assert without[0] == 1
+    assert by_name["laser-X"].others_left == 1
+    assert by_name["laser-X"].others_p == pytest.approx(without[1], rel=0.01)
+    assert beside is not None
+    assert _names(beside) == ("laser-X", "bar-xy")
 
 
 def _campaign(folder: Path, seed: int, otherwise: tuple[str, float] | None) -> Path:

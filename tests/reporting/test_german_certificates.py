@@ -21,7 +21,7 @@ from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind, Reason, ReasonKind, Refusal
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.dcc import dcc_xml
-from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind
+from monitor.reporting.certificate.grounds import IN_U, AcceptedGround, Ground, GroundKind
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord
@@ -159,6 +159,10 @@ def german_record(make_record: Callable[..., CertificateRecord], campaign: Campa
     (result,) = map(german_result, made.results)
     grounds = [
         Ground(kind, 3, subject, 7.0, 5.0, "µm") for kind in GroundKind for subject in ("", "EXX", "EXX, EYY")
+    ]
+    grounds += [
+        Ground(GroundKind.INSTRUMENTS, 3, subject, 7.0, 5.0, IN_U, several)
+        for subject, several in (("EXX", None), ("", ("EXX", "EYY")), ("", None))
     ]
     identity = CertificateIdentity("K-1", date(2026, 3, 3), "samba", "Maßstab")
     record = certificate_record(laboratory, own, 1, [result], identity, made.volumetric)

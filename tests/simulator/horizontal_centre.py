@@ -182,6 +182,15 @@ def read_otherwise(rows: list[Row], setups: str, factor: float) -> None:
                     row[column] = factor * float(row[column])  # type: ignore[arg-type]
 
 
+def only_of(setups: tuple[str, ...], text: str, rows: list[Row]) -> tuple[str, list[Row]]:
+    """Some setups of a campaign with their rows."""
+    blocks = text.split("\n[[setups]]\n")[1:]
+    kept = [block for block in blocks if any(f'id = "{setup}"' in block for setup in setups)]
+    return "".join(f"\n[[setups]]\n{block}" for block in kept), [
+        row for row in rows if row["setup"] in setups
+    ]
+
+
 def campaign(
     folder: Path,
     rng: np.random.Generator,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from monitor.cli import output, residual_output
@@ -17,7 +17,7 @@ from monitor.workflow.explain.compare_answer import (
     MachinePart,
 )
 from monitor.workflow.explain.request import CompareRequest
-from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
+from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime, Suspect
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
@@ -87,23 +87,43 @@ def _disagreement(campaign: str, apart: Disagreement) -> None:
 
 
 def _against_others(beside: AgainstOthers) -> None:
-    suspects = " or ".join(beside.suspects)
+    names, suspects = " or ".join(suspect.name for suspect in beside.suspects), beside.suspects
+    agree = all(suspect.others_agree for suspect in suspects)
+    said = f"setups in run {beside.run} contradict each other"
     if not suspects:
         who = (
             "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
         )
-    elif len(beside.suspects) == 1:
+    elif len(suspects) == 1:
+        said = f"{names} in run {beside.run} contradicts all others together"
+        rest = "the others agree" if agree else "nothing is left that could contradict"
         who = (
-            f"Without {suspects} the others agree: look first at signs, unit, points and rows of {suspects}; where "
-            "they are right, the model lacks what the others do not meet"
+            f"Without {names} {rest}: look first at {_where(suspects)}; where they are right, the model lacks what the "
+            "others do not meet"
         )
     else:
-        who = f"Without {suspects} the others agree, which cannot tell them apart: look at each of them"
+        if beside.is_of_two:
+            said = f"{suspects[0].name} and {suspects[1].name} in run {beside.run} contradict each other"
+        rest = "the others agree" if agree else "nothing contradicts"
+        who = f"Without {names} {rest}, so that any of these may be the wrong one: look at {_where(suspects)}"
     output.say(
-        f"{beside.name} in run {beside.run} contradicts all other setups together by {beside.size:.1f} u in "
+        f"{said} by {beside.size:.1f} u in "
         f"{beside.directions} {'direction' if beside.directions == 1 else 'directions'}; chance alone makes as much in "
         f"{_chance(beside.by_chance)} of campaigns. {who}"
     )
+
+
+def _where(suspects: Sequence[Suspect]) -> str:
+    """What to look at: of a number that is stated nothing was read."""
+    read = [suspect.name for suspect in suspects if not suspect.is_stated]
+    parts = [f"signs, unit, points and rows of {' and '.join(read)}"] if read else []
+    parts += [
+        f"{suspect.name}, one number for {', '.join(suspect.setups)} (its certificate, the digits and the unit in the "
+        "file, the temperature)"
+        for suspect in suspects
+        if suspect.is_stated
+    ]
+    return " and at ".join(parts)
 
 
 def _breakdown(answer: CompareAnswer) -> None:

@@ -14,7 +14,7 @@ and is known beforehand (the length of a bar) may be the wrong one as well: with
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.run_rows import RunRows, instruments_of, run_rows
 from monitor.methods.instruments.shares import scatter_of
-from monitor.methods.method import Contrast, SetupScatter
+from monitor.methods.method import Contrast, ContrastKind, SetupScatter
 from monitor.records import Array
 
 #: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
@@ -108,7 +108,7 @@ def _units(at: RunRows, blocks: dict[str, _Block]) -> dict[str, frozenset[str]]:
     shared = at.shared_beforehand()
     for name, setups in instruments_of(at.problem).items():
         of_it = {what for what, (_, of) in shared.items() if of <= set(setups)}
-        mine = frozenset({*setups, *of_it}) & blocks.keys()
+        mine = frozenset({*setups, *of_it} & blocks.keys())
         if len(mine) > 1:
             units.setdefault(name, mine)
     return units
@@ -125,10 +125,18 @@ def _judged(
         if contrast is None:
             continue
         if contrast.p < ASKED and among == frozenset(blocks):
-            within = [other.p for other in _judged(at, blocks, units, among - mine)]
+            within = tuple(_judged(at, blocks, units, among - mine))
+            count = comparisons_of(within)
             # Others that share nothing cannot contradict each other.
-            contrast = replace(contrast, others_p=min(1.0, len(within) * min(within)) if within else 1.0)
+            least = min((count * other.p for other in within), default=1.0)
+            contrast = replace(contrast, others_left=count, others_p=min(1.0, least))
         yield contrast
+
+
+def comparisons_of(every: Sequence[Contrast]) -> int:
+    """How many comparisons so many contrasts of the same setups are: one side against the other is one."""
+    whole = frozenset(member for each in every for member in each.members)
+    return len({frozenset({each.members, whole - each.members}) for each in every})
 
 
 def _apart(
@@ -139,7 +147,10 @@ def _apart(
     ordered = [blocks[setup] for side in sides for setup in side]
     rows = np.concatenate([block.rows for block in ordered])
     deviation = np.concatenate([np.full(len(block.rows), block.deviation) for block in ordered])
-    residual, jacobian = at.residual[rows] / deviation, at.jacobian[rows] / deviation[:, None]
+    residual = at.residual[rows] / deviation
+    # What the whole run separates these rows may show by products of errors alone: no direction of a common fit.
+    projector, _, _ = at.separated(rows)
+    jacobian = at.jacobian[rows] @ projector / deviation[:, None]
     split = sum(len(blocks[setup].rows) for setup in sides[0])
     first = _basis(at, rows[:split], deviation[:split])
     second = _basis(at, rows[split:], deviation[split:])
@@ -154,7 +165,14 @@ def _apart(
     moved = np.vstack([first @ differ[: first.shape[1]], second @ differ[first.shape[1] :]])
     square, freedom = float(np.sum((moved.T @ residual) ** 2)), _freedom(ordered, moved)
     size, p = float(np.sqrt(square / directions)), _p(square, directions, freedom)
-    return Contrast(name, tuple(sorted(mine)), directions, size, freedom, p, others_p=1.0)
+    stated = at.shared_beforehand()
+    setups = sorted(
+        setup for member in mine for setup in (stated[member][1] if member in stated else {member})
+    )
+    kind = ContrastKind.STATED if name in stated else ContrastKind.SETUP
+    if len(mine) > 1:
+        kind = ContrastKind.INSTRUMENT
+    return Contrast(name, kind, tuple(dict.fromkeys(setups)), mine, directions, size, freedom, p)
 
 
 def _freedom(ordered: list[_Block], moved: Array) -> float:

@@ -7,10 +7,11 @@ for who issues it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
 
+from monitor.documents import OMITTED
 from monitor.reporting.texts import Texts
 
 #: Between the names of a ground that is of several parameters together.
@@ -42,7 +43,8 @@ class Ground:
     none where the residuals are a ``size`` of what the statements leave, or the setup of which they are. Of what was
     simulated the subject is the machine. Of instruments
     the subject is a parameter with the two that disagree, and ``size`` is their E_n; or it is who contradicts all
-    others, by ``size`` in standard uncertainties.
+    others, by ``size`` in standard uncertainties. Where it may be any of several they are ``several``, each by its
+    name; where nobody alone explains it there is no subject.
     """
 
     kind: GroundKind
@@ -51,6 +53,7 @@ class Ground:
     size: float | None = None
     limit: float | None = None
     unit: str = ""
+    several: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -74,17 +77,24 @@ def ground_sentence(ground: Ground, texts: Texts) -> str:
     if ground.kind is GroundKind.UNITS and ground.subject and not ground.unit:
         key = "setup_fits_too_well"
     if ground.kind is GroundKind.INSTRUMENTS and ground.unit == IN_U:
-        key = "one_of_several" if SEVERAL in ground.subject else "against_others"
+        key = _who(ground)
     if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:
         key = "lack_in_budget"
     return texts(
         f"grounds.{key}",
         run=ground.run,
-        subject=ground.subject,
+        subject=texts("grounds.or").join(ground.several or (ground.subject,)),
         size=_written(ground.size, texts),
         limit=_written(ground.limit, texts),
         unit=ground.unit,
     )
+
+
+def _who(ground: Ground) -> str:
+    """The sentence for setups that contradict each other: of one, of any of several, of nobody alone."""
+    if ground.several:
+        return "one_of_several"
+    return "against_others" if ground.subject else "nobody_alone"
 
 
 def _written(value: float | None, texts: Texts) -> str:

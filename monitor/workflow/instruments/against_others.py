@@ -7,8 +7,9 @@ from scipy.special import chdtri, fdtri
 
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.instruments.contrasts import comparisons_of
 from monitor.methods.method import Contrast, Instruments, Unable
-from monitor.workflow.instruments.answer import AgainstOthers
+from monitor.workflow.instruments.answer import AgainstOthers, Suspect
 from monitor.workflow.instruments.instruments import DOUBTFUL
 
 
@@ -19,37 +20,31 @@ def against_others(
     run: int | None = None,
     doubtful: float = DOUBTFUL,
 ) -> AgainstOthers | None:
-    """The setup or instrument of a run, the last one without ``run``, that is the least likely beside all others; None
-    where chance makes as much more often than ``doubtful``, or nothing is compared."""
+    """Who contradicts all others of a run, the last one without ``run``, the least likely; None where chance makes as
+    much more often than ``doubtful``, or nothing is compared."""
     if not isinstance(ability, Instruments):
         return None
     run = int(problem.runs[-1]) if run is None else run
-    of_all = ability.contrasts(problem, solution, run)
-    every = frozenset(setup for contrast in of_all for setup in contrast.setups)
-    comparisons = len(
-        {frozenset({mine, every - mine}) for mine in (frozenset(each.setups) for each in of_all)}
-    )
-    worst = min(of_all, key=lambda contrast: (contrast.p, -contrast.size), default=None)
-    if worst is None or worst.p * comparisons > doubtful:
+    every = ability.contrasts(problem, solution, run)
+    comparisons = comparisons_of(every)
+    if not every or min(each.p for each in every) * comparisons > doubtful:
         return None
-    suspects = [each for each in of_all if each.p * comparisons <= doubtful and each.others_p > doubtful]
+    # Also those that contradict the others less surely: their direction may be one of many.
+    explaining = [each for each in every if each.others_p is not None and each.others_p > doubtful]
+    suspects = [each for each in explaining if not any(other.members < each.members for other in explaining)]
+    worst = min(suspects or every, key=lambda contrast: (contrast.p, -contrast.size))
     return AgainstOthers(
         run,
         worst.name,
+        worst.kind,
         worst.setups,
         worst.directions,
         worst.size,
         _limit(worst, doubtful / comparisons),
         comparisons,
         min(1.0, worst.p * comparisons),
-        _smallest(suspects),
+        tuple(Suspect(each.name, each.kind, each.setups, bool(each.others_left)) for each in suspects),
     )
-
-
-def _smallest(suspects: list[Contrast]) -> tuple[str, ...]:
-    """The names of suspects of which no part is one."""
-    setups = {each.name: frozenset(each.setups) for each in suspects}
-    return tuple(name for name, mine in setups.items() if not any(other < mine for other in setups.values()))
 
 
 def _limit(contrast: Contrast, level: float) -> float:

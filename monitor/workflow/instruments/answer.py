@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
+from monitor.methods.method import ContrastKind
 
 
 @dataclass(frozen=True)
@@ -57,25 +58,47 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
+class Suspect:
+    """One of a ``kind`` (a setup, an instrument, a stated number that several ``setups`` share) without which nothing
+    contradicts any more: the others agree (``others_agree``), or share nothing that could contradict."""
+
+    name: str
+    kind: ContrastKind
+    setups: tuple[str, ...]
+    others_agree: bool
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether it is a stated number, of which nothing was read."""
+        return self.kind is ContrastKind.STATED
+
+
+@dataclass(frozen=True)
 class AgainstOthers:
-    """A setup, or all setups of one instrument, that contradicts all others of a ``run`` together.
+    """One of a ``kind`` (a setup, an instrument, a stated number that several setups share) that contradicts all others
+    of a ``run`` together; of those that are suspects the least likely, of all where there is none.
 
     They can differ in so many ``directions`` and do by ``size`` (root of the mean square in standard uncertainties;
     ``limit`` is what chance exceeds as often as is doubtful), the least likely of so many ``comparisons``; chance alone
     makes as much in no more than ``by_chance`` of campaigns without fault (Bonferroni's bound). ``suspects`` are those
-    without which the others agree: one of them is the wrong one, and only one can be where there is only one; none
-    where no single one explains it.
+    that explain it alone: without each of them nothing contradicts any more. None where no single one explains it.
     """
 
     run: int
     name: str
+    kind: ContrastKind
     setups: tuple[str, ...]
     directions: int
     size: float
     limit: float
     comparisons: int
     by_chance: float
-    suspects: tuple[str, ...]
+    suspects: tuple[Suspect, ...]
+
+    @property
+    def is_of_two(self) -> bool:
+        """Whether two contradict each other and there is nobody else: each contradicts as much as the other."""
+        return self.comparisons == 1 and len(self.suspects) == 2
 
 
 @dataclass(frozen=True)

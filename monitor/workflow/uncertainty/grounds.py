@@ -168,8 +168,9 @@ def _instruments(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Gr
     problem, solution = robust.fit.problem, robust.fit.solution
     beside = against_others(problem, solution, ability, run, DISAGREE)
     if beside is not None:
-        names = beside.suspects or (beside.name,)
-        yield Ground(GroundKind.INSTRUMENTS, run, SEVERAL.join(names), beside.size, beside.limit, IN_U)
+        names = tuple(suspect.name for suspect in beside.suspects)
+        subject, several = (names[0], None) if len(names) == 1 else ("", names or None)
+        yield Ground(GroundKind.INSTRUMENTS, run, subject, beside.size, beside.limit, IN_U, several)
     if isinstance(ability, Instruments):
         for scatter in ability.scatters(problem, solution, run):
             if scatter.times < TOO_SMALL and scatter.p < DISAGREE:
