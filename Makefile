@@ -75,6 +75,7 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_empty.py --seeds 300 --seconds 1200
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_days.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_signed.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_weekly.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_ties.py 20
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py

@@ -82,7 +82,7 @@ class Fault:
     def __str__(self) -> str:
         text = self.file
         if self.sheet is not None:
-            text += f", sheet {self.sheet}"
+            text += f", sheet '{self.sheet}'"
         if self.line is not None:
             text += f", line {self.line}"
         if self.column is not None:

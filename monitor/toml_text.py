@@ -35,6 +35,12 @@ def toml_fault(error: ValueError, text: str) -> tuple[int | None, str]:
     return line, f"this is not TOML{where}: {_printable(message[: match.start()])}"
 
 
+def encoding_refusal(file: object, error: UnicodeDecodeError) -> str:
+    """Return why a file is no text in UTF-8, with the line of the first byte that is not."""
+    line = error.object.count(b"\n", 0, error.start) + 1
+    return f"{file}, line {line}: byte 0x{error.object[error.start]:02x} is not UTF-8; save the file as UTF-8 text"
+
+
 def toml_refusal(file: object, error: ValueError, text: str) -> str:
     """Return why a file could not be parsed, with its line."""
     line, reason = toml_fault(error, text)

@@ -25,9 +25,13 @@ class Ask:
 
     def __init__(self, db: Database) -> None:
         self.db = db
+        self.is_closed = False
 
     def __call__(self, question: str, /, **values: Any) -> Any:
-        """Return the typed answer. Raises InputError for an option that the question does not have."""
+        """Return the typed answer. Raises InputError for an option that the question does not have, and once
+        it is closed."""
+        if self.is_closed:
+            raise InputError(f"this database is closed; open it again: mm.open({str(self.db.path)!r})")
         asked = QUESTIONS[question]
         with options_as_arguments(asked.request):
             if asked.request is None and values:
@@ -35,7 +39,7 @@ class Ask:
                     f"'{question}' has no options; there is none to give as '{next(iter(values))}'"
                 )
             arguments = [] if asked.request is None else [request_of(asked.request, values)]
-            self.db.forget_campaigns()
+            self.db.begin_question()
             return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
 
 
@@ -43,13 +47,17 @@ class Ask:
 def options_as_arguments(request: Any) -> Iterator[None]:
     """Let messages of this block name the arguments of a request where they name options of the command line.
 
-    ``--holds-for`` is ``holds_for``, ``--peak`` is ``peak_um``; what is no field of the request stays as it is.
+    ``--holds-for`` is ``holds_for``, ``--peak`` is ``peak_um``, ``--event``, typed once for each, ``events``; what is
+    no field of the request stays as it is.
     """
     names = [] if request is None else [field.name for field in fields(request) if field.init]
 
     def argument(option: re.Match[str]) -> str:
         name = option[1].replace("-", "_")
-        return next((field for field in names if field == name or field.startswith(f"{name}_")), option[0])
+        several = f"{name}s"
+        return next(
+            (field for field in names if field in (name, several) or field.startswith(f"{name}_")), option[0]
+        )
 
     try:
         yield

@@ -55,7 +55,8 @@ class Database:
         self.close()
 
     def close(self) -> None:
-        """Close the file; other processes can open it then."""
+        """Close the file; other processes can open it then. Nothing more is answered."""
+        self._ask.is_closed = True
         self._store.close()
 
     @checked
@@ -69,13 +70,15 @@ class Database:
         Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
         others are imported.
         """
-        if len(folders) == 1 and isinstance(folders[0], (list, tuple)):
-            (folders,) = folders
-        if not folders:
+        # A list of folders in place of several arguments means the same.
+        named: tuple[Any, ...] = folders
+        if len(named) == 1 and isinstance(named[0], (list, tuple)):
+            named = tuple(named[0])
+        if not named:
             raise InputError("name a campaign folder or more")
         answer = self._ask(
             "import",
-            folders=folders,
+            folders=named,
             mapping=mapping,
             **options,
         )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import date, datetime
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from monitor.documents import inlined_parts
 from monitor.exceptions import InputError
@@ -67,8 +67,19 @@ def _frame_of(rows: object) -> pd.DataFrame | None:
             _numbers_first(pd.DataFrame.from_dict(records, orient="index")) if all(records.values()) else None
         )
     if isinstance(rows, tuple) and (not rows or dataclasses.is_dataclass(rows[0])):
-        return pd.DataFrame([_scalars(record) for record in rows])
+        frame = pd.DataFrame([_scalars(record) for record in rows])
+        frame.attrs["meanings"] = dict(_clocks(rows[0])) if rows else {}
+        return frame
     return None
+
+
+def _clocks(record: object) -> Iterator[tuple[str, str]]:
+    """Yield the name of every moment of a record, whose table has no offsets, with the clock that it is by."""
+    for part in inlined_parts(record):
+        hints = get_type_hints(type(part))
+        for field in dataclasses.fields(part):  # type: ignore[arg-type]
+            if datetime in (hints[field.name], *get_args(hints[field.name])):
+                yield field.name, "in UTC" if field.metadata.get("utc") else "by the clock of the shop"
 
 
 def _numbers_first(frame: pd.DataFrame) -> pd.DataFrame:

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from monitor.exceptions import InputError, did_you_mean
-from monitor.toml_text import toml_refusal
+from monitor.exceptions import InputError, StoreError, did_you_mean
+from monitor.toml_text import encoding_refusal, toml_refusal
 
 NAME = "monitor.toml"
 #: The units of angle that a screen may have.
@@ -92,7 +92,7 @@ def read(file: Path) -> Configuration:
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{file} is no TOML in UTF-8: {error}") from error
+        raise InputError(encoding_refusal(file, error)) from error
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -170,6 +170,16 @@ def _wrong_effect(name: str) -> str:
 
 
 def _database(value: str, file: Path) -> str:
+    # Loaded here: a configuration without a database needs none.
+    from monitor.store import check_database_name
+
+    try:
+        check_database_name(value)
+        check_database_name(str(file.parent / value))
+    except StoreError as error:
+        return str(error)
+    if value.startswith(":memory:"):
+        return "this names no file; name one, for example monitor.duckdb"
     folder = (file.parent / value).parent
     return "" if folder.is_dir() else f"the folder {folder} does not exist"
 

@@ -41,14 +41,11 @@ def campaign_toml(campaign: Campaign) -> str:
 
 def _machine(machine: Machine) -> Iterator[str]:
     yield from ("", "[machine]", f"id = {_text(machine.id)}")
-    for key in ("manufacturer", "model", "serial_number", "location"):
-        value = getattr(machine, key)
-        if value is not None:
-            yield f"{key} = {_text(value)}"
+    plate = {key: getattr(machine, key) for key in ("manufacturer", "model", "serial_number", "location")}
+    yield from (f"{key} = {_text(value)}" for key, value in plate.items() if value is not None)
     if not machine.chain:
         yield f"topology = {_text(machine.topology)}"
-    if machine.virtual:
-        yield "virtual = true"
+    yield from ("virtual = true",) * machine.virtual
     if machine.gravity is not None:
         yield f"gravity = {_numbers(machine.gravity)}"
     for placed in machine.chain:

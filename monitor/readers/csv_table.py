@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,9 @@ from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.spreadsheet import plain_csv
 
+#: Lines at the top of a file among which the head may stand under a title.
+LOOKED_AT = 8
+_NAME = re.compile(r"[A-Za-z]\w*")
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
 #: Most lines of one file: two years of touching without a pause, at one touch a minute.
@@ -21,19 +25,21 @@ MOST_LINES = 1_000_000
 class CsvTable:
     """A file's cells: column name to the cells of every whole row, and the line that each row stands on.
 
-    ``damaged`` holds the rows that do not have the header's number of cells.
+    ``damaged`` holds the rows that do not have the header's number of cells; ``of_workbook`` is whether a spreadsheet
+    held the cells, which has no text between them.
     """
 
     file: str
     columns: dict[str, Sequence[str]]
     lines: Sequence[int]
     damaged: tuple[tuple[str, ...], ...]
+    of_workbook: bool = False
 
     def __len__(self) -> int:
         return len(self.lines)
 
 
-def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
+def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False) -> CsvTable | None:
     """Parse RFC 4180 with one line a row, or what a spreadsheet of a country with decimal commas writes.
 
     None where the header cannot be used; the faults are noted.
@@ -61,7 +67,35 @@ def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
     except csv.Error as error:
         faults.add(file, 1, None, f"the header cannot be read: {_what(error)}")
         return None
-    return _body(file, header, lines, faults) if _header_is_sound(file, header, faults) else None
+    head = _line_of_head(header, lines)
+    if head is not None:
+        faults.add(
+            file,
+            1,
+            None,
+            f"the head seems to be in line {head}; take away what stands above it: line 1 names the columns",
+        )
+        return None
+    if not _header_is_sound(file, header, faults):
+        return None
+    return _body(file, header, lines, faults, of_workbook=of_workbook)
+
+
+def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
+    """Return the line of the names of the columns where a title stands above them; None where line 1 has them."""
+    named = sum(map(bool, header))
+    for number, line in enumerate(lines[1:LOOKED_AT], start=2):
+        try:
+            cells = _cells(line)
+        except csv.Error:
+            return None
+        if (
+            len(cells) > 2 * max(named, 1)
+            and len(set(cells)) == len(cells)
+            and all(map(_NAME.fullmatch, cells))
+        ):
+            return number
+    return None
 
 
 def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> None:
@@ -95,7 +129,7 @@ def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
     return sound
 
 
-def _body(file: str, header: list[str], lines: list[str], faults: Faults) -> CsvTable:
+def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_workbook: bool) -> CsvTable:
     rows: list[list[str]] = []
     at: list[int] = []
     damaged: list[tuple[str, ...]] = []
@@ -111,13 +145,13 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults) -> Csv
         elif not row:
             faults.add(file, number, None, "the line is empty; remove it")
         else:
-            hint = "; is a comma used as decimal point?" if len(row) > width else ""
+            hint = "; is a comma used as decimal point?" if len(row) > width and not of_workbook else ""
             faults.add(file, number, None, f"{len(row)} cells where the header has {width}{hint}")
             damaged.append(tuple(row[:width]))
     if not rows and not damaged:
         faults.add(file, 1, None, "there is only a header; at least one row must follow")
     columns = list(zip(*rows, strict=True)) if rows else [()] * width
-    return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged))
+    return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged), of_workbook)
 
 
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:

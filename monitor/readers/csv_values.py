@@ -111,6 +111,11 @@ def what_is_wrong(cell: str) -> str | None:
         return None if math.isfinite(value) else f"{shown} is too large for a number; a finite one is needed"
     if cell.strip().lstrip("+-").lower() in ("nan", "inf", "infinity"):
         return f"{shown} is not a finite number; leave out the row, or measure again"
+    if cell.endswith("%"):
+        return (
+            f"{shown} is a percentage: in a column whose name ends in _percent leave the % out; elsewhere write a "
+            "plain number (in Excel: a number format without %)"
+        )
     if cell != cell.strip():
         return f"{shown} is not a number: remove the spaces around it"
     if any(mark in cell for mark in TYPOGRAPHIC_MINUS):

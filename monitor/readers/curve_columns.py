@@ -13,7 +13,7 @@ import numpy.typing as npt
 from monitor.readers.csv_table import CsvTable
 from monitor.readers.csv_values import numbers
 from monitor.readers.curve_cells import are_dates, days_of, refuse_copies, refuse_dates, refuse_enormous
-from monitor.readers.faults import Faults
+from monitor.readers.faults import Faults, quoted
 from monitor.records import Array
 
 DATA = "data.csv"
@@ -137,6 +137,9 @@ def _refuse_empty(table: CsvTable, name: str, cells: Sequence[str], faults: Faul
     for line, cell in zip(table.lines, cells, strict=True):
         if not cell.strip() or not cell.isprintable():
             faults.add(DATA, line, name, "the cell is empty or cannot be printed; a label is needed")
+        elif cell != cell.strip():
+            wrong = f"the label {quoted(cell)} has blanks around it, and would be another than {quoted(cell.strip())}"
+            faults.add(DATA, line, name, f"{wrong}; remove them")
 
 
 def _are_labels(cells: Sequence[str]) -> bool:
@@ -153,7 +156,8 @@ def _are_words(cells: Sequence[str]) -> bool:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        # A percentage is a number to be refused as one, not a label.
+        float(cell.removesuffix("%"))
     except ValueError:
         return False
     return True

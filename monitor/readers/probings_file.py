@@ -68,6 +68,14 @@ class Expected:
         """The axes by the column of their readings."""
         return {axis.column: axis for axis in self.axes or ()}
 
+    @property
+    def listed(self) -> tuple[str, ...]:
+        """The required columns as the manual lists them: X, Y and Z before the rotary axes of the chain."""
+        columns = self.columns
+        lines = sorted(name for name, axis in columns.items() if axis.kind == "linear")
+        turning = [name for name in columns if name not in lines]
+        return (*self.first, *lines, *turning, *self.allowed.measured_columns)
+
 
 @dataclass(frozen=True)
 class _Columns:
@@ -114,7 +122,7 @@ def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> Probin
     What does not depend on the missing column is checked all the same.
     """
     required = (*expected.first, *expected.columns, *expected.allowed.measured_columns)
-    refuse_missing(table, required, faults)
+    refuse_missing(table, expected.listed, faults)
     taken = (*required, "target", SETUP) if expected.allowed.needs_setups else required
     readings, channels = _cells(table, taken, expected, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None

@@ -96,15 +96,18 @@ def _truths(table: CsvTable, faults: Faults) -> list[bool | None]:
 
 def _moments(table: CsvTable, faults: Faults) -> list[datetime | None]:
     moments = [
-        _moment(line, cell, faults)
+        _moment(line, cell, faults, of_workbook=table.of_workbook)
         for line, cell in zip(table.lines, table.columns["started_at"], strict=True)
     ]
     _refuse_backwards(table.lines, moments, faults)
     return moments
 
 
-def _moment(line: int, cell: str, faults: Faults) -> datetime | None:
-    wrong = f"{quoted(cell)} is not a time in ISO 8601 with an offset; write for example {EXAMPLE}"
+def _moment(line: int, cell: str, faults: Faults, *, of_workbook: bool) -> datetime | None:
+    asked = f"write for example {EXAMPLE}"
+    if of_workbook:
+        asked = f"write it as text (number format Text), for example {EXAMPLE}: a date of Excel's own holds no offset"
+    wrong = f"{quoted(cell)} is not a time in ISO 8601 with an offset; {asked}"
     if match := MOMENT.fullmatch(cell):
         try:
             moment = datetime.fromisoformat(cell)
@@ -116,7 +119,7 @@ def _moment(line: int, cell: str, faults: Faults) -> datetime | None:
             if match[3] is not None:
                 wrong = f"{quoted(cell)} is not in the years {YEARS[0]} to {YEARS[1]}"
             else:
-                wrong = f"{quoted(cell)} has no offset from UTC; write for example {EXAMPLE}"
+                wrong = f"{quoted(cell)} has no offset from UTC; {asked}"
     faults.add(FILE, line, "started_at", wrong)
     return None
 

@@ -10,18 +10,16 @@ from __future__ import annotations
 import csv
 import io
 import re
-import warnings
 import zipfile
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from datetime import date, datetime
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from monitor.exceptions import Fault
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.files import LARGEST_CSV, decode, read_bytes
+from monitor.readers.workbook import UNREADABLE, listed, read_sheet
 from monitor.records import SourceFile
 
 #: Instead of NAME.csv: a workbook of that table, or one workbook with a sheet of its name for every table.
@@ -29,19 +27,33 @@ WORKBOOK = "campaign.xlsx"
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
 _TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
-#: Unpacked, a workbook of a million rows has some 200 MiB; what is larger is an attack on memory.
-UNPACKED_BYTES = 512 * 2**20
-#: What zipfile and openpyxl raise for a file that is no workbook, or a damaged one.
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, KeyError, ValueError, OSError, SyntaxError)
+#: Workbooks that are tables of a campaign, and files of spreadsheets in general.
+_TABLE_BOOK = re.compile(r"(campaign|runs|probings|data)\.xlsx")
+_OF_SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
 #: Columns of true and false.
 _OF_TRUTHS = ("warm_up",)
 
 
-def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | None, str | None]:
-    """Return the file that holds the table ``name`` (``runs.csv``) with its text as plain CSV.
+@dataclass(frozen=True)
+class TableText:
+    """A table as plain CSV with the file that it was read from; ``sheet`` is that of a workbook with several. Without a
+    file or text what is wrong is noted."""
 
-    A workbook is read where there is no such file. What cannot be read is noted, and is None; so is a table that stands
-    in two files, of which one is older.
+    source: SourceFile | None = None
+    text: str | None = None
+    sheet: str | None = None
+
+    @property
+    def of_workbook(self) -> bool:
+        """Whether a spreadsheet holds it as cells and not as text."""
+        return self.source is not None and self.source.name.endswith(".xlsx")
+
+
+def read_table(folder: Path, name: str, faults: Faults) -> TableText:
+    """Return the table ``name`` (``runs.csv``) of a folder.
+
+    A workbook is read where there is no such file. What cannot be read is noted; so is a table that stands in two
+    files, of which one is older.
     """
     stem = name.removesuffix(".csv")
     sheets = _sheets_of(folder / WORKBOOK)
@@ -60,18 +72,40 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
             None,
             f"this table stands in {' and in '.join(holding)}; take away what is not to be read",
         )
-        return None, None
+        return TableText()
     books = [] if (folder / name).exists() else [f"{stem}.xlsx", WORKBOOK]
     book = next((book for book in books if (folder / book).is_file()), None)
+    if not holding and book is None and _note_other_workbooks(folder, faults):
+        return TableText()
     content = read_bytes(folder, book or name, LARGEST_CSV, faults)
     if content is None:
-        return None, None
-    text = (
-        decode(name, content, faults, of_spreadsheet=True)
-        if book is None
-        else _sheet_text(book, content, stem, faults)
-    )
-    return SourceFile(book or name, content), text
+        return TableText()
+    if book is None:
+        return TableText(SourceFile(name, content), decode(name, content, faults, of_spreadsheet=True))
+    text, sheet = _sheet_text(book, content, stem, faults)
+    return TableText(SourceFile(book, content), text, sheet)
+
+
+def _note_other_workbooks(folder: Path, faults: Faults) -> bool:
+    """Note the files of a spreadsheet under names or of kinds that are not read; return whether there are any."""
+    with suppress(OSError):
+        names = sorted(path.name for path in folder.iterdir() if path.suffix.casefold() in _OF_SPREADSHEETS)
+        others = [
+            name for name in names if not name.startswith(("~", ".")) and not _TABLE_BOOK.fullmatch(name)
+        ]
+        for name in others:
+            todo = (
+                "rename it"
+                if name.casefold().endswith(".xlsx")
+                else "save it in Excel as .xlsx under such a name"
+            )
+            faults.add(
+                name, None, None,
+                f"a workbook with a sheet for every table is called {WORKBOOK}, one with a single table as that is "
+                f"(runs.xlsx, probings.xlsx, data.xlsx), in small letters; {todo}",
+            )  # fmt: skip
+        return bool(others)
+    return False
 
 
 def _sheets_of(path: Path) -> list[str] | None:
@@ -80,22 +114,28 @@ def _sheets_of(path: Path) -> list[str] | None:
     if not path.is_file():
         return []
     try:
-        with zipfile.ZipFile(path) as packed, packed.open("xl/workbook.xml") as listed:
-            names = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', listed.read(2**20))
-    except (*_UNREADABLE, NotImplementedError, RuntimeError):
+        with zipfile.ZipFile(path) as packed, packed.open("xl/workbook.xml") as part:
+            names = re.findall(rb'<sheet\b[^>]*\bname="([^"]*)"', part.read(2**20))
+    except (*UNREADABLE, NotImplementedError, RuntimeError):
         return None
-    return [name.decode("utf-8", "replace").lower() for name in names]
+    return [name.decode("utf-8", "replace").strip().lower() for name in names]
 
 
-def renamed(faults: Iterable[Fault], files: Mapping[str, str]) -> list[Fault]:
-    """Return the faults under the names of the files that their tables were read from, with the sheet of the workbook
-    that holds all tables."""
-    return [_renamed(fault, files.get(fault.file, fault.file)) for fault in faults]
+def renamed(faults: Iterable[Fault], tables: Mapping[str, TableText]) -> list[Fault]:
+    """Return the faults under the names of the files that their tables were read from, with the sheet of a workbook
+    with several."""
+    return [_renamed(fault, tables) for fault in faults]
 
 
-def _renamed(fault: Fault, file: str) -> Fault:
-    sheet = fault.file.removesuffix(".csv") if file == WORKBOOK and fault.file != WORKBOOK else fault.sheet
-    return replace(fault, file=file, sheet=sheet)
+def _renamed(fault: Fault, tables: Mapping[str, TableText]) -> Fault:
+    message = fault.message
+    for name, table in tables.items():
+        if table.of_workbook and table.source is not None:
+            where = table.source.name if table.sheet is None else f"the sheet '{table.sheet}'"
+            message = message.replace(name, where)
+    table = tables.get(fault.file, TableText())
+    file = fault.file if table.source is None else table.source.name
+    return replace(fault, file=file, message=message, sheet=table.sheet or fault.sheet)
 
 
 def plain_csv(file: str, text: str, faults: Faults) -> str:
@@ -157,11 +197,20 @@ def _written(rows: Iterable[Sequence[str]]) -> str:
     return stream.getvalue()
 
 
-def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | None:
-    rows = sheet_rows(file, content, stem, faults, or_first=file != WORKBOOK)
-    if rows is None:
-        return None
+def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> tuple[str | None, str | None]:
+    """Return the text of the sheet of a table, and its name where that is not its file's."""
+    sheet = read_sheet(file, content, stem, faults, or_first=file != WORKBOOK)
+    if sheet is None:
+        return None, None
+    rows = sheet.rows
     width = max((index + 1 for index, cell in enumerate(rows[0] if rows else []) if cell), default=0)
+    if len(sheet.names) > 1 and sheet.name.strip().casefold() != stem and (width < 2 or len(rows) < 2):
+        faults.add(
+            file, None, None,
+            f"the first sheet, '{sheet.name}', was read, since none is called '{stem}', and it holds no table; call "
+            f"the sheet of the table '{stem}'; there are {listed(sheet.names)}",
+        )  # fmt: skip
+        return None, None
     # A row ends with its last cell that was ever filled; what stands beside the table is a fault of its row.
     cut = [
         [*row, *[""] * (width - len(row))][:width] + [cell for cell in row[width:] if cell] for row in rows
@@ -169,69 +218,5 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
     text = _written(cut).rstrip("\n")
     if not text:
         faults.add(file, None, None, f"the sheet of '{stem}' is empty; its first row names the columns")
-        return None
-    return text + "\n"
-
-
-def sheet_rows(
-    file: str, content: bytes, sheet: str | None, faults: Faults, *, or_first: bool = False
-) -> list[list[str]] | None:
-    """Return the cells of a sheet as CSV writes them, of the first sheet where none is named (``or_first``: or none has
-    that name); None with the fault noted."""
-    try:
-        from openpyxl import load_workbook
-    except ImportError:
-        faults.add(
-            file, None, None,
-            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]', or save the table as CSV",
-        )  # fmt: skip
-        return None
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as packed:
-            unpacked = sum(member.file_size for member in packed.infolist())
-        if unpacked > UNPACKED_BYTES:
-            faults.add(
-                file, None, None, f"the workbook unpacks to more than {UNPACKED_BYTES // 2**20} MiB; split it"
-            )
-            return None
-        with warnings.catch_warnings():
-            # What openpyxl does not keep (drop-down lists, colours) is not read either.
-            warnings.simplefilter("ignore")
-            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-    except _UNREADABLE as error:
-        _note_no_workbook(file, error, faults)
-        return None
-    names = {name.casefold(): name for name in book.sheetnames}
-    first = book.sheetnames[0] if book.sheetnames else None
-    title = first if sheet is None else names.get(sheet.casefold(), first if or_first else None)
-    if title is None:
-        listed = ", ".join(book.sheetnames)
-        faults.add(
-            file,
-            None,
-            None,
-            f"there is no sheet '{sheet}'; name the sheet of that table so; there are {listed}",
-        )
-        return None
-    try:
-        return [[_cell(value) for value in row] for row in book[title].iter_rows(values_only=True)]
-    except _UNREADABLE as error:  # a damaged sheet of a workbook that is whole elsewhere
-        _note_no_workbook(file, error, faults)
-        return None
-
-
-def _note_no_workbook(file: str, error: Exception, faults: Faults) -> None:
-    faults.add(file, None, None, f"this is no workbook of Excel (.xlsx) that can be read: {str(error)[:100]}")
-
-
-def _cell(value: Any) -> str:
-    """A cell as CSV writes it: decimal points, true and false, moments in ISO 8601."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
-    if isinstance(value, datetime | date):
-        return value.isoformat()
-    return " ".join(str(value).splitlines())
+        return None, None
+    return text + "\n", sheet.name if len(sheet.names) > 1 else None

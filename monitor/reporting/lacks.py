@@ -36,6 +36,7 @@ class Cause(StrEnum):
     ALL_IN_REFERENCE = "all_in_reference"
     FEW_DAYS = "few_days"
     FEW_POINTS = "few_points"
+    FEW_RUNS = "few_runs"
     NO_CYCLE_SEEN = "no_cycle_seen"
     NO_DRIFT = "no_drift"
     NO_DRIFT_TO_TEST = "no_drift_to_test"
@@ -106,6 +107,7 @@ _CAUSES = {
         "{count} {name} in the reference period and {after} after it for {parameters} parameters; at least {needed[0]} "
         "and one are needed (--reference FROM..TO)"
     ),
+    Cause.FEW_RUNS: "too few runs ({count}); at least {needed[0]} are needed",
     Cause.NO_CYCLE_SEEN: (
         "a daily one needs runs over {needed[0]} hours of the clock, a yearly one {needed[1]} days of history"
     ),

@@ -7,6 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from monitor.reporting.run_notes import joined_by_and
+
 #: What is said of a slope that a season may be all of.
 DRIFT_OR_SEASON = "drift or season cannot be told apart"
 #: What is said of a parameter of the fleet in place of its class, where that is so.
@@ -62,6 +64,15 @@ def machines_lacking(machines: Mapping[str, str], most: int) -> str:
     return (
         f"the latest comparison says that the model lacks something: {named}{more}; "
         f"type `monitor explain {next(iter(machines.values()))}`"
+    )
+
+
+def campaigns_of_same_hours(machine: str, campaigns: Sequence[str]) -> str:
+    """Return which ``campaigns`` a machine cannot all have made, and what to do about it."""
+    return (
+        f"campaigns {joined_by_and(campaigns)} of {machine} hold runs of the same hours, which one machine cannot have "
+        f"made; the numbers here mix them: see the one that counts alone with `monitor trend {machine} --campaign "
+        f"{campaigns[0]}`, and withdraw what is not its own with `monitor withdraw`"
     )
 
 
@@ -285,6 +296,19 @@ def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
         f"not identified by the model that {machine} is followed by, and left out: {', '.join(campaigns)}; type "
         f"`monitor identify {campaigns[0]}`"
     )
+
+
+def before_all_runs(machine: str, first: datetime) -> str:
+    """Return that an event lies before the first run of its machine, in UTC."""
+    return (
+        f"recorded, and it lies before the first run of {machine} ({first:%Y-%m-%d %H:%M} UTC): it splits nothing "
+        "until earlier runs are imported; an event cannot be undone"
+    )
+
+
+def without_rows(tables: Sequence[str], machine: str | None) -> str:
+    """Return which tables of an export have their head alone."""
+    return f"{', '.join(tables)}: no row" + ("" if machine is None else f" of {machine}")
 
 
 def lacks_campaigns(sheets: Sequence[str], campaigns: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from monitor.on_demand import on_demand
 
 if TYPE_CHECKING:
     from monitor.statistics.changes import (
+        FEWEST_RUNS as FEWEST_RUNS,
         Change as Change,
         History as History,
         find_changes as find_changes,
@@ -117,7 +118,7 @@ else:
     __getattr__, __dir__ = on_demand(
         __name__,
         {
-            "changes": "Change History find_changes",
+            "changes": "FEWEST_RUNS Change History find_changes",
             "charts.control": "ControlChart CusumChart Reference correlated_reference cusum_chart ewma_chart "
             "individuals_chart known_reference reference_period",
             "charts.vector_control": "VectorChart mewma_chart mewma_limit t_squared_chart",

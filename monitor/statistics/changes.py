@@ -23,6 +23,9 @@ from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
 
+#: A history of fewer runs is not searched.
+FEWEST_RUNS = 2 * EDGE + 2
+
 
 @dataclass(frozen=True)
 class Change:
@@ -71,7 +74,7 @@ class _Series:
     @property
     def searched(self) -> bool:
         """Whether there are runs enough, and any scatter, for a search."""
-        return len(self.y) >= 2 * EDGE + 2 and bool(np.ptp(self.y) > 0.0)
+        return len(self.y) >= FEWEST_RUNS and bool(np.ptp(self.y) > 0.0)
 
     def part(self, start: int, stop: int) -> _Series:
         part_u = None if self.u is None else self.u[start:stop]
@@ -287,7 +290,7 @@ def find_changes(
     searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that cannot reach the
     level, or non-finite values.
     """
-    t = as_vector(times, "times", least=2 * EDGE + 2)
+    t = as_vector(times, "times", least=FEWEST_RUNS)
     _check(values, t, u or {}, false_alarm)
     bounds = [
         0,

@@ -89,7 +89,10 @@ if TYPE_CHECKING:
         Compaction as Compaction,
         compact as compact,
     )
-    from monitor.store.copies.export import export_tables as export_tables
+    from monitor.store.copies.export import (
+        export_tables as export_tables,
+        tables_without_rows as tables_without_rows,
+    )
     from monitor.store.copies.increment import take_increment as take_increment
     from monitor.store.copies.manifest import (
         Backup as Backup,
@@ -145,6 +148,7 @@ if TYPE_CHECKING:
     from monitor.store.past.fleet import (
         BlockCut as BlockCut,
         FleetSums as FleetSums,
+        GroupHours as GroupHours,
         fleet_sums as fleet_sums,
     )
     from monitor.store.past.history import (
@@ -228,7 +232,7 @@ else:
             "connection": "Database",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
-            "copies.export": "export_tables",
+            "copies.export": "export_tables tables_without_rows",
             "copies.increment": "take_increment",
             "copies.manifest": "Backup list_backups",
             "copies.restoring": "Restored restore",
@@ -242,7 +246,7 @@ else:
             "import_notes": "campaign_notes run_fingerprints",
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
             "save_model",
-            "past.fleet": "BlockCut FleetSums fleet_sums",
+            "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "

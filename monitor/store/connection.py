@@ -398,6 +398,10 @@ class Database:
     def forget_campaigns(self) -> None:
         """Let every name be that of another campaign from here on: after a withdrawal, and for a new question."""
 
+    def begin_question(self) -> None:
+        """Let a new question of a long session see what others stored since the last one."""
+        self.forget_campaigns()
+
 
 def _detach(connection: duckdb.DuckDBPyConnection, path: Path, name: str) -> None:
     """Close an attached file. Raises StoreError naming it where what it holds could not be written."""

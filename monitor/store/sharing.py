@@ -26,7 +26,7 @@ from monitor.store import migrations
 from monitor.store.connection import Database
 from monitor.store.opening import busy, close_written, connect, is_missing
 from monitor.store.turns import Patience, turn_to_write, writer_at_work
-from monitor.store.unwritable import private_copy, why_not_written
+from monitor.store.unwritable import private_copy, state_of_file, why_not_written
 
 #: How long the file stays open for the next question, in s: to open it takes some 10 ms. Whoever reads keeps it longer
 #: while nobody has taken the turn to write: what is computed between two questions of one verb.
@@ -83,6 +83,7 @@ class SharedDatabase(Database):
         self._unstored: Callable[[str], None] | None = unstored
         #: Whether a private copy is open in place of the file, and whether it is written now.
         self._is_copy = self._copy_is_written = False
+        self._copied_state: tuple[tuple[int, ...], ...] = ()
         self._turn = ExitStack()
         self._writes = False
         self._blocks = 0
@@ -102,6 +103,16 @@ class SharedDatabase(Database):
 
     def forget_campaigns(self) -> None:
         self._numbers.clear()
+
+    def begin_question(self) -> None:
+        """As before; and let go of a private copy whose file others have written since.
+
+        Not between two questions: what was identified on the way of one is read from the copy until its end.
+        """
+        super().begin_question()
+        with self._lock:
+            if self._is_copy and not self._blocks and state_of_file(self.path) != self._copied_state:
+                self._let_go()
 
     @property
     def keeps_answers(self) -> bool:
@@ -143,6 +154,7 @@ class SharedDatabase(Database):
     def _open_copy(self) -> None:
         with ExitStack() as copied:
             with self._used():
+                self._copied_state = state_of_file(self.path)
                 path = copied.enter_context(private_copy(self.path))
             self._let_go()
             self._connection = connect(path, False, self._threads)

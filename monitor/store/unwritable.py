@@ -2,7 +2,7 @@
 
 What an answer is made of is mostly not asked for again, and is remembered until the session ends. Identifications are:
 the trend, the statistics, the report read what was identified a moment before. They are stored in a private copy of the
-file, which ends with the session, too.
+file, which ends with the session, too, or with the first question after somebody else wrote the file.
 """
 
 from __future__ import annotations
@@ -30,6 +30,20 @@ def why_not_written(path: str) -> str | None:
     if _may_write(path) and _may_write(folder):
         return None
     return f"{folder if _may_write(path) else path} may not be written by this user"
+
+
+def state_of_file(path: str) -> tuple[tuple[int, ...], ...]:
+    """Return what differs once somebody wrote a file or its log, or put another in its place; empty of what is not
+    there."""
+    states: list[tuple[int, ...]] = []
+    for name in (path, path + ".wal"):
+        try:
+            status = os.stat(name)
+        except OSError:
+            states.append(())
+        else:
+            states.append((status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns))
+    return tuple(states)
 
 
 def _may_write(path: str) -> bool:

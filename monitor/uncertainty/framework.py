@@ -16,7 +16,7 @@ from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
 from monitor.uncertainty.coverage_regions.regions import RegionFactors, region_factors
 from monitor.uncertainty.degrees_of_freedom import effective_dof
-from monitor.uncertainty.parts import BudgetLine, OutputContribution, known
+from monitor.uncertainty.parts import BudgetLine, OutputContribution, known, one_of_each_estimate
 from monitor.uncertainty.roots import WithCovariance, checked_covariance, covariance_root
 
 
@@ -101,7 +101,8 @@ def gum_framework(
     budget = _input_lines(inputs, sensitivity) + _output_lines(contributions, outputs, inputs.source_names)
     covariance = np.sum([line.covariance for line in budget], axis=0)
     covariance = 0.5 * (covariance + covariance.T)
-    proper = [line for line in budget if line.dof is not None]
+    estimates = one_of_each_estimate(budget)
+    proper = [line for line in estimates if line.dof is not None]
     dofs = [line.dof for line in proper if line.dof is not None]
     joint = effective_dof([line.covariance for line in proper], dofs)
     single = np.array(
@@ -123,7 +124,7 @@ def gum_framework(
         dof_by_output=single,
         rank=rank,
         finite_dof=finite_dof,
-        factors=region_factors(budget if finite_dof else known(budget), p),
+        factors=region_factors(estimates if finite_dof else known(estimates), p),
     )
 
 
@@ -160,5 +161,5 @@ def _output_lines(
         covariance = checked_covariance(part.covariance)
         if covariance.shape != (outputs, outputs):
             raise DataError(f"'{part.source}' must have shape ({outputs}, {outputs}), not {covariance.shape}")
-        lines.append(BudgetLine(part.source, covariance, part.dof, part.estimated))
+        lines.append(BudgetLine(part.source, covariance, part.dof, part.estimated, part.estimated_with))
     return tuple(lines)

@@ -34,13 +34,15 @@ class BudgetLine:
     """What one source adds to the output covariance (m, m), and its degrees of freedom.
 
     A line named ``a × b`` is the covariance between two sources, which may be negative. A source whose
-    degrees of freedom do not apply (a covariance between sources) has None.
+    degrees of freedom do not apply (a covariance between sources) has None. ``estimated_with`` is the source from
+    whose estimate it follows, where that is another.
     """
 
     source: str
     covariance: Array
     dof: float | None
     estimated: Estimated = Estimated.MATRIX
+    estimated_with: str | None = None
 
     @property
     def variance(self) -> Array:
@@ -55,14 +57,31 @@ class BudgetLine:
 
 @dataclass(frozen=True)
 class OutputContribution:
-    """A covariance (m, m) that acts on the outputs directly, such as what lack of fit leaves."""
+    """A covariance (m, m) that acts on the outputs directly, such as what lack of fit leaves; ``estimated_with`` as in
+    ``BudgetLine``."""
 
     source: str
     covariance: Array
     dof: float = math.inf
     estimated: Estimated = Estimated.SCALE
+    estimated_with: str | None = None
 
 
 def known(parts: Sequence[BudgetLine]) -> tuple[BudgetLine, ...]:
     """Return the parts as if nothing of them were estimated."""
     return tuple(replace(part, dof=math.inf) for part in parts)
+
+
+def one_of_each_estimate(parts: Sequence[BudgetLine]) -> tuple[BudgetLine, ...]:
+    """Return the parts with those that follow from one estimate as one: they are too small or too large together, and
+    two of them say no more about the sum than one."""
+    estimates: dict[str, BudgetLine] = {}
+    for part in parts:
+        name = part.estimated_with or part.source
+        before = estimates.get(name)
+        estimates[name] = (
+            replace(part, source=name, estimated_with=None)
+            if before is None
+            else replace(before, covariance=before.covariance + part.covariance)
+        )
+    return tuple(estimates.values())

@@ -31,7 +31,9 @@ class Urgency:
     next_step: str
 
 
-_STOP = Urgency("stop", "■", "act now", "")
+#: The colour of what cannot wait.
+STOP = "stop"
+_STOP = Urgency(STOP, "■", "act now", "")
 _SOON = Urgency("soon", "▲", "plan", "")
 _LOOK = Urgency("look", "◆", "look", "")
 _GOOD = Urgency("good", "●", "as usual", "")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from monitor.exceptions import InputError, did_you_mean
-from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
+from monitor.reporting import messages
+from monitor.store import NOTE, Database, StoredEvent, list_campaigns, list_events, record_event
 from monitor.store.catalogue import check_machine
 
 #: Before it nobody recorded what happened to a machine that is measured today.
@@ -21,7 +23,7 @@ class EventRequest:
     """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment with an offset; without text list them.
 
     An event of any kind but a note splits the history of the machine. Raises InputError for a kind that is nearly a
-    usual one, a moment to come or no words.
+    usual one, a moment to come, or a moment or kind without words.
     """
 
     machine: str
@@ -34,6 +36,7 @@ class EventRequest:
             at = self.at.isoformat()
             raise InputError(f"the moment {at} lacks its offset from UTC, such as {at}-05:00")
         if self.text is None:
+            self._refuse_unsaid()
             return
         if not self.text.strip():
             raise InputError("say in words what happened, for example 'B axis encoder changed'")
@@ -63,12 +66,21 @@ class EventRequest:
                 f"({', '.join((*USUAL_KINDS, NOTE))}) is not recorded; any other word is"
             )
 
+    def _refuse_unsaid(self) -> None:
+        """Raise InputError for a moment or kind without words, which is no question for the list."""
+        if self.at is not None or self.kind != NOTE:
+            raise InputError(
+                "say in words what happened, for example 'B axis encoder changed': nothing was recorded; the list of "
+                "events takes neither a time nor a kind"
+            )
+
 
 @dataclass(frozen=True)
 class EventAnswer:
-    """The events of the machine, in the order of time."""
+    """The events of the machine, in the order of time; ``notes`` say what the one recorded now does not do."""
 
     events: tuple[StoredEvent, ...]
+    notes: tuple[str, ...] = ()
 
 
 def event(db: Database, request: EventRequest) -> EventAnswer:
@@ -81,4 +93,14 @@ def event(db: Database, request: EventRequest) -> EventAnswer:
                 "in the time of this computer"
             )
         record_event(db, request.machine, request.at, request.kind, request.text)
-    return EventAnswer(list_events(db, request.machine))
+    return EventAnswer(list_events(db, request.machine), tuple(_notes(db, request)))
+
+
+def _notes(db: Database, request: EventRequest) -> Iterator[str]:
+    """Yield that an event lies before every run of its machine, as one of a mistyped year does."""
+    if request.text is None or request.at is None:
+        return
+    begins = [row.first_run_at for row in list_campaigns(db, machine=request.machine)]
+    first = min((moment for moment in begins if moment is not None), default=None)
+    if first is not None and request.at.astimezone(UTC).replace(tzinfo=None) < first:
+        yield messages.before_all_runs(request.machine, first)

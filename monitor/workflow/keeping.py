@@ -26,6 +26,7 @@ from monitor.store import (
     last_entries,
     not_identified,
     restore,
+    tables_without_rows,
     take_backup,
     take_increment,
     unrecorded,
@@ -319,7 +320,8 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class ExportAnswer:
-    """The files that were written; ``notes`` say what a workbook lacks because it was not computed yet."""
+    """The files that were written; ``notes`` say what a workbook lacks because it was not computed yet, and which
+    tables that were asked for have no row."""
 
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
@@ -330,9 +332,12 @@ def export(db: Database, request: ExportRequest) -> ExportAnswer:
     if request.format == "xlsx":
         return _workbook(db, request)
     with db.reading():
-        return ExportAnswer(
-            export_tables(db, request.folder, request.format, tables=request.tables, machine=request.machine)
+        written = export_tables(
+            db, request.folder, request.format, tables=request.tables, machine=request.machine
         )
+        # Of all tables many are empty, which nobody wonders at.
+        empty = tables_without_rows(db, request.tables, request.machine) if request.tables is not None else ()
+    return ExportAnswer(written, (messages.without_rows(empty, request.machine),) if empty else ())
 
 
 def _workbook(db: Database, request: ExportRequest) -> ExportAnswer:

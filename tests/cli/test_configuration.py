@@ -227,3 +227,21 @@ def test_an_empty_file_is_no_database_for_a_verb_that_reads(typed: Any) -> None:
     assert (answer.status, answer.out) == (2, "")
     assert "full.duckdb is an empty file, as a full disk leaves one" in answer.err
     assert Path("full.duckdb").stat().st_size == 0
+
+
+@pytest.mark.parametrize("name", ["x.csv", "md:shop", "x.sqlite", ":memory:"])
+def test_a_name_that_is_no_database_is_refused_by_check(typed: Any, name: str) -> None:
+    """It passed here, and every verb refused it."""
+    configured(f'database = "{name}"')
+    assert typed("config", "check").status == 2
+    said = typed("config", "check").err
+    assert f"database = '{name}': " in said
+    assert "name a file such as" in said or "name one, for example" in said
+
+
+def test_a_file_in_latin_1_is_told_with_its_line(typed: Any) -> None:
+    Path("monitor.toml").write_bytes('# one\nmail = "M\xfcller.toml"\n'.encode("latin-1"))
+    assert (
+        "monitor.toml, line 2: byte 0xfc is not UTF-8; save the file as UTF-8 text"
+        in typed("config", "check").err
+    )

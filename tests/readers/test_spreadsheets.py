@@ -208,8 +208,8 @@ def test_faults_of_a_workbook_of_all_tables_name_the_sheet_too(tmp_path: Path) -
     with pytest.raises(CampaignError, match="'none' is not a number") as refusal:
         read_campaign(folder)
     shown = str(refusal.value)
-    assert "  campaign.xlsx, sheet runs, line 3, column ambient_degC: 'none' is not a number" in shown
-    assert "  campaign.xlsx, sheet probings, line 3, column x_mm: 'none' is not a number" in shown
+    assert "  campaign.xlsx, sheet 'runs', line 3, column ambient_degC: 'none' is not a number" in shown
+    assert "  campaign.xlsx, sheet 'probings', line 3, column x_mm: 'none' is not a number" in shown
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_a_workbook_without_the_sheet_says_what_it_has(tmp_path: Path) -> None:
     book.worksheets[0].title = "Tabelle1"
     book.save(folder / "campaign.xlsx")
     with pytest.raises(
-        CampaignError, match="there is no sheet 'data'; name the sheet of that table so; there are Tabelle1"
+        CampaignError, match="there is no sheet 'data'; name the sheet of that table so; there are 'Tabelle1'"
     ):
         read_campaign(folder)
 

@@ -20,6 +20,7 @@ from monitor.store import (
     take_backup,
     verify_audit,
 )
+from monitor.workflow.keeping import ExportRequest, export
 
 
 def test_restored_backup_is_the_database(filled: Database, campaign: Campaign, tmp_path: Path) -> None:
@@ -98,6 +99,14 @@ def test_csv_export_has_every_table_view_and_file(
     }
     for file in campaign.files:
         assert (tmp_path / "it's" / "source_files" / "1" / file.name).read_bytes() == file.content
+
+
+def test_a_table_without_rows_is_named(filled: Database, tmp_path: Path) -> None:
+    answer = export(filled, ExportRequest(tmp_path / "out", "csv", ("v_parameters", "events")))
+    assert answer.notes == ("v_events: no row",)
+    machine = filled.rows("SELECT machine FROM machine")[0][0]
+    answer = export(filled, ExportRequest(tmp_path / "of", "csv", ("v_parameters", "events"), machine))
+    assert answer.notes == (f"v_events: no row of {machine}",)
 
 
 def test_parquet_export_has_every_row_and_byte(filled: Database, campaign: Campaign, tmp_path: Path) -> None:

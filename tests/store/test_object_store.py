@@ -5,6 +5,10 @@ What needs a store that answers (moto's, on loopback) runs by ``make object-stor
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import tempfile
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -180,3 +184,30 @@ def test_an_address_of_another_store_makes_no_folder_of_that_name(files: str) ->
     with pytest.raises(InputError, match=r"lie in a folder, or at s3://BUCKET/FOLDER"):
         object_store.address_of_files(files)
     assert object_store.address_of_files("S3://lake/shops") == "s3://lake/shops"
+
+
+_AS_NOBODY = """
+import os, sys
+from monitor.exceptions import InputError
+from monitor.store.lake.object_store import address_of_files
+os.setuid(65534)
+try:
+    address_of_files(sys.argv[1])
+except InputError as refusal:
+    print(refusal)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root acts as somebody else")
+def test_a_folder_below_one_that_may_not_be_entered_is_refused_in_words() -> None:
+    """It ended in a bare PermissionError of Python."""
+    with tempfile.TemporaryDirectory() as outer:
+        os.chmod(outer, 0o755)
+        closed = Path(outer, "closed")
+        (closed / "inner").mkdir(parents=True)
+        closed.chmod(0o700)
+        said = subprocess.run(
+            [sys.executable, "-c", _AS_NOBODY, str(closed / "inner" / "lake")],
+            capture_output=True, text=True, check=True, cwd=Path(__file__).resolve().parents[2],
+        )  # fmt: skip
+        assert said.stdout == f"--files {closed}/inner/lake: nothing can be written to {closed}\n"

@@ -108,7 +108,13 @@ def test_a_backup_of_a_session_shows_the_moment_that_it_states(
 
         def storing(db: Database, catalog: str | None = None) -> Any:
             sums = checksums(db, catalog)
-            record_event(other, campaign.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "note", "meanwhile")
+            record_event(
+                other,
+                campaign.machine.id,
+                datetime(2026, 1, 1, tzinfo=UTC),
+                "note",
+                f"meanwhile {len(stored)}",
+            )
             stored.append(last_entry(other)[1])
             return sums
 

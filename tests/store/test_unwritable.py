@@ -109,6 +109,26 @@ def test_what_is_identified_is_read_again_in_the_same_session_and_gone_behind_it
     assert reading.files() == reading.before
 
 
+def test_a_question_of_a_long_session_sees_what_others_stored_since_the_copy(
+    reading: Reading, campaign: Campaign, identification: StoredIdentification
+) -> None:
+    """A notebook that is open for days answered from its copy until it was closed."""
+    seen = "SELECT (SELECT count(*) FROM identification), (SELECT count(*) FROM event)"
+    with reading.opened() as db:
+        save_identification(db, identification)
+        db.begin_question()
+        # Nobody wrote the file: what the session identified is still there.
+        assert db.rows(seen) == [(1, 0)]
+        with Database(reading.path) as other:
+            record_event(other, campaign.machine.id, campaign.runs[0].started_at, "crash", "hit the vice")
+        # Within a question the copy stays.
+        assert db.rows(seen) == [(1, 0)]
+        db.begin_question()
+        assert db.rows(seen) == [(0, 1)]
+        save_identification(db, identification)
+        assert db.rows(seen) == [(1, 1)]
+
+
 def _refused(path: str, *options: object) -> None:
     raise StoreError(f"{path} may not be opened by this user for writing: permission denied")
 

@@ -11,6 +11,7 @@ from scipy import stats
 from monitor.uncertainty import BudgetLine, Estimated, ellipsoid_factor, region_factors, single_factor
 from monitor.uncertainty.coverage_regions.stein import stein_eigenvalues
 from monitor.uncertainty.coverage_regions.tails import PartTails, tails_of
+from monitor.uncertainty.parts import one_of_each_estimate
 
 
 def equal(m: int, rho: float) -> np.ndarray:
@@ -164,3 +165,42 @@ def test_sources_that_miss_most_outputs_are_no_covariance_gone_wrong(seed: int) 
         estimated += rng.chisquare(9.0, (count, 1, 1)) / 9.0 * line.covariance
     squares = np.sum(errors * np.linalg.solve(estimated, errors[:, :, None])[:, :, 0], axis=1)
     assert np.mean(squares <= factor**2) == pytest.approx(0.955, abs=0.02)
+
+
+def test_a_sum_of_tails_beyond_its_nodes_is_no_polynomial() -> None:
+    # Half of the variance known, half of one size of one degree of freedom: far out the polynomial of k² rises.
+    known, size = PartTails(np.array([0.1]), math.inf, 0.0, 0.0), PartTails(np.array([0.9]), 1.0, 1.0, 1.0)
+    of_world, _ = tails_of([known, size], 0.95)
+    chi = stats.chi2(1).ppf((np.arange(200_000) + 0.5) / 200_000)
+    for k in (1.0, 20.0, 40.0):
+        expected = float(np.mean(2.0 * stats.norm.sf(k * np.sqrt(0.1 + 0.9 * chi))))
+        assert of_world(k) == pytest.approx(expected, rel=0.05, abs=1e-12)
+
+
+def test_k_q_where_a_part_of_one_degree_of_freedom_leads_is_that_of_plain_draws_taken_twice() -> None:
+    # Fourteen outputs, of which one has nine tenths of its variance from it: the search once left for infinity.
+    rng, count, k = np.random.default_rng(41), 400_000, np.zeros(14)
+    k[-1], k[7], k[10] = math.sqrt(0.9), 0.7, 0.5
+    known_part, shared = 1.0 - k**2, k**2
+    factors = region_factors(
+        [
+            BudgetLine("readings", np.diag(known_part), math.inf, Estimated.SCALE),
+            BudgetLine("scatter", np.outer(k, k), 1.0, Estimated.SCALE),
+        ]
+    )
+
+    def quantile(true: np.ndarray) -> float:
+        e = np.sqrt(known_part) * rng.standard_normal((count, 14))
+        e += k * (np.sqrt(true) * rng.standard_normal(count))[:, None]
+        u = np.sqrt(known_part + shared * (true * rng.chisquare(1.0, count))[:, None])
+        return float(np.quantile(np.max(np.abs(e) / u, axis=1), 0.95))
+
+    first, second = quantile(np.ones(count)), quantile(rng.chisquare(1.0, count))
+    assert factors.k_q == pytest.approx(first * first / second, rel=0.02)
+
+
+def test_parts_of_one_estimate_say_no_more_than_one() -> None:
+    readings = BudgetLine("readings", np.array([[1.0]]), 8.0)
+    others = BudgetLine("others", np.array([[1.0]]), 8.0, estimated_with="readings")
+    (both,) = one_of_each_estimate([readings, others])
+    assert (both.source, both.dof, both.covariance.item()) == ("readings", 8.0, 2.0)

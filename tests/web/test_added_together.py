@@ -27,7 +27,7 @@ def test_ticked_effects_are_one_version_by_rank(own: Any) -> None:
         "/model/add", data={**form, "ticked-10": "load_N:sin1", "ticked-2": "load_N:poly2"}
     )
     assert answer.status_code == 303
-    assert "load_N%3Apoly2%2C+load_N%3Asin1+were+added" in answer.headers["location"]
+    assert "load_N:poly2, load_N:sin1 were added" in own.client.get(answer.headers["location"]).text
     versions = [model for model in own.ask("models")[1]["models"] if model["name"] == "curve"]
     assert [version["added"] for version in versions] == [[], ["load_N:poly2", "load_N:sin1"]]
 
@@ -42,10 +42,12 @@ def test_without_a_tick_nothing_is_made_and_it_is_said(own: Any) -> None:
 
 def test_after_a_change_of_the_model_the_first_page_can_be_brought_up_to_it(own: Any) -> None:
     """The fleet has numbers of the newest version alone: whoever adds an effect emptied it and was not told."""
-    text = own.client.get("/model", params={"campaign": "hidden-spindle-growth", "note": "x was added"}).text
+    form = {"proof": own.proof(), "once": "c", "campaign": "hidden-spindle-growth", "to": "samba"}
+    text = own.sent("/model/add", data={**form, "effect": "EZC1:const@warmup"}).text
+    assert "✓ EZC1:const@warmup was added: the model is now samba@2" in text
     assert re.search(r'action="/fleet/identify".*?identify every campaign with it', text, re.DOTALL)
     for address in (
         {"campaign": "hidden-spindle-growth"},
-        {"campaign": CURVE, "note": "x was added"},
+        {"campaign": CURVE, "changed": "1"},
     ):
         assert "identify every campaign with it" not in own.client.get("/model", params=address).text

@@ -190,6 +190,28 @@ def test_the_methods_own_model_has_none(stated) -> None:
     assert effects_of(db, answers["samba"]) is None
 
 
+def test_an_effect_of_which_the_joint_region_has_one_coefficient_keeps_the_other_on_the_paper(stated) -> None:
+    """Beside a tenth harmonic that is determined stand its sine without a number, and all of a first harmonic."""
+    db, answers = stated
+    evaluated = answers["with-backlash"]
+    guf = evaluated.answer.guf
+    cosine = "EBB:harmonic10.cos"
+    answer = replace(
+        evaluated.answer,
+        effects=(cosine,),
+        units={**evaluated.answer.units, cosine: "µrad"},
+        guf=replace(guf, estimate={**guf.estimate, cosine: 3.0}, u={**guf.u, cosine: 0.2}),
+    )
+    texts = ("EBB:harmonic1", "EBB:harmonic10")
+    model = replace(evaluated.model, name="none stored", effects=texts, added=texts)
+    effects = effects_of(db, StatedUncertainty(evaluated.campaign, model, answer))
+    assert [(effect.name, effect.value) for effect in effects] == [
+        (cosine, 3.0),
+        ("EBB:harmonic1", None),
+        ("EBB:harmonic10.sin", None),
+    ]
+
+
 def test_u_of_the_mean_is_that_of_days_that_differ_more_than_runs() -> None:
     values, days = np.array([1.0, 1.0, 3.0, 3.0]), np.array([0, 0, 1, 1])
     assert _u_of_mean(values, np.full(4, 0.1), days) == pytest.approx(1.0)

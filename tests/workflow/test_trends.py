@@ -188,7 +188,7 @@ def test_too_little_history_is_a_sentence_for_each_item_and_no_number(made: Data
     assert found["slope_per_year"] is None
     assert found["crosses_limit_at"] is None
     assert found["why"] == "1 day of history is too short for a slope a year; at least 30 are needed"
-    assert found["why_no_changes"].startswith("no search for changes: times has 3 values")
+    assert found["why_no_changes"].startswith("no search for changes: too few runs (3); at least 6")
     assert found["why_no_cycles"].startswith("no cycles: a daily one needs")
     assert found["why_no_warm_up"].startswith("no warm-up:")
     assert found["why_no_forecast"] == "no forecast: there is no drift to extrapolate"

@@ -98,6 +98,8 @@ def test_zips_and_lone_workbooks(path: Path, tmp_path: Path) -> None:
     shutil.make_archive(str(folder / "cell"), "zip", EXAMPLES, "load-cell")
     (folder / "cut.zip").write_bytes((folder / "cell.zip").read_bytes()[:500])
     (folder / "alone.xlsx").write_bytes(b"")
+    (folder / "loose.csv").write_bytes(b"")
+    (folder / "truth.csv").write_bytes(b"")
     answer = look(path, folder)
     assert [(campaign.campaign, campaign.rows, campaign.identified) for campaign in answer.arrived] == [
         ("load-cell", 44, True)
@@ -105,7 +107,10 @@ def test_zips_and_lone_workbooks(path: Path, tmp_path: Path) -> None:
     assert [
         "a workbook alone is no campaign" in answer.refused[0].why,
         "was cut off" in answer.refused[1].why,
-    ]
+        "a table alone is no campaign" in answer.refused[2].why,
+    ] == [True] * 3
+    # What a rehearsal writes beside its folders is nobody's campaign.
+    assert len(answer.refused) == 3
     assert not look(path, folder).news
 
 

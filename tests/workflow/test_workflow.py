@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -173,6 +174,21 @@ def test_events_need_words_and_a_machine(db: Database) -> None:
     with pytest.raises(NotFoundError, match="there is no machine 'NOPE'; there are HU40-T"):
         event(db, EventRequest("NOPE"))
     assert event(db, EventRequest("HU40-T")).events == ()
+    unsaid: tuple[dict[str, Any], ...] = ({"at": at}, {"kind": "crash"})
+    for without_words in unsaid:
+        with pytest.raises(InputError, match="say in words what happened"):
+            event(db, EventRequest("HU40-T", **without_words))
+
+
+def test_an_event_before_all_runs_is_recorded_with_a_word(tmp_path: Path) -> None:
+    """A mistyped year cannot be undone, and nothing was said."""
+    with Database(tmp_path / "one.duckdb") as db:
+        import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
+        early = event(db, EventRequest("HU40-T", "belt", datetime(1926, 3, 5, tzinfo=UTC), "repair"))
+        assert early.notes[0].startswith("recorded, and it lies before the first run of HU40-T (20")
+        late = event(db, EventRequest("HU40-T", "belt", datetime.now(UTC), "repair"))
+        assert late.notes == ()
+        assert len(late.events) == 2
 
 
 @pytest.mark.slow

@@ -50,6 +50,8 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     output.listing(answer.events, "nothing was recorded yet")
+    for note in answer.notes:
+        output.say(f"note: {note}")
     if options.text is not None and options.kind == NOTE:
         output.say(
             "recorded as a note, which does not split the history; "

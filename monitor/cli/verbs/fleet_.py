@@ -7,6 +7,7 @@ Of each machine the days since its last recorded event count (`monitor event`).
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Container
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
@@ -14,6 +15,7 @@ from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.reporting.messages import (
     attention_words,
+    campaigns_of_same_hours,
     machines_lacking,
     machines_refuted,
     numbers_of_older_version,
@@ -26,6 +28,8 @@ EXAMPLE = "monitor fleet --top 50"
 
 #: Campaigns that are named where they lack numbers.
 MOST_NAMED = 10
+#: What is said of a machine whose campaigns cannot all be its own.
+SAME_HOURS = "campaigns overlap"
 #: What a machine is called of which nothing was identified.
 NOT_JUDGED = "not judged: not identified"
 
@@ -89,7 +93,10 @@ def _table(answer: FleetAnswer, most: int) -> None:
         "q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "relative to", "unit", "latest", "mean", "s runs", "s days",
          "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
-        [*(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named), *(_cells(row) for row in answer.table)],
+        [
+            *(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named),
+            *(_cells(row, answer.same_hours or ()) for row in answer.table),
+        ],
         text_columns=6,
     )  # fmt: skip
     if len(named) < len(without):
@@ -105,6 +112,9 @@ def _say_of_machines(answer: FleetAnswer) -> None:
             output.say(numbers_of_older_version(machine, version.model, version.newest))
     if len(older) > MOST_NAMED:
         output.say(f"so are those of {len(older) - MOST_NAMED} more machines; --json names all")
+    for machine, groups in list((answer.same_hours or {}).items())[:MOST_NAMED]:
+        for campaigns in groups:
+            output.say(campaigns_of_same_hours(machine, campaigns))
     for machine, name in (answer.tolerances_of_type or {}).items():
         output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
     if answer.models_refuted:
@@ -114,9 +124,11 @@ def _say_of_machines(answer: FleetAnswer) -> None:
         output.say(machines_lacking(answer.models_lacking, MOST_NAMED))
 
 
-def _cells(row: FleetTableRow) -> list[str]:
+def _cells(row: FleetTableRow, same_hours: Container[str]) -> list[str]:
+    attention = attention_words(row.attention, row.season_not_told)
     return [
-        str(row.rank), row.machine, row.parameter, attention_words(row.attention, row.season_not_told),
+        str(row.rank), row.machine, row.parameter,
+        f"{attention}; {SAME_HOURS}" if row.machine in same_hours else attention,
         row.refers_to or "", row.unit,
         _three(row.latest), _three(row.mean),
         "-" if row.sd_pooled is None else output.two_digits(row.sd_pooled),

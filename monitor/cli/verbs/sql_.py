@@ -13,6 +13,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
+from monitor.exceptions import InputError
 from monitor.workflow.query import SqlRequest, TableAnswer, sql
 
 EXAMPLE = (
@@ -33,6 +34,8 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    if options.csv and options.json:
+        raise InputError("--csv and --json are two forms of one answer; type one of them")
     query = sys.stdin.read() if options.query == "-" else options.query
     as_table = not (options.csv or options.json)
     limit = SHOWN if options.limit is None and as_table else options.limit

@@ -313,8 +313,11 @@ class InstrumentProblem(ChainProblem):
     def _first_order(
         self, setup: str, shown: Shown, derivatives: Array, pose: ChainPose, at: npt.NDArray[np.int64]
     ) -> npt.NDArray[np.bool_]:
-        """Which errors (J, 2, 6) a setup reads more of than products of errors, as it was first looked at."""
-        if self.has_products:
+        """Which errors (J, 2, 6) a setup reads more of than products of errors, as it was first looked at.
+
+        A setup without rows shows nothing here; that says nothing of what it reads in other runs.
+        """
+        if self.has_products or not len(at):
             return np.ones(derivatives.shape[2:], dtype=bool)
         if setup not in self._masks:
             self._masks[setup] = first_order(shown, derivatives, pose, at)
@@ -391,6 +394,9 @@ class InstrumentProblem(ChainProblem):
     def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
         """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
         separated = self._separated_of(rows, run)
+        if not self.has_products and any(len(part.at) and part.id not in self._masks for part in self.parts):
+            # By all rows: what one run shows of a setup would hold for the others, as they come.
+            self.evaluated(self.start, self.common_start, jacobian=True)
         problem = replace(super().taken(rows, run), separated=separated, shares_bars=False, masks=self._masks)
         index = np.searchsorted(problem.runs, run)
         parts = []

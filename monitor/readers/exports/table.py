@@ -26,8 +26,8 @@ from monitor.readers.export import Export, ExportFile, ExportFormat
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import foreign_unit
-from monitor.readers.spreadsheet import sheet_rows
 from monitor.readers.toml_table import Table
+from monitor.readers.workbook import read_sheet
 
 _WORKBOOKS = (".xlsx", ".xlsm")
 #: What a date at the head of an export is called.
@@ -87,8 +87,8 @@ def choice(table: Table, key: str, choices: dict[str, str]) -> str | None:
 def read(file: ExportFile, how: TableSettings, faults: Faults) -> Export | None:
     """Read the one table of a file; None with the faults noted."""
     if file.name.casefold().endswith(_WORKBOOKS):
-        cells = sheet_rows(file.name, file.content, how.sheet, faults)
-        text = None if cells is None else "\n".join("\t".join(map(_one_line, row)) for row in cells)
+        sheet = read_sheet(file.name, file.content, how.sheet, faults)
+        text = None if sheet is None else "\n".join("\t".join(map(_one_line, row)) for row in sheet.rows)
         encoding, style = "workbook of Excel", Style("\t", ".")
     else:
         decoded = decode_foreign(file.name, file.content, faults)

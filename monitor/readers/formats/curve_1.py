@@ -59,11 +59,11 @@ def read(folder: Path) -> CurveCampaign:
     faults = Faults((TOML, DATA))
     content = read_bytes(folder, TOML, LARGEST_TOML, faults)
     toml = None if content is None else decode(TOML, content, faults)
-    source, data_file = read_table(folder, DATA, faults)
+    rows = read_table(folder, DATA, faults)
     head_file = None if content is None else SourceFile(TOML, content)
-    files = tuple(file for file in (head_file, source) if file is not None)
+    files = tuple(file for file in (head_file, rows.source) if file is not None)
     top = None if toml is None else parse_toml(TOML, toml, faults)
-    table = None if data_file is None else parse_csv(DATA, data_file, faults)
+    table = None if rows.text is None else parse_csv(DATA, rows.text, faults, of_workbook=rows.of_workbook)
     head = _Head() if top is None else _head(top)
     columns = CurveColumns()
     if table is not None and head.settings is not None and top is not None:
@@ -71,8 +71,7 @@ def read(folder: Path) -> CurveCampaign:
         if len(table) and _check_settings(top, head.settings, table):
             columns = read_columns(table, head.settings, faults)
     if len(faults):
-        read_from = {} if source is None else {DATA: source.name}
-        raise CampaignError(str(folder), renamed(faults.sorted(), read_from))
+        raise CampaignError(str(folder), renamed(faults.sorted(), {DATA: rows}))
     return _campaign(head, table, columns, files)
 
 

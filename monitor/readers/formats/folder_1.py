@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from monitor.exceptions import CampaignError
@@ -11,7 +12,7 @@ from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.faults import Faults
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader
-from monitor.readers.spreadsheet import read_table, renamed
+from monitor.readers.spreadsheet import TableText, read_table, renamed
 from monitor.readers.toml_table import parse_toml
 from monitor.records import Campaign, SourceFile
 
@@ -23,29 +24,27 @@ def read(folder: Path) -> Campaign:
     """Read the campaign of a folder. Raises CampaignError with all faults of the folder."""
     faults = Faults(FILES)
     content = read_bytes(folder, TOML, LARGEST_TOML, faults)
-    texts = {TOML: None if content is None else decode(TOML, content, faults)}
-    sources = {} if content is None else {TOML: SourceFile(TOML, content)}
-    for name in FILES[1:]:
-        source, texts[name] = read_table(folder, name, faults)
-        if source is not None:
-            sources[name] = source
+    toml = None if content is None else decode(TOML, content, faults)
+    tables = {name: read_table(folder, name, faults) for name in FILES[1:]}
+    sources = [
+        None if content is None else SourceFile(TOML, content),
+        *(table.source for table in tables.values()),
+    ]
     # One workbook may hold both tables.
-    files = tuple({source.name: source for source in sources.values()}.values())
-    toml = texts[TOML]
+    files = tuple({source.name: source for source in sources if source is not None}.values())
     top = None if toml is None else parse_toml(TOML, toml, faults)
     head = EMPTY if top is None else read_head(top)
-    runs_table = _table(runs_file.FILE, texts, faults)
-    table = _table(probings_file.FILE, texts, faults)
+    runs_table = _table(tables, runs_file.FILE, faults)
+    table = _table(tables, probings_file.FILE, faults)
     parts = read_parts(head, runs_table, table, faults)
     if len(faults):
-        read_from = {name: source.name for name, source in sources.items()}
-        raise CampaignError(str(folder), renamed(faults.sorted(), read_from))
+        raise CampaignError(str(folder), renamed(faults.sorted(), tables))
     return campaign_of(head, parts, files)
 
 
-def _table(name: str, texts: dict[str, str | None], faults: Faults) -> CsvTable | None:
-    text = texts.get(name)
-    return None if text is None else parse_csv(name, text, faults)
+def _table(tables: Mapping[str, TableText], name: str, faults: Faults) -> CsvTable | None:
+    table = tables[name]
+    return None if table.text is None else parse_csv(name, table.text, faults, of_workbook=table.of_workbook)
 
 
 READER = Reader(

@@ -120,6 +120,23 @@ def _chosen(db: Database, tables: Sequence[str] | None, machine: str | None) -> 
     return relations
 
 
+def tables_without_rows(db: Database, tables: Sequence[str], machine: str | None) -> tuple[str, ...]:
+    """The tables and views of those that are named which have no row, of a machine where one is named and they have
+    one. Raises NotFoundError for a table that is not there."""
+    return tuple(
+        name
+        for name in _chosen(db, tables, machine)
+        if not db.rows(f'SELECT 1 FROM "{name}"{_of_machine(db, name, machine)} LIMIT 1')
+    )
+
+
+def _of_machine(db: Database, name: str, machine: str | None) -> str:
+    """The condition for the rows of a machine, which COPY cannot bind; empty where there is none."""
+    if machine is None or not _has_machine(db, name):
+        return ""
+    return " WHERE machine = '{}'".format(machine.replace("'", "''"))
+
+
 def _has_machine(db: Database, name: str) -> bool:
     return bool(
         db.rows(
@@ -143,9 +160,7 @@ def _copy(db: Database, name: str, folder: Path, form: str, machine: str | None)
         columns.append(_column(column, kind) if form == "csv" else f'"{column}"')
     # The names come from the catalogue; path and machine, which COPY cannot bind, are quoted.
     literal = str(path).replace("'", "''")
-    where = ""
-    if machine is not None and _has_machine(db, name):
-        where = " WHERE machine = '{}'".format(machine.replace("'", "''"))
+    where = _of_machine(db, name, machine)
     db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\"{where}) TO '{literal}' ({_OPTIONS[form]})")
     return path
 

@@ -30,8 +30,9 @@ def address_of_files(files: str) -> str:
     if scheme is None:
         folder = Path(files).resolve()
         # Asked before a lake is made that would look for its files there ever after.
-        nearest = next(path for path in (folder, *folder.parents) if path.exists())
-        if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+        # By way of `os.path`: pathlib raises for what lies in a folder that this user may not enter.
+        nearest = next(path for path in (folder, *folder.parents) if os.path.exists(path))
+        if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
             raise InputError(f"--files {files}: nothing can be written to {nearest}")
         return str(folder)
     if scheme[0].lower() != SCHEME:

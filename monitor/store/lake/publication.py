@@ -64,8 +64,11 @@ _LASTING = re.compile(
     r"|authentication failed|no password supplied|no pg_hba\.conf entry|fatal: [^:]* does not exist"
     r"|name or service not known|invalid (connection option|integer value|port number)"
     r"|does not support ssl|certificate verify failed|root certificate file"
-    r"|permission denied|must be owner|read-only (transaction|file system)|no space left"
+    r"|permission denied|must be owner|read-only file system|no space left"
 )
+#: What a standby server says until it is promoted, which takes seconds, and one that is only read, which stays: it is
+#: tried so often, for 7 to 21 s (the pauses are drawn).
+_STANDBY, _TRIES_OF_STANDBY = "read-only transaction", 13
 #: How DuckLake names the statement that its catalogue refused.
 _QUERY = re.compile(r'Failed to execute query ".*": (?=ERROR)', re.DOTALL)
 #: After how many seconds of trying somebody who waits is told.
@@ -174,7 +177,7 @@ class _Publisher:
                 return attempt()
             except (duckdb.Error, StoreError) as fault:
                 self._roll_back()
-                if not remaining or not _may_pass(str(fault)):
+                if not remaining or not _may_pass(str(fault), _TRIES - remaining):
                     if isinstance(fault, StoreError):
                         raise
                     raise StoreError(
@@ -354,12 +357,16 @@ class _Publisher:
         return int(copied)
 
 
-def _may_pass(message: str) -> bool:
-    """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away.
+def _may_pass(message: str, tries: int) -> bool:
+    """Whether a fault may be gone with the next try, after so many ``tries``: a conflict with another writer, or a lake
+    that was away.
 
-    Whom a server does not let in, or what it does not have, stays so.
+    Whom a server does not let in, or what it does not have, stays so. DuckDB gives the words of a server without its
+    SQLSTATE: those of one that speaks another language are not told apart.
     """
     said = message.lower()
+    if _STANDBY in said:
+        return tries < _TRIES_OF_STANDBY
     return _LASTING.search(said) is None and any(phrase in said for phrase in _PASSING)
 
 

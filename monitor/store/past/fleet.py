@@ -83,6 +83,16 @@ class TemperatureSums:
 
 
 @dataclass(frozen=True)
+class GroupHours:
+    """A group of runs of a machine, from its first start to its last, in days since 1970."""
+
+    machine: str
+    campaign: str
+    began_d: float
+    ended_d: float
+
+
+@dataclass(frozen=True)
 class FleetSums(GroupSums):
     """Sufficient statistics of c cells, one a machine and parameter; every array is (c,), in display units.
 
@@ -90,9 +100,12 @@ class FleetSums(GroupSums):
     to ``sum_tm`` are sums over the groups of t, t², m, m² and t m, with t in days since ``epoch_d`` and m the mean
     of the group less the origin. ``last_d`` is when the machine's last day began (days since 1970), ``latest`` the
     mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where the parameter was refused
-    there. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it are
-    left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs without a
-    break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within it).
+    there. Groups of other campaigns that overlap that day are part of it: ``latest_groups`` counts them all,
+    ``latest_m`` and ``latest_mm`` are the sums of their m and m². ``same_hours`` are the groups of machines of which
+    some overlap. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it
+    are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
+    without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
+    it).
     """
 
     machine: npt.NDArray[np.str_]
@@ -108,12 +121,16 @@ class FleetSums(GroupSums):
     last_d: Array
     latest: Array
     latest_runs: Array
+    latest_groups: Array
+    latest_m: Array
+    latest_mm: Array
     since_d: Array
     first_d: Array
     beyond_d: Array
     repeated_sums: RepeatedSums
     temperatures: TemperatureSums
     blocks: FleetBlocks
+    same_hours: tuple[GroupHours, ...]
 
 
 def fleet_sums(
@@ -134,14 +151,16 @@ def fleet_sums(
     parameter are in display units. Raises NotFoundError where nothing was identified.
     """
     with db.reading():
-        epoch_d, columns, of_blocks = _summed(db, (model, version), cut, limits)
-    return _sums(columns, _blocks(of_blocks, columns), epoch_d)
+        epoch_d, columns, of_blocks, same_hours = _summed(db, (model, version), cut, limits)
+    return _sums(columns, _blocks(of_blocks, columns), epoch_d, same_hours)
 
 
 def _summed(
     db: Database, of: tuple[str | None, int | None], cut: BlockCut, limits: Mapping[tuple[str, str], float]
-) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """Return first day, columns of all cells and of their blocks, by way of tables that live as long as the connection.
+) -> tuple[float, dict[str, Any], dict[str, Any], tuple[GroupHours, ...]]:
+    """Return first day, columns of all cells and of their blocks, and the groups of machines of which some overlap.
+
+    The tables on the way live as long as the connection.
 
     ``of`` are a model and its version.
     """
@@ -177,9 +196,10 @@ def _summed(
         {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
         for query in (queries.TOGETHER, queries.OF_BLOCKS)
     )
+    same_hours = tuple(GroupHours(*row) for row in db.rows(queries.SAME_HOURS))
     for name in queries.TABLES:
         db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
-    return epoch_d, columns, of_blocks
+    return epoch_d, columns, of_blocks, same_hours
 
 
 def _blocks(
@@ -196,7 +216,12 @@ def _blocks(
     return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis], degrees)
 
 
-def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, epoch_d: float) -> FleetSums:
+def _sums(
+    columns: Mapping[str, npt.NDArray[np.generic]],
+    blocks: FleetBlocks,
+    epoch_d: float,
+    same_hours: tuple[GroupHours, ...],
+) -> FleetSums:
     number = {
         name: np.asarray(column, dtype=np.float64)
         for name, column in columns.items()
@@ -228,6 +253,9 @@ def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, e
         last_d=number["last_d"],
         latest=number["latest"] / f,
         latest_runs=number["latest_n"],
+        latest_groups=number["latest_k"],
+        latest_m=number["latest_m"] / f,
+        latest_mm=number["latest_mm"] / f**2,
         since_d=number["since_d"],
         first_d=epoch_d + number["t_first"],
         beyond_d=number["beyond_d"],
@@ -253,4 +281,5 @@ def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, e
             sum_gm=number["gm"] / f,
         ),
         blocks=blocks,
+        same_hours=same_hours,
     )  # fmt: skip

@@ -57,11 +57,12 @@ WITH latest AS (
                AND (getvariable('version') IS NULL OR identification.model_version = getvariable('version')) END
     GROUP BY campaign_id
 ), span AS (
-    SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
+    SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d,
+           epoch(max(started_at)) / 86400.0 AS ended_d
     FROM run GROUP BY campaign_id
 )
 SELECT CAST(l.identification_id AS INTEGER) AS identification_id, l.campaign_id, n.machine_no, h.heading,
-       s.several_days, s.began_d
+       s.several_days, s.began_d, s.ended_d
 FROM latest AS l
 JOIN campaign AS c ON c.campaign_id = l.campaign_id
 JOIN span AS s ON s.campaign_id = l.campaign_id
@@ -129,20 +130,34 @@ GROUP BY campaign_id, runs HAVING count(*) = runs
 # A group is a campaign, or a day of a campaign that has several: `places` are then its runs among those identified.
 GROUPS = """
 CREATE OR REPLACE TEMP TABLE fleet_group AS
-SELECT identification_id, machine_no, heading, began_d, CAST(NULL AS BIGINT[]) AS places, degc
+SELECT identification_id, campaign_id, machine_no, heading, began_d, ended_d, CAST(NULL AS BIGINT[]) AS places, degc
 FROM fleet_chosen LEFT JOIN fleet_campaign_temperature USING (campaign_id) WHERE NOT several_days
 UNION ALL
-SELECT identification_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
+SELECT identification_id, campaign_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
+       epoch(max(started_at)) / 86400.0,
        coalesce(list(place) FILTER (place IS NOT NULL), []),
        CASE WHEN count(degc) = count(*) THEN avg(degc) END
 FROM (
-    SELECT c.identification_id, c.machine_no, c.heading, r.day, r.started_at, list_position(v.runs, r.run) AS place,
-           d.degc
+    SELECT c.identification_id, c.campaign_id, c.machine_no, c.heading, r.day, r.started_at,
+           list_position(v.runs, r.run) AS place, d.degc
     FROM fleet_chosen AS c JOIN run AS r USING (campaign_id) JOIN identified_values AS v USING (identification_id)
     LEFT JOIN fleet_temperature AS d ON d.campaign_id = c.campaign_id AND d.run = r.run
     WHERE c.several_days
 )
-GROUP BY identification_id, machine_no, heading, day
+GROUP BY identification_id, campaign_id, machine_no, heading, day
+"""
+
+# Every day of the machines of which days of two campaigns overlap: a day overlaps an earlier one where it begins before
+# that ends.
+SAME_HOURS = """
+WITH followed AS (
+    SELECT machine_no, began_d,
+           max(ended_d) OVER (PARTITION BY machine_no ORDER BY began_d, ended_d
+                              ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING) AS ended_before_d
+    FROM fleet_group
+)
+SELECT machine, campaign, began_d, ended_d FROM fleet_group JOIN campaign USING (campaign_id)
+WHERE machine_no IN (SELECT machine_no FROM followed WHERE began_d <= ended_before_d)
 """
 
 # A recorded event splits the history of a machine, as in `monitor trend`: groups that began before the last event count
@@ -211,16 +226,21 @@ FROM (
 )
 """
 
-# The last day of each machine: of every parameter what it found.
+# The last day of each machine, that of its last run: of every parameter what it found. A day of another campaign that
+# overlaps it is part of it, as in `monitor trend`: which of two was stored first says nothing.
 LATEST = f"""
 CREATE OR REPLACE TEMP TABLE fleet_latest AS
-WITH last AS (
-    SELECT *, 0 AS block FROM fleet_group
-    SEMI JOIN (SELECT machine_no, max(began_d) AS began_d FROM fleet_group GROUP BY machine_no)
-    USING (machine_no, began_d)
-    QUALIFY row_number() OVER (PARTITION BY machine_no ORDER BY identification_id DESC) = 1
+WITH ends AS (
+    SELECT machine_no, max(ended_d) AS ended_d FROM fleet_group GROUP BY machine_no
+), begins AS (
+    SELECT machine_no, min(began_d) AS last_began_d FROM fleet_group JOIN ends USING (machine_no, ended_d)
+    GROUP BY machine_no
+), last AS (
+    SELECT fleet_group.*, 0 AS block FROM fleet_group JOIN begins USING (machine_no) WHERE ended_d >= last_began_d
 )
-{LISTS.format(groups="last")}
+SELECT cell, max(began_d) AS began_d, flatten(list(x)) AS x,
+       list(list_avg(x)) FILTER (list_count(x) > 0) AS means
+FROM ({LISTS.format(groups="last")}) GROUP BY cell
 """
 
 # Limits of the absolute values, in display units.
@@ -293,7 +313,9 @@ GROUP BY cb, n
 TOGETHER = f"""
 WITH latest AS (
     SELECT cell, began_d AS last_d, list_count(x) AS latest_n,
-           list_avg(list_transform(x, lambda value: value - origin)) AS latest
+           list_avg(list_transform(x, lambda value: value - origin)) AS latest, len(means) AS latest_k,
+           list_sum(list_transform(means, lambda value: value - origin)) AS latest_m,
+           list_sum(list_transform(means, lambda value: (value - origin) * (value - origin))) AS latest_mm
     FROM fleet_latest JOIN fleet_origin USING (cell)
 ), part AS (
     SELECT cb >> {BLOCK_BITS} AS cell, n, sum(k) AS k, min(t_first) AS t_first, sum(v) AS v, min(least) AS least,
@@ -326,7 +348,8 @@ WITH latest AS (
 )
 SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
-       coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d,
+       coalesce(l.latest_n, 0) AS latest_n, coalesce(l.latest_k, 0) AS latest_k, coalesce(l.latest_m, 0.0) AS latest_m,
+       coalesce(l.latest_mm, 0.0) AS latest_mm, coalesce(e.since_d, 'nan') AS since_d,
        coalesce(b.beyond_d, 'nan') AS beyond_d,
        coalesce(h.channel, '') AS thermometer
 FROM summed AS p

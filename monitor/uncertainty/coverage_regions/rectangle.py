@@ -27,7 +27,9 @@ _WORK, _FEWEST_TRIALS, _MOST_TRIALS = 2.5e4, 50, 5000
 #: So many outputs lead in a group of trials.
 _MOST_LEADING = 24
 #: The search ends where the tail is within this part of what is wanted, or after so many steps.
-_SOLVED, _MOST_STEPS = 1e-3, 12
+_SOLVED, _MOST_STEPS = 1e-3, 24
+#: A tail below this is none, and the square of a factor of which no end is known is taken so many times as large.
+_LEAST_TAIL, _FARTHER = 1e-12, 4.0
 
 
 @dataclass(frozen=True)
@@ -195,13 +197,27 @@ def _quantile(rng: np.random.Generator, world: Sequence[Part], count: int, p: fl
 
 
 def _solved(beyond: Callable[[float], float], tail: float, outputs: int) -> float:
-    """Return k with ``beyond(k) = tail``: the logarithm of a tail is nearly straight in k²."""
+    """Return k with ``beyond(k) = tail``: the logarithm of a tail is nearly straight in k².
+
+    Of heavy tails it is not: a step that leaves what the values so far enclose goes to the middle of that, or so many
+    times farther out as long as no end is known there.
+    """
+
+    def over(square: float) -> float:
+        return math.log(max(beyond(math.sqrt(square)), _LEAST_TAIL) / tail)
+
     low = rectangle_factor(1, 1.0 - tail)
-    ends = [(k * k, math.log(beyond(k) / tail)) for k in (low, rectangle_factor(outputs + 1, 1.0 - tail))]
+    ends = [(k * k, over(k * k)) for k in (low, rectangle_factor(outputs + 1, 1.0 - tail))]
     for _ in range(_MOST_STEPS):
         (first, at_first), (second, at_second) = ends[-2:]
-        if abs(at_second) < _SOLVED or at_first == at_second:
+        if abs(at_second) < _SOLVED:
             break
-        square = max(second - at_second * (second - first) / (at_second - at_first), 0.25 * low * low)
-        ends.append((square, math.log(max(beyond(math.sqrt(square)), 1e-12) / tail)))
+        inside = max((square for square, at in ends if at > 0.0), default=0.25 * low * low)
+        outside = min((square for square, at in ends if at < 0.0), default=math.inf)
+        farthest = outside if math.isfinite(outside) else _FARTHER * inside
+        flat = at_first == at_second
+        square = math.inf if flat else second - at_second * (second - first) / (at_second - at_first)
+        if not inside < square < farthest:
+            square = 0.5 * (inside + outside) if math.isfinite(outside) else farthest
+        ends.append((square, over(square)))
     return math.sqrt(min(ends, key=lambda end: abs(end[1]))[0])

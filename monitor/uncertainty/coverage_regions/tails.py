@@ -45,7 +45,7 @@ def normal_tails(outputs: int) -> Callable[[float], float]:
 def tails_of(parts: Sequence[PartTails], p: float, shift: float = 0.5) -> tuple[Tails, Tails]:
     """Return the sum of tails beyond k where the ``parts`` are true, and where an estimate of them is taken for true.
 
-    For k between that of one output and that at which the sum is 1 - ``p``. Both are of the same points, so that what
+    Fastest for k between that of one output and that at which the sum is 1 - ``p``. Both are of the same points, so that what
     they have in common falls out of a quotient of their factors; another ``shift`` of the points says how well they do.
     """
     estimated = [part for part in parts if math.isfinite(part.dof)]
@@ -84,7 +84,13 @@ def _sum_of_tails(ratios: Array, p: float) -> Tails:
     line = np.polynomial.Chebyshev.fit(
         squares, [logarithm(square) for square in squares], _DEGREE, [low, high]
     )
-    return lambda k: math.exp(float(line(k * k)))
+
+    def tails(k: float) -> float:
+        # Outside of its nodes the polynomial says nothing: there it may turn and rise without bound.
+        square = k * k
+        return math.exp(float(line(square)) if low <= square <= high else logarithm(square))
+
+    return tails
 
 
 def _chi_square(probability: Array, freedom: float) -> Array:

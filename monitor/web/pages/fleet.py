@@ -23,6 +23,7 @@ from monitor.web.words import (
     DOES_NOT_FIT,
     NOT_IDENTIFIED,
     NOT_MEASURED,
+    STOP,
     UNEXPLAINED,
     URGENCIES,
     WITHOUT_NUMBERS,
@@ -58,7 +59,8 @@ class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
     numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it: numbers that
-    ask for nothing do not make such a machine usual. ``topology`` and ``parameters`` name the parameters."""
+    ask for nothing do not make such a machine usual. ``same_hours`` are campaigns that it cannot all have made, of
+    which its numbers are mixed. ``topology`` and ``parameters`` name the parameters."""
 
     machine: str
     plant: str
@@ -71,12 +73,21 @@ class MachineRow:
     others: tuple[FleetTableRow, ...]
     latest: str
     unexplained: str = ""
+    same_hours: tuple[str, ...] = ()
     topology: str = ""
     parameters: frozenset[str] = frozenset()
 
+    @property
+    def next_step(self) -> str:
+        """What its class asks for; where its numbers are mixed only what cannot wait until the campaign is chosen."""
+        return "" if self.same_hours and self.urgency.colour != STOP else self.urgency.next_step
+
 
 def machine_rows(
-    table: Iterable[FleetTableRow], described: Mapping[str, Mapping[str, Any]], unexplained: Mapping[str, str]
+    table: Iterable[FleetTableRow],
+    described: Mapping[str, Mapping[str, Any]],
+    unexplained: Mapping[str, str],
+    same_hours: Mapping[str, tuple[tuple[str, ...], ...]],
 ) -> list[MachineRow]:
     """Return a row a machine, in the order of the table, which has the most urgent first."""
     rows: dict[str, list[FleetTableRow]] = {}
@@ -101,6 +112,7 @@ def machine_rows(
             others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < _USUAL),
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
             unexplained=unexplained.get(machine, ""),
+            same_hours=tuple(name for group in same_hours.get(machine, ()) for name in group),
             topology=str(described.get(machine, {}).get("topology") or ""),
             parameters=frozenset(row.parameter for row in of_machine),
         )
@@ -171,9 +183,8 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
     if (answer := sums.answer) is not None:
         refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
         unexplained = {**(answer.models_lacking or {}), **refuted}
-        rows = machine_rows(
-            answer.table, {str(row["machine"]): row for row in _described(machines)}, unexplained
-        )
+        by_name = {str(row["machine"]): row for row in _described(machines)}
+        rows = machine_rows(answer.table, by_name, unexplained, answer.same_hours or {})
     rows += unnumbered_rows(machines, {row.machine for row in rows})
     ranks = {label: rank for rank, label in enumerate(CLASSES)}
     return sorted(rows, key=lambda row: ranks[row.attention])

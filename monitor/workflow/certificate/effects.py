@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.methods import campaign_method
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.store import Database, MachineHistory, machine_history
 from monitor.workflow.identify.answer import Estimate, reversal_value
+from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 
@@ -22,44 +24,44 @@ def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect,
     Those among the results have their value from there. Of another the value is the mean of what the runs of the
     campaign say, each by itself; its u is the largest of what the noise of the readings, the scatter of the runs and
     that of the days' means leave of such a mean. One of a campaign that is not identified under the model is named
-    without a value.
+    without a value, and so is a coefficient of which nothing is known beside others of the same effect.
     """
-    joint = _joint(evaluated)
-    shared = _shared(evaluated, joint)
-    if not shared:
+    names_of = _coefficients(evaluated)
+    if not names_of:
         return None
-    others = [text for text in shared if not any(name.startswith(text) for name in joint)]
+    joint = _joint(evaluated)
     outside = evaluated.answer.effects_outside
-    alone = _from_history(db, evaluated, others) if others else ()
+    others = {text: [name for name in names if name not in joint] for text, names in names_of.items()}
+    values = _from_history(db, evaluated, [name for names in others.values() for name in names])
+    alone: list[ModelEffect] = []
+    for text, names in others.items():
+        stated = [values[name] for name in names if name in values]
+        unstated = [name for name in names if name not in values]
+        # An effect of which nothing is known is named as a whole.
+        whole = len(unstated) == len(names_of[text])
+        alone += [*stated, *(ModelEffect(name) for name in ([text] if whole else unstated))]
     return (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
 
 
-def _names_of_run(evaluated: StatedUncertainty, joint: Mapping[str, ModelEffect]) -> set[str]:
-    """The parameters of the run itself, with a number and without."""
-    refused = (name for group in evaluated.answer.refused for name in group.parameters)
-    return {*(name for name in evaluated.names if name not in joint), *refused}
-
-
-def _shared(evaluated: StatedUncertainty, joint: Mapping[str, ModelEffect]) -> list[str]:
-    """The effects of the model, as written, of which no run has parameters of its own."""
-    names = _names_of_run(evaluated, joint)
-    return [text for text in evaluated.model.effects if not any(name.startswith(text) for name in names)]
+def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
+    """The names of the coefficients of every effect that all runs share, by its text; an effect on what did not measure
+    in this campaign by its text alone."""
+    problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
+    names = {added.effect.text: added.names() for added in problem.shared}
+    return {**names, **{text: (text,) for text in problem.left_out if text not in names}}
 
 
 def _from_history(
-    db: Database, evaluated: StatedUncertainty, effects: Sequence[str]
-) -> tuple[ModelEffect, ...]:
-    """Effects as the runs of the campaign have them stored, without a value where none has."""
+    db: Database, evaluated: StatedUncertainty, names: Sequence[str]
+) -> dict[str, ModelEffect]:
+    """Coefficients as the runs of the campaign have them stored; without those of which none has a value."""
+    if not names:
+        return {}
     model, campaign = evaluated.model, evaluated.campaign
-    of_run = _names_of_run(evaluated, {})
     history = machine_history(db, campaign.machine.id, model=model.name, version=model.version)
     history = history.part(history.campaign == campaign.name)
-    stated: list[ModelEffect] = []
-    for text in effects:
-        names = [name for name in history.parameters if name.startswith(text) and name not in of_run]
-        values = [_effect(history, name) for name in names]
-        stated += [effect for effect in values if effect is not None] or [ModelEffect(text)]
-    return tuple(stated)
+    values = {name: _effect(history, name) for name in names if name in history.parameters}
+    return {name: effect for name, effect in values.items() if effect is not None}
 
 
 def _joint(evaluated: StatedUncertainty) -> dict[str, ModelEffect]:

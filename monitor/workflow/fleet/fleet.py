@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
@@ -18,6 +18,7 @@ from monitor.statistics.sufficient import CellDrift, CellTests
 from monitor.store import (
     Database,
     FleetSums,
+    GroupHours,
     fleet_sums,
     latest_frames,
     latest_tolerances,
@@ -44,6 +45,7 @@ from monitor.workflow.fleet.ranking import (
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
+from monitor.workflow.history.runs import overlapping
 from monitor.workflow.models import label_of, resolve
 
 
@@ -160,6 +162,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
+        same_hours=_same_hours(sums.same_hours) or None,
         **_by_their_own_models(db, request.model, numbered),
     )
 
@@ -186,6 +189,15 @@ def _older_versions(db: Database) -> dict[str, tuple[OlderVersion, ...]]:
         older = OlderVersion(f"{row.model}@{row.version}", f"{row.model}@{row.newest}")
         versions[row.machine] = (*versions.get(row.machine, ()), older)
     return versions
+
+
+def _same_hours(groups: Iterable[GroupHours]) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Return by machine the groups of campaigns that it cannot all have made."""
+    days: dict[str, list[tuple[float, float, str]]] = {}
+    for group in groups:
+        days.setdefault(group.machine, []).append((group.began_d, group.ended_d, group.campaign))
+    campaigns = {machine: tuple(overlapping(days[machine])) for machine in sorted(days)}
+    return {machine: of_machine for machine, of_machine in campaigns.items() if of_machine}
 
 
 def _without_numbers(db: Database, numbered: Container[str]) -> tuple[str, ...]:

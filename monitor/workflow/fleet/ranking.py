@@ -135,10 +135,10 @@ def _latest_day(sums: FleetSums, cells: CellTests) -> tuple[Array, Array]:
     """How many standard deviations of the other days the latest one lies from their mean (c,), NaN of few days; and
     the p-value of that (c,), by Student's t distribution with the degrees of freedom of those days."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        # Against the other days: the latest one is taken out of their mean.
-        k = sums.groups
-        others = (sums.sum_m - sums.latest) / (k - 1.0)
-        squares = sums.sum_mm - sums.latest**2 - (k - 1.0) * others**2
+        # Against the other days: the latest one, with those that overlap it, is taken out of their mean.
+        k = sums.groups - sums.latest_groups + 1.0
+        others = (sums.sum_m - sums.latest_m) / (k - 1.0)
+        squares = sums.sum_mm - sums.latest_mm - (k - 1.0) * others**2
         variance = np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0))
         # A day of few runs after days of many: what the mean of its runs scatters more than theirs do.
         fewer = 1.0 / sums.latest_runs - (k - 1.0) / (sums.runs - sums.latest_runs)

@@ -19,7 +19,7 @@ from typing import Any
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.health.letter import not_attached, report_lines, report_subject
-from monitor.toml_text import toml_refusal
+from monitor.toml_text import encoding_refusal, toml_refusal
 from monitor.workflow.health.request import ReportAnswer
 
 #: Port that goes with each kind of security (RFC 8314 section 3.3; RFC 6409; RFC 5321 section 4.5.4.2).
@@ -66,7 +66,7 @@ def read_mail_settings(path: Path) -> MailSettings:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not TOML in UTF-8: {error}") from error
+        raise InputError(encoding_refusal(path, error)) from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(toml_refusal(path, error, text)) from error
     table = tables.get("mail")

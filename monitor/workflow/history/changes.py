@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.lacks import Lack, Part, refused
-from monitor.statistics import Change, History, find_changes
+from monitor.reporting.lacks import Cause, Lack, Part, refused
+from monitor.statistics import FEWEST_RUNS, Change, History, find_changes
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
@@ -84,6 +84,10 @@ class _Plan(NamedTuple):
     u: dict[str, Array]
 
 
+def _too_few(runs: int) -> Lack:
+    return Lack(Part.CHANGES, Cause.FEW_RUNS, count=runs, needed=(FEWEST_RUNS,))
+
+
 def search_changes(
     series: Sequence[Series], events: Sequence[float], *, false_alarm: float = FALSE_ALARM, seed: int = SEED
 ) -> Mapping[str, ChangeSearch]:
@@ -107,7 +111,8 @@ def search_changes(
                 trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),
             )  # fmt: skip
         except DataError as error:
-            results |= dict.fromkeys(plan.values, ChangeSearch(why_none=refused(Part.CHANGES, error)))
+            why = refused(Part.CHANGES, error) if len(t) >= FEWEST_RUNS else _too_few(len(t))
+            results |= dict.fromkeys(plan.values, ChangeSearch(why_none=why))
             continue
         results |= {name: _of_parameter(history, name, plan.begins) for name in plan.values}
     return results

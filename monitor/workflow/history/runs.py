@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -45,8 +45,19 @@ def same_hours(history: MachineHistory) -> list[SameHoursNoted]:
         history.campaign.tolist(), history.day.tolist(), history.seconds.tolist(), strict=True
     ):
         days.setdefault((name, day), []).append(at)
-    stretches = sorted((min(at), max(at), name) for (name, _), at in days.items())
-    group = {name: {name} for name in history.campaign.tolist()}
+    groups = overlapping((min(at), max(at), name) for (name, _), at in days.items())
+    if not groups:
+        return []
+    from monitor.reporting.run_notes import SameHoursNoted
+
+    return [SameHoursNoted(names) for names in groups]
+
+
+def overlapping(days: Iterable[tuple[float, float, str]]) -> list[tuple[str, ...]]:
+    """Return the groups of campaigns of which days overlap, each in the order of names; a day is first start, last
+    start, campaign."""
+    stretches = sorted(days)
+    group = {name: {name} for _, _, name in stretches}
     # In the order of their beginnings, a stretch overlaps an earlier one where it begins before the latest end.
     latest, holder = -np.inf, ""
     for begins, ends, name in stretches:
@@ -56,12 +67,7 @@ def same_hours(history: MachineHistory) -> list[SameHoursNoted]:
                 group[member] = joined
         if ends > latest:
             latest, holder = ends, name
-    groups = {tuple(sorted(names)) for names in group.values() if len(names) > 1}
-    if not groups:
-        return []
-    from monitor.reporting.run_notes import SameHoursNoted
-
-    return [SameHoursNoted(names) for names in sorted(groups)]
+    return sorted({tuple(sorted(names)) for names in group.values() if len(names) > 1})
 
 
 def possible_campaigns(

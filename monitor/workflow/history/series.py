@@ -65,6 +65,20 @@ class Series:
         """The runs that are not marked warm_up, where enough are not: a warming machine is another matter."""
         return self.part(_steady(self.warm_up))
 
+    @property
+    def of_last_day(self) -> npt.NDArray[np.bool_]:
+        """Mask (n,) of the runs of the day of the last run, and of those days of other campaigns that overlap it.
+
+        Of several days that end with the last run it is the one that began first: nothing depends on the order in
+        which campaigns were stored.
+        """
+        _, day = np.unique(self.days, return_inverse=True)
+        began, ended = np.full(day.max() + 1, np.inf), np.full(day.max() + 1, -np.inf)
+        np.minimum.at(began, day, self.t)
+        np.maximum.at(ended, day, self.t)
+        mask: npt.NDArray[np.bool_] = (ended >= began[ended == ended.max()].min())[day]
+        return mask
+
     def weights(self) -> Array | None:
         """The uncertainties of the runs, None where a run has none (then all count alike)."""
         return self.u if bool(np.isfinite(self.u).all() and (self.u > 0.0).all()) else None

@@ -86,8 +86,11 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
 
 
 def latest_mean(steady: Series) -> LatestMean:
-    """The mean of the last day's steady runs, with its standard uncertainty (None where not stated)."""
-    last = steady.days == steady.days[-1]
+    """The mean of the last day's steady runs, with its standard uncertainty (None where not stated).
+
+    A day of another campaign that overlaps it is part of it, as in the table of all machines.
+    """
+    last = steady.of_last_day
     count = int(last.sum())
     u = float(steady.values[last].std(ddof=1) / np.sqrt(count)) if count > 1 else float(steady.u[last][0])
     return LatestMean(

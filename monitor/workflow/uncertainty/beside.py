@@ -21,7 +21,7 @@ from monitor.uncertainty.type_b import SourceColumns
 from monitor.units import Unit
 from monitor.workflow.selections.readings import SelectedReadings
 from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
-from monitor.workflow.uncertainty.inputs import holding_for
+from monitor.workflow.uncertainty.inputs import holding_for, readings_of_runs
 from monitor.workflow.uncertainty.request import Asked
 from monitor.workflow.uncertainty.result import Behind
 from monitor.workflow.uncertainty.sources import (
@@ -112,7 +112,11 @@ def beside_readings(
                 run.effects.runs, run.effects.unknowns, fit.problem.runs, strict=True
             )
         )
-        lines, sampled, moves = _with_effects(campaign, fit, run, readings, counted, others, of_days)
+        covariances = readings_of_runs(
+            fit, campaign, run.effects.runs, run.index, readings, source.selection
+        )
+        of_others = run.effects.of_other_runs(readings, covariances)
+        lines, sampled, moves = _with_effects(campaign, fit, run, readings, of_others, counted, others, of_days)
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
         lines,
@@ -147,11 +151,13 @@ def _with_effects(
     fit: Fit,
     run: Linearised,
     readings: Inputs,
+    of_others: OutputContribution,
     counted: tuple[SourceColumns, ...],
     others: tuple[tuple[SourceColumns, ...], ...],
     of_days: tuple[OutputContribution, ...],
 ) -> tuple[tuple[OutputContribution, ...], tuple[OutputContribution, ...], Moves]:
-    """Lines, what is sampled and moves of a run with effects; ``others`` has what every source does to every run."""
+    """Lines, what is sampled and moves of a run with effects; ``of_others`` is what the readings of the other runs
+    add, ``others`` has what every source does to every run."""
     effects, of_run = run.effects, run.own_rows
     assert effects is not None
     day = {each.run: each.day for each in campaign.runs}
@@ -160,11 +166,10 @@ def _with_effects(
         source_effect(effects, of_run, [columns[index] for columns in others], days)
         for index in range(len(counted))
     ]
-    of_others = effects.of_other_runs(readings)
     count = len(run.run.reading_names)
     rows = run.rows[:, :count]
     of_readings = rows @ readings.covariance[:count, :count] @ rows.T + of_others.covariance
-    scatter = scatter_of_effects(effects, fit, day, of_readings)
+    scatter = scatter_of_effects(effects, fit, day, of_readings, of_others.dof)
     on_outputs = (
         *(effects.contribution(part) for part in of_days),
         *((of_others,) if effects.others else ()),

@@ -7,6 +7,7 @@ resemble each other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,8 @@ from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceKind, CovarianceSource
 from monitor.uncertainty import Inputs, OutputContribution, overall, pooled_by_day, uncorrelated
 from monitor.uncertainty.linear_axes import row_covariances
-from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.parts import Estimated
+from monitor.uncertainty.runs.measured_run import MeasuredRun, same_plan
 from monitor.uncertainty.runs.row_run import repeated_readings
 from monitor.uncertainty.runs.sensitivity import Sensitivity
 from monitor.uncertainty.runs.touched_run import TouchedRun
@@ -107,6 +109,37 @@ def _stated_inputs(
     neighbours = round(alike.correlation.rho * alike.correlation.share, 3)
     covariance = alike.matrix * np.outer(deviation, deviation)
     return replace(inputs, covariance=covariance), replace(source, neighbours=neighbours)
+
+
+def readings_of_runs(
+    fit: Fit, campaign: Campaign, runs: Sequence[MeasuredRun], index: int, inputs: Inputs, selection: str | None
+) -> tuple[Array, ...]:
+    """The covariance of the readings of every run of a fit, of which that of the one at ``index`` is in ``inputs``.
+
+    A run of the same plan has the same one. One of another plan (cut short, or in another order) has its own from what
+    is stated; where repeated runs of one plan gave the covariance they say nothing of how its readings resemble each
+    other, so that these are independent, each as many times what is stated as the largest of the evaluated run.
+    """
+    evaluated = runs[index]
+    count = len(evaluated.reading_names)
+    of_evaluated = inputs.covariance[:count, :count]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        times = np.sqrt(np.diag(of_evaluated)) / evaluated.stated
+    largest = float(np.max(times[np.isfinite(times)], initial=0.0))
+    covariances = []
+    for run in runs:
+        if _is_alike(run, evaluated):
+            covariances.append(of_evaluated)
+        elif inputs.estimated_of(inputs.sources[0]) is Estimated.SCALE:
+            covariances.append(_stated_inputs(fit, campaign, run, selection)[0].covariance)
+        else:
+            covariances.append(np.diag((largest * run.stated) ** 2))
+    return tuple(covariances)
+
+
+def _is_alike(run: MeasuredRun, other: MeasuredRun) -> bool:
+    """Whether the readings of two runs are those of one plan, with one weight."""
+    return same_plan(run.problem, other.problem) and bool(np.allclose(run.stated, other.stated))
 
 
 def _chose_the_run(holds_for: HoldsFor | None, repeated: int) -> bool | None:

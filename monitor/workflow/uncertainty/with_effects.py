@@ -6,6 +6,7 @@ of them moves the run's own parameters, too. ``monitor.uncertainty.runs.shared_e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -19,7 +20,7 @@ from monitor.methods.chain.shared_effects import followed_effects, shared_parame
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.sources import Sharing
-from monitor.statistics.tails import chi_square_quantile
+from monitor.statistics.tails import chi_square_quantile, f_quantile
 from monitor.uncertainty import Inputs, OutputContribution
 from monitor.uncertainty.parts import Estimated
 from monitor.uncertainty.runs.measured_run import MeasuredRun
@@ -36,8 +37,10 @@ class EffectLine(StrEnum):
     SCATTER = "scatter of the added effects"
 
 
-#: Two days, or two runs, count from a difference on that chance makes in this part of campaigns.
-_TWO_DIFFER = 0.05
+#: The added effects of a campaign scatter from a size on that chance makes of readings in this part of campaigns.
+_BY_CHANCE = 0.05
+#: Of so many runs or days a scatter is not taken: one degree of freedom.
+_FEWEST_SCATTERED = 2
 
 
 @dataclass(frozen=True)
@@ -86,30 +89,22 @@ class EffectOutputs:
             linear[:, readings:] += self.by_run[run][:, len(self.runs[run].reading_names) :]
         return linear
 
-    def of_other_runs(self, inputs: Inputs) -> OutputContribution:
-        """What the readings of the other runs add, each with the covariance that those of the evaluated one have."""
-        evaluated = self.runs[self.index]
-        readings = len(evaluated.reading_names)
-        of_readings = inputs.covariance[:readings, :readings]
+    def of_other_runs(self, inputs: Inputs, covariances: Sequence[Array]) -> OutputContribution:
+        """What the readings of the other runs add, of which each has one of the ``covariances`` (R).
+
+        They follow from the estimate that those of the evaluated run in ``inputs`` follow from.
+        """
         source = inputs.sources[0]
-        estimated = inputs.estimated_of(source)
-        known_each = estimated is Estimated.SCALE
-        with np.errstate(invalid="ignore", divide="ignore"):
-            scale = np.sqrt(np.diag(of_readings)) / evaluated.stated
-        factor = float(np.max(scale[np.isfinite(scale)], initial=0.0))
         covariance = np.zeros((len(self.by_run[0]),) * 2)
         for run in self.others:
             rows = self.by_run[run][:, : len(self.runs[run].reading_names)]
-            stated = self.runs[run].stated
-            alike = stated.shape == evaluated.stated.shape and bool(np.allclose(stated, evaluated.stated))
-            if known_each and not alike:
-                spread = rows * (factor * stated)
-                covariance += spread @ spread.T
-            else:
-                covariance += rows @ of_readings @ rows.T
-        covariance = 0.5 * (covariance + covariance.T)
+            covariance += rows @ covariances[run] @ rows.T
         return OutputContribution(
-            EffectLine.OTHER_RUNS.value, covariance, inputs.degrees_of_freedom(source), estimated
+            EffectLine.OTHER_RUNS.value,
+            0.5 * (covariance + covariance.T),
+            inputs.degrees_of_freedom(source),
+            inputs.estimated_of(source),
+            estimated_with=source,
         )
 
 
@@ -205,49 +200,102 @@ def source_effect(
     )
 
 
+@dataclass(frozen=True)
+class _Beyond:
+    """What a number of runs, or of the means of days, scatters in an effect beyond its readings.
+
+    ``variance`` of one of them, ``count`` of them, ``has_run``: whether the evaluated run is one, or of one.
+    """
+
+    variance: float
+    count: int
+    has_run: bool
+
+    def added(self, of_run: Array, of_effect: Array) -> Array:
+        """What it adds to all outputs (m + a, m + a), of which the parameters of the run answer the effect by ``of_run``
+        and the effects by ``of_effect`` (m + a,).
+
+        The fit gives the run the mean of all, so that its own parameters take up what its own value is off that mean:
+        nearly all of what one scatters. The mean itself has the part of the number of them.
+        """
+        of_mean = self.variance / self.count
+        off_mean = self.variance - of_mean if self.has_run else self.variance + of_mean
+        added = off_mean * np.outer(of_run, of_run) + of_mean * np.outer(of_effect, of_effect)
+        if not self.has_run:
+            added += of_mean * (np.outer(of_run, of_effect) + np.outer(of_effect, of_run))
+        return np.asarray(added)
+
+
 def scatter_of_effects(
-    effects: EffectOutputs, fit: Fit, day_of: Mapping[int, int], of_readings: Array
+    effects: EffectOutputs,
+    fit: Fit,
+    day_of: Mapping[int, int],
+    of_readings: Array,
+    dof: float = math.inf,
 ) -> OutputContribution | None:
     """What runs and days scatter in the effects beyond their readings, or poses that share what no model has.
 
-    ``of_readings`` (m + a, m + a) is what the readings of all runs give. None where they scatter no more.
+    ``of_readings`` (m + a, m + a) is what the readings of all runs give, estimated with ``dof`` degrees of freedom. None
+    where they scatter no more than chance makes of readings in ``_BY_CHANCE`` of campaigns.
     """
     problem, solution = fit.problem, fit.solution
     followed = followed_effects(problem, solution)
     first = len(of_readings) - len(effects.names)
     widened = widening_of_common(problem, solution)[effects.columns]
     days = np.array([day_of[int(number)] for number in problem.runs])
-    missing = np.zeros(len(effects.names))
-    fewest = np.inf
+    is_effect = np.arange(len(of_readings)) >= first
+    covariance, fewest = np.zeros_like(of_readings), math.inf
     for column, name in enumerate(effects.names):
         variance = float(of_readings[first + column, first + column])
-        poses = (float(widened[column]) ** 2 - 1.0) * variance
-        more, dof = 0.0, np.inf
+        response = effects.response[:, column]
+        of_run, of_effect = np.where(is_effect, 0.0, response), np.where(is_effect, response, 0.0)
+        beyond: list[_Beyond] = []
         if name in followed.names:
             values = followed.estimate[:, followed.names.index(name)]
-            more, dof = _beyond(values, days, variance)
-        missing[column] = max(poses, more, 0.0)
-        if more > poses:
-            fewest = min(fewest, dof)
-    if not np.any(missing):
+            tail = _BY_CHANCE / len(effects.names)
+            beyond = _beyond(values, days, effects.index, variance, dof, tail)
+        poses = (float(widened[column]) ** 2 - 1.0) * variance
+        larger = [each for each in beyond if each.variance / each.count > poses]
+        if larger:
+            # Of runs and of days the one that adds most: what days scatter is in what runs scatter, too.
+            added = [each.added(of_run, of_effect) for each in larger]
+            most = int(np.argmax([np.trace(each) for each in added]))
+            covariance = covariance + added[most]
+            fewest = min(fewest, larger[most].count - 1.0)
+        elif poses > 0.0:
+            covariance = covariance + poses * np.outer(response, response)
+    if not np.any(covariance):
         return None
-    root = effects.response * np.sqrt(missing)
-    return OutputContribution(EffectLine.SCATTER.value, root @ root.T, float(fewest), Estimated.SCALE)
+    return OutputContribution(EffectLine.SCATTER.value, covariance, fewest, Estimated.SCALE)
 
 
-def _beyond(values: Array, days: npt.NDArray[np.int64], variance: float) -> tuple[float, float]:
-    """The variance of a mean by the scatter of runs or of the days' means beyond ``variance``, with its degrees of
-    freedom; 0 where they scatter no more."""
+def _beyond(
+    values: Array, days: npt.NDArray[np.int64], index: int, variance: float, dof: float, tail: float
+) -> list[_Beyond]:
+    """What runs, and what the means of days, scatter beyond the ``variance`` of their mean by readings alone, estimated
+    with ``dof`` degrees of freedom; those of them that do so with a probability of ``tail`` at most by chance.
+
+    ``values`` (R,) of an effect, NaN where a run says nothing of it. Two runs or days, one degree of freedom, say
+    hardly anything of how much a third would differ, and are left out.
+    """
     stated = np.isfinite(values)
+    has_run = bool(stated[index])
     values, days = values[stated], days[stated]
-    largest = (0.0, np.inf)
     means = np.array([values[days == day].mean() for day in np.unique(days)])
-    for sample in (values, means):
-        if len(sample) < 2:
-            continue
+    samples = [values] if len(means) == len(values) else [values, means]
+    samples = [sample for sample in samples if len(sample) > _FEWEST_SCATTERED]
+    beyond = []
+    for sample in samples:
+        freedom = len(sample) - 1
         of_mean = float(sample.var(ddof=1)) / len(sample)
-        # One degree of freedom says hardly anything, and would widen every interval.
-        least = float(chi_square_quantile(_TWO_DIFFER, 1.0)) if len(sample) == 2 else 1.0
-        if of_mean > least * variance and of_mean - variance > largest[0]:
-            largest = (of_mean - variance, float(len(sample) - 1))
-    return largest
+        limit = _largest_ratio(tail / len(samples), freedom, dof)
+        if of_mean > limit * variance:
+            beyond.append(_Beyond(len(sample) * (of_mean - variance), len(sample), has_run))
+    return beyond
+
+
+def _largest_ratio(tail: float, freedom: float, dof: float) -> float:
+    """The ratio of two estimates of one variance that is exceeded with probability ``tail``."""
+    if math.isinf(dof):
+        return float(chi_square_quantile(tail, freedom)) / freedom
+    return float(f_quantile(tail, freedom, dof))

@@ -14,17 +14,19 @@ from tempfile import TemporaryDirectory
 from monitor.bounded import LARGEST_DOCUMENT
 from monitor.exceptions import InputError
 from monitor.readers.archive import CAMPAIGN_FILES, UploadedFile, unpack
+from monitor.workflow.true_values import TRUTH
 
 #: Files of an arrival that are looked at; a campaign has three to a dozen.
 MOST_FILES = 2000
 #: Endings of names under which browsers and copying programs write what is not whole yet.
 _UNFINISHED = (".part", ".partial", ".tmp", ".crdownload", ".filepart", ".new")
-_ALONE = (".xlsx", ".xlsm")
+_WORKBOOKS = (".xlsx", ".xlsm")
+_ALONE = (*_WORKBOOKS, ".csv")
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """A folder, zip or workbook directly in the watched folder.
+    """A folder, zip, workbook or table directly in the watched folder.
 
     ``fingerprint`` changes with the name, size or time of any of its files; ``changed_at`` is when the last of them was
     written or came here (seconds since 1970). ``lacks`` says what a folder still lacks to be a campaign.
@@ -54,7 +56,7 @@ def _arrival(path: Path) -> Arrival | None:
             has_one = any((path / name).is_file() for name in CAMPAIGN_FILES)
             lacks = None if has_one else f"it has no {CAMPAIGN_FILES[0]}"
             return _observed(path, _files_below(path), lacks)
-        if path.suffix.casefold() in (".zip", *_ALONE):
+        if path.suffix.casefold() in (".zip", *_ALONE) and path.name != TRUTH:
             return _observed(path, [path], None)
     except OSError:
         return None  # it went away, or is not readable yet
@@ -88,12 +90,18 @@ def _observed(path: Path, files: Sequence[Path], lacks: str | None) -> Arrival:
 def campaign_folders(path: Path) -> Iterator[tuple[Path, ...]]:
     """Yield the campaign folders of an arrival: itself, or those that a zip holds, unpacked for the block.
 
-    Raises InputError for a zip that cannot be trusted or read, and for a workbook that lies alone.
+    Raises InputError for a zip that cannot be trusted or read, and for a workbook or table that lies alone.
     """
     if path.is_dir():
         yield (path,)
         return
     if path.suffix.casefold() in _ALONE:
+        if path.suffix.casefold() not in _WORKBOOKS:
+            raise InputError(
+                f"{path}: a table alone is no campaign; put it into a folder of its own, beside {CAMPAIGN_FILES[0]} "
+                "(docs/campaign-format.md); files of an instrument are imported with a mapping "
+                "(docs/files-as-they-come.md)"
+            )
         raise InputError(
             f"{path}: a workbook alone is no campaign; put it into a folder of its own as campaign.xlsx, "
             f"beside {CAMPAIGN_FILES[0]} (docs/campaign-format.md)"

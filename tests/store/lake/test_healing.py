@@ -50,9 +50,10 @@ LASTING = (
     'invalid integer value "abc" for connection option "port"',
     'connection to server at "h", port 5432 failed: server does not support SSL, but SSL was required',
     'Failed to commit: Failed to execute query "INSERT": ERROR: permission denied for table ducklake_snapshot',
-    'Failed to commit: Failed to execute query "INSERT": ERROR: cannot execute INSERT in a read-only transaction',
     "Failed to commit DuckLake transaction: No space left on device",
 )
+#: Said by a standby until it is promoted, and for ever by a server that is only read.
+STANDBY = 'Failed to commit: Failed to execute query "INSERT": ERROR: cannot execute INSERT in a read-only transaction'
 PASSING = (
     'connection to server at "h", port 5432 failed: Connection refused Is the server running on that host?',
     'connection to server on socket "/s/.s.PGSQL.5432" failed: No such file or directory Is the server running?',
@@ -66,7 +67,7 @@ PASSING = (
 
 @pytest.mark.parametrize(
     ("message", "tries"),
-    [*((message, 1) for message in LASTING), *((message, 3) for message in PASSING)],
+    [*((message, 1) for message in LASTING), (STANDBY, 3), *((message, 4) for message in PASSING)],
     ids=lambda value: re.sub(r"[^a-z]+", "-", value[-40:].lower()) if isinstance(value, str) else None,
 )
 def test_what_can_not_heal_is_said_at_once(
@@ -82,7 +83,8 @@ def test_what_can_not_heal_is_said_at_once(
         raise StoreError(f"Unable to connect to Postgres at host=h: {message}")
 
     monkeypatch.setattr(publication, "attach", attach)
-    monkeypatch.setattr(publication, "_TRIES", 3)
+    monkeypatch.setattr(publication, "_TRIES", 4)
+    monkeypatch.setattr(publication, "_TRIES_OF_STANDBY", 3)
     monkeypatch.setattr(publication.time, "sleep", lambda seconds: None)
     with SharedDatabase(tmp_path / "Ulm.duckdb") as db, pytest.raises(StoreError, match="Unable to connect"):
         publish(db, f"ducklake:{tmp_path}/lake.ducklake", files=tmp_path / "files")

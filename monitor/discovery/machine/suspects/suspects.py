@@ -129,11 +129,11 @@ class _LooksForVarying:
         self._may_slip = True
 
     def slip(self, under: Fit) -> BallMove | None:
-        """The slip of the piece under a fit, if any. Where there was none it is not asked for again: it would be weighed
-        among all variants after each bad point."""
+        """The slip of the piece under a fit, if any. Where there was none it is not asked for again."""
         if not self._may_slip:
             return None
-        slip = piece_move(under, self._variants, self._scene if self._under is None else None)
+        scene = self._scene if self._scene is not None and self._scene.fit is under else None
+        slip = piece_move(under, self._variants, scene)
         self._may_slip = slip is not None
         return slip
 
