@@ -84,6 +84,8 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_mounts.py --seeds 30
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_instruments.py --seeds 300
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_tool_points.py --seeds 240
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_who_contradicts.py --seeds 20
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_methods.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_regions.py --replicates 80
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_outliers.py
