@@ -7,8 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
-from monitor.reporting.run_notes import joined_by_and
-
 #: What is said of a slope that a season may be all of.
 DRIFT_OR_SEASON = "drift or season cannot be told apart"
 #: What is said of a parameter of the fleet in place of its class, where that is so.
@@ -21,6 +19,12 @@ SEASON_NOT_TOLD = (
     "the history is too short to tell a drift from a part of a yearly season: slopes hold it, their intervals and the "
     "forecasts allow for a season as large as what was seen (record the temperature, or wait for 300 days)"
 )
+
+
+def joined_by_and(names: Sequence[object]) -> str:
+    """Return names with commas, the last two joined by ``and``."""
+    *first, last = map(str, names)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def joint_region_lacks(needed: int, fewest: float) -> str:

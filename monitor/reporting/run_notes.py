@@ -6,10 +6,10 @@ Sizes are in internal units (mm, rad).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.documents import Sentence
+from monitor.reporting.messages import joined_by_and
 from monitor.units import MICROMETRE
 
 
@@ -177,9 +177,3 @@ class RunsOfSeveralPlans(Sentence):
 
     def __str__(self) -> str:
         return "the runs do not follow one plan"
-
-
-def joined_by_and(names: Sequence[object]) -> str:
-    """Return names with commas, the last two joined by ``and``."""
-    *first, last = map(str, names)
-    return f"{', '.join(first)} and {last}" if first else last

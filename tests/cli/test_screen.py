@@ -22,6 +22,8 @@ OTHER = frozenset(
     {
         *(
             "autocorrelation",
+            "neighbours",
+            "time_constant_days",
             "axes",
             "bartlett",
             "by_chance",

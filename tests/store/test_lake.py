@@ -121,7 +121,7 @@ def test_while_the_lake_is_away_the_plant_can_write_and_who_waits_is_told(
         fill(db, campaign, make_identification(campaign))
     asked = publication._Publisher._last_published
     faults = ["Connection refused by the store", "Connection refused by the store again"]
-    words = ["event", campaign.machine.id, "moved", "--at", "2026-03-05 07:00", "--quiet", "--wait", "0"]
+    words = ["--at", "2026-03-05 07:00", "--quiet", "--wait", "0"]
 
     def away(self: publication._Publisher, plant_no: int) -> tuple[int, str] | None:
         if faults:
@@ -129,7 +129,8 @@ def test_while_the_lake_is_away_the_plant_can_write_and_who_waits_is_told(
         return asked(self, plant_no)
 
     def write(pause: float) -> None:
-        command = [sys.executable, "-m", "monitor.cli", *words, "--db", str(path)]
+        event = ["event", campaign.machine.id, f"moved {len(wrote)} times", *words]
+        command = [sys.executable, "-m", "monitor.cli", *event, "--db", str(path)]
         wrote.append(subprocess.run(command, capture_output=True, text=True))
 
     wrote: list[subprocess.CompletedProcess[str]] = []

@@ -54,7 +54,9 @@ def test_what_is_stored_while_the_audit_is_compared_has_its_entry(
             def then_stored(session: Database) -> Any:
                 answer = read(session)
                 answer = answer if isinstance(answer, dict) else list(answer)
-                record_event(other, campaign.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "note", "x")
+                record_event(
+                    other, campaign.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "note", f"x {len(stored)}"
+                )
                 stored.append(read.__name__)
                 return answer
 

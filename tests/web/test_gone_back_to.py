@@ -41,7 +41,7 @@ def _files(content: bytes = b"hello") -> dict[str, Any]:
             {"machine": "HU40-T", "text": "belt", "at": "yesterday"},
             {},
             400,
-            "valid datetime",
+            "is a moment, such as",
         ),
         ("/machine/event", {"machine": "HU41-T", "text": "belt"}, {}, 404, "did you mean &#39;HU40-T&#39;"),
         ("/model/add", {"campaign": CAMPAIGN, "effect": "EZZ1:up", "to": "samba"}, {}, 400, "EZZ1"),

@@ -14,7 +14,8 @@ import numpy as np
 from monitor.exceptions import CampaignError, Fault, MonitorError
 from monitor.methods import campaign_method
 from monitor.records import Campaign
-from monitor.reporting.run_notes import CopiedRunsNoted, joined_by_and
+from monitor.reporting.messages import joined_by_and
+from monitor.reporting.run_notes import CopiedRunsNoted
 from monitor.store import Database, run_fingerprints
 from monitor.units import MICROMETRE
 from monitor.workflow.campaign_parts import only_run
