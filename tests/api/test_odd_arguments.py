@@ -47,6 +47,7 @@ def needed(request: Any) -> dict[str, Any]:
     return {name: OF_TYPE.get(hints[name], NEEDED.get(name, {})) for name in without}
 
 
+@pytest.mark.slow
 def test_every_field_of_every_request_answers_odd_values_in_words() -> None:
     """TypeError, AttributeError, OverflowError and others came from 89 fields."""
     raw = []

@@ -31,7 +31,13 @@ def slipped(virtual_campaigns, seed, days, each, shift, turn=0.0, at=0.6, **opti
 
 @pytest.mark.parametrize(
     ("seed", "days", "each", "turn"),
-    [(7101, 1, 1, 0.0), (7102, 1, 1, 50.0), (7103, 1, 2, 30.0), (7104, 2, 2, 0.0)],
+    [
+        (7102, 1, 1, 50.0),
+        *(
+            pytest.param(*layout, marks=pytest.mark.slow)
+            for layout in ((7101, 1, 1, 0.0), (7103, 1, 2, 30.0), (7104, 2, 2, 0.0))
+        ),
+    ],
 )
 def test_a_piece_that_slips_in_a_run_is_named_alone(virtual_campaigns, seed, days, each, turn):
     shift = (7.0, -6.0, 4.0)
@@ -53,7 +59,13 @@ def test_one_ball_that_comes_loose_is_no_slip_of_the_piece(virtual_campaigns):
     assert [(move.target, move.of_all) for move in answer.moves] == [("2", False)]
 
 
-@pytest.mark.parametrize("effect", ["EXX:poly1@warmup", "EZC1:const@warmup", "EX0C@run_time"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "EX0C@run_time",
+        *(pytest.param(of, marks=pytest.mark.slow) for of in ("EXX:poly1@warmup", "EZC1:const@warmup")),
+    ],
+)
 def test_a_drift_of_the_machine_is_no_slip(virtual_campaigns, effect):
     options = {"tau_s": 900.0} if "warmup" in effect else {}
     drift = simulator().Effect(effect, peak_um=10.0, **options)

@@ -45,7 +45,7 @@ def _read(path: Path) -> Campaign:
     return campaign
 
 
-@pytest.mark.parametrize("seed", [9000, 9001])
+@pytest.mark.parametrize("seed", [9000, pytest.param(9001, marks=pytest.mark.slow)])
 def test_a_turning_head_shows_its_tool_point(tmp_path: Path, seed: int) -> None:
     path, truth = _campaign(tmp_path, seed, OFF, KEY)
     problem = campaign_method(campaign := _read(path)).problem_of(campaign)
@@ -67,6 +67,7 @@ def test_a_turning_head_shows_its_tool_point(tmp_path: Path, seed: int) -> None:
         assert abs(solution.local[0, index] - truth[name]) < 4.0 * u[index], name
 
 
+@pytest.mark.slow
 def test_a_tool_point_that_is_not_an_unknown_does_not_settle(tmp_path: Path) -> None:
     """The refusal says what fits, and how to have it solved for."""
     path, _ = _campaign(tmp_path, 9000, OFF)
@@ -75,6 +76,7 @@ def test_a_tool_point_that_is_not_an_unknown_does_not_settle(tmp_path: Path) -> 
         campaign_method(campaign).identify(campaign)
 
 
+@pytest.mark.slow
 def test_a_stated_uncertainty_where_the_point_is_right_costs_little(tmp_path: Path) -> None:
     """EYY shares its readings with the tool point: u grows, and the value stays within both."""
     values = []
