@@ -129,7 +129,7 @@ def mixed_marks(folder: Path, points: int) -> str:
     # Whole numbers elsewhere: the last column alone has marks.
     body = [[*(cell.partition(".")[0] for cell in row[:-1]), row[-1]] for row in body]
     (folder / "probings.csv").write_text("\n".join(";".join(row) for row in [rows[0], *body]), "utf-8")
-    with pytest.raises(CampaignError) as refusal:
+    with pytest.raises(CampaignError, match=r"probings\.csv") as refusal:
         read_campaign(folder)
     return str(refusal.value)
 
