@@ -11,6 +11,7 @@ import numpy as np
 from monitor.effects.context import Context
 from monitor.effects.description import OWN_DOCUMENT, Description
 from monitor.effects.registry import BuiltIn
+from monitor.effects.slip import MOVED, moment_of
 from monitor.exceptions import EffectError
 from monitor.records import Array
 from monitor.units import MICROMETRE, Unit
@@ -27,18 +28,11 @@ class BallMoved(BuiltIn):
     run: int
     sequence: int
     unit: Unit = MICROMETRE
-    pattern: ClassVar[str] = (
-        r"ball:(?P<ball>[^:]+):moved(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
-    )
+    pattern: ClassVar[str] = r"ball:(?P<ball>[^:]+):" + MOVED
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        if "run" not in groups:
-            text = f"ball:{groups['ball']}:moved"
-            raise EffectError(
-                f"'{text}' must say when: write {text}(run 7, sequence 23); `explain` finds the moment"
-            )
-        return cls(groups["ball"], int(groups["run"]), int(groups["sequence"]))
+        return cls(groups["ball"], *moment_of(groups, f"ball:{groups['ball']}"))
 
     @property
     def text(self) -> str:

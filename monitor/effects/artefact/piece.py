@@ -12,7 +12,7 @@ import numpy.typing as npt
 from monitor.effects.context import Context
 from monitor.effects.description import OWN_DOCUMENT, Description
 from monitor.effects.registry import BuiltIn
-from monitor.exceptions import EffectError
+from monitor.effects.slip import MOVED, moment_of
 from monitor.records import Array
 from monitor.units import MICROMETRE, Unit
 
@@ -25,17 +25,11 @@ class ArtefactMoved(BuiltIn):
     run: int
     sequence: int
     unit: Unit = MICROMETRE
-    pattern: ClassVar[str] = (
-        r"artefact:moved(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
-    )
+    pattern: ClassVar[str] = "artefact:" + MOVED
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        if "run" not in groups:
-            raise EffectError(
-                "'artefact:moved' must say when: write artefact:moved(run 7, sequence 23); `explain` finds the moment"
-            )
-        return cls(int(groups["run"]), int(groups["sequence"]))
+        return cls(*moment_of(groups, "artefact"))
 
     @property
     def text(self) -> str:
