@@ -26,6 +26,7 @@ from monitor.store import (
     older_numbers,
     parameter_frames,
     save_analysis,
+    simulated_campaigns,
     tolerance_types,
 )
 from monitor.units import CONDITION_SUFFIXES
@@ -162,6 +163,7 @@ def _answer(
         ),
         notes=(
             *map(str, same_hours(history)),
+            *_simulated(db, history),
             *_not_followed(history),
             *_of_older_version(db, request),
             *_limits_of_type(db, history),
@@ -209,6 +211,13 @@ def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
     if name is None:
         return ()
     return (messages.limits_of_type(name),)
+
+
+def _simulated(db: Database, history: MachineHistory) -> tuple[str, ...]:
+    """That nobody measured the readings, or some of them."""
+    names = set(history.campaign.tolist())
+    simulated = simulated_campaigns(db, names).get(history.machine, ())
+    return (messages.simulated(simulated, len(names)),) if simulated else ()
 
 
 def _refuted(refuted: ModelRefuted | None) -> tuple[str, ...]:
