@@ -10,7 +10,7 @@ SELECT c.campaign_id, c.campaign, c.machine, c.method,
        CAST(c.artefact -> 'scale_bar' ->> 'length' AS DOUBLE) AS scale_bar_mm,
        c.artefact -> 'scale_bar' ->> 'certificate' AS scale_bar_certificate,
        c.imported_at,
-       coalesce(c.machine_description ->> 'virtual' = 'true', false) AS simulated
+       coalesce((c.machine_description ->> 'virtual') = 'true', false) AS simulated
 FROM campaign AS c
 LEFT JOIN (
     SELECT campaign_id, count(*) AS runs, min(started_at) AS first_run_at, max(started_at) AS last_run_at,

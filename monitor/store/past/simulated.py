@@ -9,7 +9,7 @@ from monitor.store.connection import Database
 # The text is looked through first: reading the JSON of every campaign of a fleet takes ten times as long.
 _SIMULATED = """
 SELECT machine, list(campaign ORDER BY campaign_id) FROM campaign
-WHERE contains(CAST(machine_description AS VARCHAR), '"virtual"') AND machine_description ->> 'virtual' = 'true'
+WHERE contains(CAST(machine_description AS VARCHAR), '"virtual"') AND (machine_description ->> 'virtual') = 'true'
 {among} GROUP BY machine ORDER BY machine
 """
 
