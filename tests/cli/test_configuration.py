@@ -138,10 +138,10 @@ def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(type
 
 
 def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(typed: Any, db: Path) -> None:
-    configured('[tolerances."*"]\nEB0D = 5\n')
+    configured('[tolerances."*"]\nEB0C9 = 5\n')
     notes = typed("trend", "HU40-T", "--json", db=db).document["notes"]
     (note,) = (note for note in notes if "machine type" in note)
-    assert note.startswith("no limit holds: the machine type '*' in the configuration limits EB0D, of which")
+    assert note.startswith("no limit holds: the machine type '*' in the configuration limits EB0C9, of which")
     assert "did you mean 'EB0C'?" in note
 
 
