@@ -24,8 +24,21 @@ HERE = "--here"  # run pytest in this process, which has the other version
 
 OF_THE_LAKE = ("tests/store/test_lake.py", "tests/store/test_torn_catalogue.py", "tests/store/lake")
 
-# Tests that fail with another DuckDB, and why (docs/reliability.md).
-DIFFERENT: dict[str, str] = {}
+# Tests that fail with DuckDB 2.0, by their beginnings, and why (docs/reliability.md).
+DIFFERENT = {
+    "tests/archives/test_archives.py::test_archive_opens_and_holds_what_it_held[": "2.0 writes views otherwise",
+    "tests/cli/test_kill_then_verb.py::test_a_file_that_lost_rows_from_an_index_is_repaired_when_it_is_opened":
+        "2.0 loses none",
+    "tests/cli/test_kill_then_verb.py::test_verify_names_an_index_that_lost_rows": "2.0 loses none",
+    "tests/store/test_foreign_log.py::test_duckdb_itself_mixes_them": "2.0 refuses the log of another file itself",
+    "tests/store/test_foreign_log.py::test_a_log_that_ends_in_zeros_is_replayed_as_one_that_is_cut_off[behind the h":
+        "2.0 takes zeros behind the head of a log for no log",
+    "tests/store/test_half_a_block.py::test_duckdb_1_5_half_a_block_without_its_header_damages_the_state_before":
+        "2.0 keeps the state before",
+    "tests/store/test_incremental.py::test_a_backup_of_every_release_is_put_back[": "2.0 writes views otherwise",
+    "tests/store/test_retention.py::test_compaction_gives_the_room_back_and_changes_no_row": "2.0 gives back less",
+    "tests/store/test_schema.py::test_the_fingerprint_is_that_of_the_migrations": "the fingerprint is that of 1.5",
+}  # fmt: skip
 
 
 def environment(folder: Path, requirement: str) -> Path:
@@ -58,8 +71,9 @@ class AtOnce:
         self.ran.add(report.nodeid)
         if report.failed:
             self.failed.add(report.nodeid)
-            known = DIFFERENT.get(report.nodeid)
-            print(f"\n{report.nodeid}: {known or report.longreprtext}", file=sys.__stdout__, flush=True)
+            known = [why for begin, why in DIFFERENT.items() if report.nodeid.startswith(begin)]
+            text = known[0] if known else report.longreprtext
+            print(f"\n{report.nodeid}: {text}", file=sys.__stdout__, flush=True)
 
 
 def run_here(arguments: list[str]) -> int:
@@ -69,8 +83,8 @@ def run_here(arguments: list[str]) -> int:
         ["-p", "no:cacheprovider", "--tb=short", *(f"--ignore={file}" for file in OF_THE_LAKE), *arguments],
         plugins=[watch],
     )
-    fresh = sorted(watch.failed - DIFFERENT.keys())
-    gone = sorted(watch.ran & DIFFERENT.keys() - watch.failed)
+    listed = {name for name in watch.ran if name.startswith(tuple(DIFFERENT))}
+    fresh, gone = sorted(watch.failed - listed), sorted(listed - watch.failed)
     print(f"DuckDB {duckdb.__version__}: {len(watch.ran)} tests, {len(watch.failed)} differ")
     for name in fresh:
         print(f"not in the list: {name}")
