@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import os
 import re
-import tomllib
 import zoneinfo
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import InputError, StoreError, did_you_mean
-from monitor.toml_text import encoding_refusal, toml_refusal
+from monitor.toml_text import toml_file
 
 NAME = "monitor.toml"
 #: The units of angle that a screen may have.
@@ -88,16 +87,7 @@ def configuration() -> Configuration:
 
 def read(file: Path) -> Configuration:
     """Read a configuration. Raises InputError with every fault of the file."""
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(encoding_refusal(file, error)) from error
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(toml_refusal(file, error, text)) from error
+    document = toml_file(file)
     faults = [fault for key, value in document.items() for fault in _faults(key, value, file)]
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))

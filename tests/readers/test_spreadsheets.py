@@ -186,6 +186,34 @@ def test_a_workbook_whose_sheet_is_damaged_is_refused_in_words(tmp_path: Path) -
         read_campaign(folder)
 
 
+@pytest.mark.parametrize(
+    ("part", "sound", "changed"),
+    [
+        (
+            "xl/worksheets/sheet1.xml",
+            b"summaryRight",
+            b"summiryRight",
+        ),  # TypeError of openpyxl, as its sheets are read
+        ("xl/styles.xml", b"<color theme", b"<color tHeme"),  # TypeError, as it is opened
+    ],
+)
+def test_a_workbook_with_xml_that_openpyxl_does_not_know_is_refused_in_words(
+    tmp_path: Path, part: str, sound: bytes, changed: bytes
+) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    as_workbook(folder, single=False)
+    path = folder / "data.xlsx"
+    with zipfile.ZipFile(path) as packed:
+        parts = {name: packed.read(name) for name in packed.namelist()}
+    assert sound in parts[part]
+    parts[part] = parts[part].replace(sound, changed, 1)
+    with zipfile.ZipFile(path, "w") as packed:
+        for name, content in parts.items():
+            packed.writestr(name, content)
+    with pytest.raises(CampaignError, match=r"data\.xlsx: this is no workbook of Excel .* that can be read"):
+        read_campaign(folder)
+
+
 def test_faults_of_a_workbook_name_its_file_and_row(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
     as_workbook(folder, single=False)
