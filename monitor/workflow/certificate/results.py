@@ -275,7 +275,7 @@ def _evaluation(
             verdict=_verdict(monte_carlo, texts),
         )
         parts.append(checked[:1].upper() + checked[1:])
-    as_stated = tool_point_sentence(evaluated, texts)
+    as_stated = tool_point_sentence(evaluated.campaign, evaluated.names, texts)
     return ". ".join([*parts, *([] if as_stated is None else [as_stated]), _how_it_fits(evaluated, texts)])
 
 
