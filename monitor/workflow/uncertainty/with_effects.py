@@ -66,7 +66,7 @@ class EffectOutputs:
     def said_by_every_run(self) -> FollowedEffects:
         """The stated effects that every run determines by itself."""
         followed = self.followed
-        every = np.isfinite(followed.estimate).all(axis=0).tolist()
+        every = [bool(np.isfinite(values).all()) for values in followed.estimate.T]
         columns = [
             column
             for column, (name, by_every) in enumerate(zip(followed.names, every, strict=True))
