@@ -338,8 +338,12 @@ function watchLater(section) {
   watcher.observe(section);
 }
 
+// The server is asked before a page loads itself again: while it is away the browser would show its own page of errors.
 function loadAgain() {
-  setTimeout(() => location.reload(), 2000);
+  setTimeout(() => fetch("/work/state?number=0", { credentials: "same-origin" }).then(() => location.reload(), () => {
+    document.querySelectorAll(".so-far").forEach((words) => { words.textContent = "The server does not answer now; this page waits for it."; });
+    loadAgain();
+  }), 2000);
 }
 
 // A page that waits loads itself again once that is computed: to make and draw it anew takes the time of what it waits for.
@@ -354,6 +358,10 @@ function waitFor(note) {
     waited = true;
     return answer.json().then((work) => {
       note.querySelector(".so-far").textContent = work.so_far;
+      if (work.at) {
+        note.querySelector(".at").textContent = work.at;
+        note.querySelector("progress")?.setAttribute("value", work.done);
+      }
       return ask();
     });
   });
@@ -361,7 +369,7 @@ function waitFor(note) {
 }
 
 // In the browser's own way an address that ends in #scene would not be loaded anew.
-document.querySelectorAll("p.waiting").forEach((note) => (note.dataset.number ? waitFor(note) : loadAgain()));
+document.querySelectorAll(".waiting, [data-waits]").forEach((note) => (note.dataset.number ? waitFor(note) : loadAgain()));
 document.querySelectorAll("[data-later]").forEach(watchLater);
 prepareScene();
 drawAll();
