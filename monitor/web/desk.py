@@ -311,8 +311,8 @@ class Desk:
         """Return the ticket of work that was begun. Raises NotFoundError for one that is gone or somebody else's."""
         if number < self._first:
             raise NotFoundError(
-                "the server was started anew since, and what was under way then was cut off; what went in before stands "
-                "in the list of the page Campaigns"
+                "the server was started anew since, and what was under way then was cut off; what went in before "
+                "stands in the list of the page Campaigns"
             )
         with self._lock:
             ticket = self._written.get(number)

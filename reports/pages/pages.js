@@ -19,6 +19,11 @@ function coloured(value) {
   return value;
 }
 
+// A name from outside as plotly.js shows it as it was typed, without reading markup in it.
+function plain(text) {
+  return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("%", "&#37;");
+}
+
 function read(id) {
   const element = document.getElementById(id);
   return element === null ? null : JSON.parse(element.textContent);
@@ -126,7 +131,7 @@ function traces(list, magnification, name, shade, visible) {
       head[axis].push(end[index]);
     });
     ["u", "v", "w"].forEach((axis, index) => head[axis].push(magnification * vector[index]));
-    head.text.push(target + ": " + Math.hypot(...vector).toFixed(2) + " µm");
+    head.text.push(plain(target) + ": " + Math.hypot(...vector).toFixed(2) + " µm");
   }
   return [line, head];
 }
@@ -158,8 +163,8 @@ function drawScene(canvas, chart) {
     }));
   }
   if (effect !== null) {
-    data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + effect.effect, colour("orange"), true));
-    data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + effect.effect, colour("teal"), "legendonly"));
+    data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + plain(effect.effect), colour("orange"), true));
+    data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + plain(effect.effect), colour("teal"), "legendonly"));
   }
   return Plotly.react(canvas, data, fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
     canvas.dataset.drawn = "1";

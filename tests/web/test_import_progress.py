@@ -113,15 +113,25 @@ def test_the_page_counts_folders_and_stops_the_import(served: Any) -> None:
     assert '<progress max="3" value="1"' in page.text
     assert f'<a href="{address}">import of 3 folders: a, b, c</a>' in served.client.get("/work").text
     # From the menu it is seen again, and a page that waits is told how far it is without being made anew.
-    assert f'Under way: <a href="{address}">import of 3 folders: a, b, c</a>' in served.client.get("/import").text
+    assert (
+        f'Under way: <a href="{address}">import of 3 folders: a, b, c</a>'
+        in served.client.get("/import").text
+    )
     state = served.client.get(f"/work/state?number={ticket.number}")
-    assert (state.status_code, state.json()["at"], state.json()["done"]) == (202, "Importing b, 2 of 3 folders", 1)
+    assert (state.status_code, state.json()["at"], state.json()["done"]) == (
+        202,
+        "Importing b, 2 of 3 folders",
+        1,
+    )
     stopped = served.client.post("/work/cancel", data={"proof": served.proof(), "number": ticket.number})
     assert (stopped.status_code, stopped.headers["location"]) == (303, address)
     _until(lambda: bool(ticket.is_taken_back))
     text = re.sub(" +", " ", _text(served.client.get(address)))
     assert "This import was taken back by engineer-1." in text
-    assert f'<a href="{address}">import of 3 folders: a, b, c</a>, by engineer-1, stopped' in served.client.get("/import").text
+    assert (
+        f'<a href="{address}">import of 3 folders: a, b, c</a>, by engineer-1, stopped'
+        in served.client.get("/import").text
+    )
 
 
 def test_an_import_that_is_stopped_names_what_went_in_and_what_did_not(
