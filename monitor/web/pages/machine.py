@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import JSONResponse, Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
-from monitor.web.days import as_iso, typed_day
+from monitor.web.days import as_iso, typed_day, typed_moment
 from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
 from monitor.web.pages.fleet import ASKED as FLEET
-from monitor.web.pages.refused import RefusedForm, led_back_to_the_form, refused_form
-from monitor.web.rendering import link, page
+from monitor.web.pages.refused import RefusedForm, led_back, led_back_to_the_form, refused_form
+from monitor.web.rendering import page
 from monitor.web.sending import attachment
 
 if TYPE_CHECKING:
@@ -100,18 +100,27 @@ def routes() -> APIRouter:
         """Record what happened to a machine."""
         async with read_form(request) as form:
             machine = form.text("machine")
-            document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
+            document = {"machine": machine, "text": form.text("text"), **form.filled("kind")}
         try:
-            await asked_once(request, form, "event", document)
+            at = await run_in_threadpool(_moment, request, machine, form.text("at"))
+            await asked_once(request, form, "event", {**document, "at": at.isoformat()})
         except NotFoundError:
             raise
         except InputError as error:
             # A time in the future, or of no calendar: what happened need not be written once more.
             refused = RefusedForm(refusal_of(error), form.texts)
             return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
-        return RedirectResponse(link("/machine", name=machine), status_code=303)
+        return led_back(request, "/machine", {"name": machine}, "events")
 
     return router
+
+
+def _moment(request: Request, machine: str, text: str) -> datetime:
+    """When something happened; without an offset by the clock of the shop, as the run nearest to it had it."""
+    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", {"machine": machine})
+    typed = typed_moment("when it happened", text, UTC)
+    nearest = min(values.started_at, key=lambda started: abs(started - typed), default=None)
+    return typed_moment("when it happened", text, None if nearest is None else nearest.tzinfo)
 
 
 async def _table_of_all(
