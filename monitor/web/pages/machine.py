@@ -16,7 +16,7 @@ from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
-from monitor.web.days import as_iso, typed_day, typed_moment
+from monitor.web.days import as_iso, typed_moment
 from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 WARMTHS = ("", "warm", "warming up")
 #: So long the script's question for the table of all parameters is held before it has to ask again.
 FETCH_S = 20.0
+#: The ends of two periods as their boxes call them.
+BOXES = {
+    "since_1": "Earlier: from",
+    "until_1": "Earlier: to, whole day",
+    "since_2": "Later: from",
+    "until_2": "Later: to, whole day",
+}
 #: Usual kinds of events; any word is one.
 KINDS = ("crash", "repair", "compensation", "probe", "note")
 
@@ -199,12 +206,18 @@ def _two_periods(
     until_2: str = "",
 ) -> Response:
     """Show two periods of a machine side by side; dates belong to the period whole."""
-    ends = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+    typed = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+    ends, faults = _typed_ends(typed)
     answer, refusal, chart = None, "", None
     ask, user = request.app.state.asker, request.state.user
-    if all(ends.values()):
+    if faults and any(typed.values()):
+        refusal = "; ".join(faults)
+    elif not faults:
         try:
-            pair = {"earlier": _whole_days(since_1, until_1), "later": _whole_days(since_2, until_2)}
+            pair = {
+                of: _whole_days(of, ends[f"since_{number}"], ends[f"until_{number}"])
+                for number, of in ((1, "earlier"), (2, "later"))
+            }
             answer = ask(user, "periods", {"machine": name, **pair})
         except MonitorError as error:
             refusal = str(error)
@@ -212,8 +225,8 @@ def _two_periods(
     values: ValuesAnswer = ask(user, "values", {"machine": name})
     days = [f"{at:%Y-%m-%d}" for at in values.started_at]
     return page(
-        request, "periods.html",
-        name=name, topology=values.topology, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+        request, "periods.html", status=400 if refusal else 200,
+        name=name, topology=values.topology, boxes=BOXES, ends=ends, answer=answer, refusal=refusal, chart=chart,
         first=min(days, default=""), last=max(days, default=""),
     )  # fmt: skip
 
@@ -240,9 +253,27 @@ def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
     return document
 
 
-def _whole_days(since: str, until: str) -> dict[str, str]:
-    """The period from the beginning of one day to the end of another. Raises InputError for what is no date."""
-    first, last = typed_day("the first day", since), typed_day("the last day", until)
+def _typed_ends(typed: dict[str, str]) -> tuple[dict[str, str], list[str]]:
+    """The ends of two periods as ISO 8601 writes them, empty where none can be read; and what is wrong, by its box."""
+    ends, faults = dict.fromkeys(typed, ""), []
+    for field, text in typed.items():
+        label = BOXES[field].lower()
+        try:
+            ends[field] = as_iso(**{field: text})[field]
+            if not ends[field]:
+                faults.append(f"'{label}' is empty: two periods need a first and a last day each")
+        except InputError:
+            faults.append(f"'{label}' is a day, such as 2026-03-02 or 02.03.2026, not '{text[:40]}'")
+    return ends, faults
+
+
+def _whole_days(of: str, since: str, until: str) -> dict[str, str]:
+    """The period from the beginning of one day to the end of another. Raises InputError for one that ends before."""
+    first, last = date.fromisoformat(since), date.fromisoformat(until)
+    if last < first:
+        raise InputError(
+            f"the {of} period ends on {last}, before its first day {first}: change one of the two"
+        )
     try:
         end = last + timedelta(days=1)
     except OverflowError as error:
