@@ -29,7 +29,6 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
-from monitor.units import CONDITION_SUFFIXES
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -317,11 +316,7 @@ class _Page:
         """The recorded conditions of the runs, not what instruments read. The method, with its instruments where setups
         name them, is one too: 1 for the runs of each but the first."""
         mask = past.mask
-        channels = {
-            name: values[mask]
-            for name, values in self.history.conditions.items()
-            if name not in self.history.channels or name.rpartition("_")[2] in CONDITION_SUFFIXES
-        }
+        channels = {name: values[mask] for name, values in self.history.true_conditions.items()}
         if len(set(self.history.measured_by.tolist())) > 1:
             method = self.history.measured_by[mask]
             for name in list(dict.fromkeys(method.tolist()))[1:]:
