@@ -198,7 +198,7 @@ def _settled(name: str, parameter: ParameterTrend) -> Iterator[str]:
 def _event_step(name: str, step: StepAtEvent) -> str:
     """The sentence of the weekly report, with the time and the probability."""
     # Loaded here: most machines have no step at an event, and the report has two dozen kinds of sentences.
-    from monitor.reporting.health.sentences import SteppedAtEvent
+    from monitor.reporting.health.news import SteppedAtEvent
 
     what = SteppedAtEvent(
         name, step.description, step.size, step.u, step.unit, step.why_not_decided, step.drift_in_30_days

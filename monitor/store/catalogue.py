@@ -37,6 +37,7 @@ class CampaignRow:
     scale_bar_mm: float | None
     scale_bar_certificate: str | None
     imported_at: datetime = field(metadata=IN_UTC)
+    simulated: bool
     rows: int | None = field(default=None, metadata=OMITTED)
 
 
@@ -81,7 +82,8 @@ SELECT c.campaign_id, c.campaign, c.machine, c.method, coalesce(len(r.run), 0) A
        nullif(len(list_distinct(r.day)), 0) AS days, c.probe ->> 'id' AS probe,
        CAST(c.probe ->> 'standard_uncertainty' AS DOUBLE) / 0.001 AS probe_u_um, c.artefact ->> 'id' AS artefact,
        CAST(c.artefact -> 'scale_bar' ->> 'length' AS DOUBLE) AS scale_bar_mm,
-       c.artefact -> 'scale_bar' ->> 'certificate' AS scale_bar_certificate, c.imported_at, q."rows"
+       c.artefact -> 'scale_bar' ->> 'certificate' AS scale_bar_certificate, c.imported_at,
+       coalesce((c.machine_description ->> 'virtual') = 'true', false) AS simulated, q."rows"
 FROM (SELECT * FROM imported_campaign WHERE campaign_id IN ({numbers})) AS c
 ANTI JOIN withdrawn_campaign USING (campaign_id)
 LEFT JOIN (SELECT campaign_id, run, started_at, day FROM campaign_runs WHERE campaign_id IN ({numbers})) AS r

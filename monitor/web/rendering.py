@@ -79,6 +79,8 @@ def _environment() -> Environment:
         "day": words.day,
         "counted": words.counted,
         "so_far": words.so_far,
+        "importing": words.importing,
+        "asked_for": words.asked_for,
         "listed": words.listed,
         "what_breaks": words.what_breaks,
         "embedded": _embedded,
