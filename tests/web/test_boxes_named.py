@@ -54,6 +54,9 @@ def test_a_certificate_is_refused_for_its_grounds_and_its_boxes_at_once(serve: A
         import_folders(db, ImportRequest([folder]))
     own = serve(tmp_path / "own.duckdb", False)
     form = {"proof": own.proof(), "campaign": "five-days", "run": "20", "button": "issue"}
+    unchosen = own.sent("/certificate/new", data={**form, "run": ""}).text
+    assert "<strong>choose the run that is certified</strong>" in unchosen
+    assert '<select name="run" aria-invalid="true">' in unchosen
     page = own.sent("/certificate/new", data=form)
     assert page.status_code == 422
     assert "the certificate is refused: simulated speaks against it and" in page.text

@@ -34,6 +34,7 @@ FILE_BYTES = 2**20
 FILE_NAME = "laboratory.toml"
 #: What stands in the place of the number on a preview.
 PREVIEW = "preview {}"
+NO_RUN = "choose the run that is certified"
 GONE = Refusal(
     404, "what was filled in here is not held any more; nothing of it was stored: fill it in again"
 )
@@ -158,6 +159,9 @@ def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder:
     draft = texts.get("button") != "issue"
     question = "amend certificate" if texts.get("replaces") and not draft else "issue certificate"
     check_role(user, question)
+    campaign = {"campaign": texts.get("campaign", "")}
+    if not texts.get("run") and not texts.get("as_left") and len(asker(user, "runs", campaign).runs) > 1:
+        return _Outcome(refusal=Refusal(400, NO_RUN), faults={"run": NO_RUN})
     with tempfile.TemporaryDirectory(dir=working_folder) as folder:
         laboratory = Path(folder, FILE_NAME)
         try:
