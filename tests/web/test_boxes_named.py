@@ -7,7 +7,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from monitor.store import Database
+from monitor.web.faults import by_field
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from tests.web.test_pages import looked_at
 
@@ -69,3 +72,26 @@ def test_a_certificate_is_refused_for_its_grounds_and_its_boxes_at_once(serve: A
     needless = {**form, "accept.simulated": "a rehearsal", "accept.units": "known"}
     at_box = own.sent("/certificate/new", data=needless).text.partition('<div id="accept.units">')[2]
     assert "✗ units: there is nothing to accept" in at_box.partition("</div>")[0]
+
+
+@pytest.mark.parametrize(
+    ("question", "document", "says"),
+    [
+        ("trend", {"machine": "HU40-T", "reliability": 7}, "'reliability' 7: a probability lies between 0 and 1"),
+        ("trend", {"machine": "HU40-T", "parameter": "EXX", "volumetric_limit_um": 5.0},
+         "'volumetric_limit_um' needs all parameters; leave out 'parameter'"),
+    ],
+)  # fmt: skip
+def test_the_interface_names_fields_and_no_options(
+    local: Any, question: str, document: dict[str, Any], says: str
+) -> None:
+    status, answer = local.ask(question, document)
+    assert (status, answer["error"]) == (400, says)
+    assert by_field("--other 7: no field; --level-of", {"level"}) == "--other 7: no field; --level-of"
+
+
+def test_a_file_that_is_no_certificate_is_called_by_its_own_name(local: Any) -> None:
+    files = [("file", ("../..\\Prüfbericht 7.pdf", b"hello"))]
+    page = local.sent("/certificates/verify", data={"proof": local.proof()}, files=files).text
+    assert "Prüfbericht 7.pdf" in page
+    assert "certificate.pdf" not in page.partition("<main")[2].partition("<table")[0]
