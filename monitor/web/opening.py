@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -28,7 +29,9 @@ def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Ite
             "the verbs that read, such as monitor --db ducklake:... fleet"
         )
     if must_exist and not path.exists():
-        raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
+        raise NotFoundError(
+            f"there is no database {path}; `monitor --db {shlex.quote(str(path))} import FOLDER` makes one"
+        )
     with Database(path, threads=1, actor=host_user_name()) as db:
         db.confine(working_folder)
         db.recalled = Recalled()

@@ -71,6 +71,8 @@ def test_version(typed: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["identify", "--run", "eins"], "argument --run: a whole number, such as 3, not 'eins'; "),
+        (["explain", "x", "--rate", "5%"], "argument --rate: a number, such as 0.95, not '5%'; "),
         (["bogus"], "there is no verb 'bogus'; there are demo, import"),
         (["CAMPAIGNS"], "there is no verb 'CAMPAIGNS'"),
         (["--db"], "--db: expected one argument"),
@@ -80,13 +82,16 @@ def test_version(typed: Any) -> None:
         (["runs", "a", "b"], "unrecognized arguments: b"),
         (["certificate"], "required: issue|show|verify|amend|withdraw"),
         (["certificate", "bogus"], "invalid choice: 'bogus'"),
-        (["certificate", "issue", "five-days", "--run", "x", "--laboratory", "y"], "invalid int value: 'x'"),
+        (
+            ["certificate", "issue", "five-days", "--run", "x", "--laboratory", "y"],
+            "a whole number, such as 3, not 'x'",
+        ),
         (["model"], "required: list|show|add|remove|use|history"),
         (["model", "add", "EXX:reversal"], "required: --to"),
-        (["uncertainty", "five-days", "--seed", "1.5"], "invalid int value: '1.5'"),
-        (["simulate", "x", "--peak", "much"], "invalid float value: 'much'"),
+        (["uncertainty", "five-days", "--seed", "1.5"], "a whole number, such as 3, not '1.5'"),
+        (["simulate", "x", "--peak", "much"], "a number, such as 0.95, not 'much'"),
         (["export", "x", "--format", "ods"], "choose from"),
-        (["audit", "--last", "x"], "invalid int value"),
+        (["audit", "--last", "x"], "a whole number"),
     ],
     ids=" ".join,
 )
@@ -113,6 +118,9 @@ def test_monitor_db_names_the_database_and_the_option_wins(
 ) -> None:
     monkeypatch.setenv("MONITOR_DB", str(db))
     assert len(typed("campaigns", "--json").document["campaigns"]) == 3
+    assert (
+        "`monitor --db 'a b.duckdb' import FOLDER` makes one" in typed("--db", "a b.duckdb", "campaigns").err
+    )
     assert "there is no database other.duckdb" in typed("--db", "other.duckdb", "campaigns").err
     # An empty variable is no name.
     monkeypatch.setenv("MONITOR_DB", "")
