@@ -132,7 +132,6 @@ def store(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
         server.stdin.close()
 
 
-@pytest.mark.slow
 def test_a_lake_in_an_object_store_answers_as_one_file(
     tmp_path: Path, make_campaign: Make, make_identification: Identify, store: str
 ) -> None:
@@ -154,7 +153,6 @@ def test_a_lake_in_an_object_store_answers_as_one_file(
         assert many.rows(values) == one.rows(values) != []
 
 
-@pytest.mark.slow
 def test_a_store_that_is_away_is_said_and_waited_for_by_the_next_call(
     tmp_path: Path,
     make_campaign: Make,
