@@ -80,6 +80,26 @@ function fitted(layout, canvas) {
   return { ...layout, scene: { ...layout.scene, ...axes, camera: { ...camera, eye, center } } };
 }
 
+// The buttons of a chart are one stop of the Tab key, as a toolbar is; the arrow keys go from one to the next.
+function oneStop(canvas) {
+  const settle = () => canvas.querySelectorAll(".modebar-btn").forEach((button, index) => { button.tabIndex = index === 0 ? 0 : -1; });
+  settle();
+  if (canvas.dataset.oneStop) {
+    return;
+  }
+  canvas.dataset.oneStop = "1";
+  canvas.on("plotly_afterplot", settle);
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    const buttons = [...canvas.querySelectorAll(".modebar-btn")];
+    const at = buttons.indexOf(event.target);
+    if (step && at >= 0) {
+      event.preventDefault();
+      buttons[(at + step + buttons.length) % buttons.length].focus();
+    }
+  });
+}
+
 function draw(figure) {
   const chart = JSON.parse(figure.querySelector("script.figure").textContent);
   const canvas = figure.querySelector(".canvas");
@@ -89,6 +109,7 @@ function draw(figure) {
     canvas.style.height = chart.layout.height + "px"; // what the style sheet has no rule for
     Plotly.react(canvas, coloured(chart.data), fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
       canvas.dataset.drawn = "1";
+      oneStop(canvas);
       if (figure.dataset.key === "trend") {
         takeTimes(canvas);
       }
@@ -168,6 +189,7 @@ function drawScene(canvas, chart) {
   }
   return Plotly.react(canvas, data, fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
     canvas.dataset.drawn = "1";
+    oneStop(canvas);
     if (effect !== null && scene.swung !== effect) {
       scene.swung = effect;
       swing(canvas, coloured(chart.data), effect);

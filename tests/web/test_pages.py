@@ -6,7 +6,6 @@ Stories in a real browser, pictures and accessibility: ``make pages``.
 from __future__ import annotations
 
 import csv
-import html
 import io
 import re
 import time
@@ -317,36 +316,6 @@ def test_a_period_says_which_of_its_days_is_none(local: Any) -> None:
         in local.client.get(address.format("2026-13-02")).text
     )
     assert "no calendar has a day after 9999-12-31" in local.client.get(address.format("9999-12-31")).text
-
-
-def test_two_periods_name_the_box_that_is_wrong_and_show_what_was_compared(local: Any) -> None:
-    """A link with German days was computed beside empty boxes; half a link had no word of what it lacks."""
-    looked_at(local, "/machine?name=HU40-T")
-
-    def asked(**days: str) -> str:
-        return str(
-            html.unescape(local.client.get("/machine/periods", params={"name": "HU40-T", **days}).text)
-        )
-
-    german = {
-        "since_1": "02.03.2026",
-        "until_1": "03.03.2026",
-        "since_2": "05.03.2026",
-        "until_2": "06.03.2026",
-    }
-    page = asked(**german)
-    assert 'name="since_1" value="2026-03-02"' in page
-    assert "Earlier: 2026-03-02 to 2026-03-03 (8 runs on 2 days). Later: 2026-03-05 to 2026-03-06" in page
-    half = asked(**{**german, "since_1": "abc", "until_2": ""})
-    assert (
-        "'earlier: from' is a day, such as 2026-03-02 or 02.03.2026, not 'abc'; 'later: to, whole day' is empty"
-        in half
-    )
-    assert 'name="until_1" value="2026-03-03"' in half
-    assert "the earlier period ends on 2026-03-01, before its first day 2026-03-02" in asked(
-        **{**german, "until_1": "2026-03-01"}
-    )
-    assert 'role="alert"' not in asked()
 
 
 def test_a_new_database_says_what_to_do_first(tmp_path: Path, serve: Any) -> None:
