@@ -48,7 +48,7 @@ browser: setup
 	@sh tests/setup/browser.sh
 
 pages: browser  ## the pages in a real browser; pictures of every page in pages-output/
-	@$(PYTEST) -n 0 tests/browser $(ARGS)
+	@$(PYTEST) $(PARALLEL) tests/browser $(ARGS)
 
 fuzz-http: setup  ## the whole HTTP interface by schemathesis (docs/reliability.md); some ten minutes
 	@$(RUN) -c 'import schemathesis' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt 'schemathesis>=4'

@@ -51,6 +51,29 @@ def model_refuted(campaigns: Sequence[str], judged: int, model: str, p_value: fl
     )
 
 
+def simulated(campaigns: Sequence[str], of: int, most: int = 5) -> str:
+    """Return which ``campaigns`` among those ``of`` a history nobody measured."""
+    named = ", ".join(campaigns[:most]) + (
+        f" and {len(campaigns) - most} more" if len(campaigns) > most else ""
+    )
+    if len(campaigns) == of:
+        return f"simulated readings, nobody measured them: {named}"
+    return (
+        f"simulated readings stand among measured ones: {named}; a rehearsal should have a machine of its own: "
+        "withdraw these campaigns"
+    )
+
+
+def machines_simulated(machines: Mapping[str, Sequence[str]], most: int) -> str:
+    """Return which ``machines`` have simulated campaigns, and how many."""
+    named = ", ".join(
+        f"{machine} ({'1 campaign' if len(campaigns) == 1 else f'{len(campaigns)} campaigns'})"
+        for machine, campaigns in list(machines.items())[:most]
+    )
+    more = f" and {len(machines) - most} more" if len(machines) > most else ""
+    return f"simulated, nobody measured it: {named}{more}"
+
+
 def machines_refuted(machines: Mapping[str, str], most: int) -> str:
     """Return which ``machines`` (with their latest campaigns) have readings that refute their model."""
     named = ", ".join(f"{machine} ({campaign})" for machine, campaign in list(machines.items())[:most])
@@ -292,6 +315,15 @@ def limits_of_type(machine_type: str) -> str:
     """Return where the limits of a trend come from, where they are not the campaign's own."""
     whose = f"the machine type '{machine_type}' in the configuration"
     return f"limits are those of {whose}: the latest campaign states none"
+
+
+def limits_of_others(machine_type: str, limits: Sequence[str], hint: str) -> str:
+    """Return that none of the ``limits`` of a machine type is of a parameter of the machine; ``hint`` may be empty."""
+    named = ", ".join(limits[:5]) + (f" and {len(limits) - 5} more" if len(limits) > 5 else "")
+    return (
+        f"no limit holds: the machine type '{machine_type}' in the configuration limits {named}, of which the model of "
+        f"this machine has none; {hint}`monitor config show` names the file"
+    )
 
 
 def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:

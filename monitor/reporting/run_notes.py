@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from monitor.documents import Sentence
-from monitor.reporting.messages import joined_by_and
+from monitor.reporting.messages import joined_by_and, simulated
 from monitor.units import MICROMETRE
 
 
@@ -169,6 +169,17 @@ class LeftOutNoted(Sentence):
             f"campaign {self.campaign} was left out: its runs lie within the time of {self.overlapped}, which was "
             "imported first"
         )
+
+
+@dataclass(frozen=True)
+class SimulatedNoted(Sentence):
+    """Campaigns among those ``of`` a machine that nobody measured."""
+
+    campaigns: tuple[str, ...]
+    of: int
+
+    def __str__(self) -> str:
+        return simulated(self.campaigns, self.of)
 
 
 @dataclass(frozen=True)

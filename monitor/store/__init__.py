@@ -177,6 +177,7 @@ if TYPE_CHECKING:
         parameter_frames as parameter_frames,
         probing_counts as probing_counts,
     )
+    from monitor.store.past.simulated import simulated_campaigns as simulated_campaigns
     from monitor.store.recalling import Recalled as Recalled
     from monitor.store.results import (
         LackOfFit as LackOfFit,
@@ -249,6 +250,7 @@ else:
             "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
             "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
+            "past.simulated": "simulated_campaigns",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "identified_runs latest_frames machine_descriptions machine_runs machine_topology parameter_frames "
             "probing_counts",

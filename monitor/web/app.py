@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -111,10 +112,15 @@ async def _of_http(request: Request, error: Exception) -> Response:
 async def _of_address(request: Request, error: Exception) -> Response:
     """Answer an address that lacks a part, or has one of another kind."""
     assert isinstance(error, RequestValidationError)
-    faults = (f"'{fault['loc'][-1]}': {str(fault['msg']).lower()}" for fault in error.errors())
-    return _refused(
-        request, Refusal(400, f"the address {request.url.path} is not complete: {'; '.join(faults)}")
-    )
+    faults = "; ".join(_fault_of_address(fault) for fault in error.errors())
+    return _refused(request, Refusal(400, f"the address {request.url.path} is not complete: {faults}"))
+
+
+def _fault_of_address(fault: Any) -> str:
+    name = fault["loc"][-1]
+    if fault["type"] == "missing":
+        return f"it lacks '{name}'; the first page leads to what there is"
+    return f"'{name}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}, not '{str(fault.get('input'))[:40]}'"
 
 
 async def _of_stale_form(request: Request, error: Exception) -> Response:

@@ -7,6 +7,7 @@ somebody else wrote it, the next question is answered from a new copy.
 from __future__ import annotations
 
 import getpass
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -82,7 +83,9 @@ def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Ite
             "the verbs that read, such as monitor --db ducklake:... fleet"
         )
     if must_exist and not path.exists():
-        raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
+        raise NotFoundError(
+            f"there is no database {path}; `monitor --db {shlex.quote(str(path))} import FOLDER` makes one"
+        )
     why = why_not_written(str(path))
     if why is None:
         with _confined(path, working_folder) as db:

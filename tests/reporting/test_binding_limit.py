@@ -11,6 +11,7 @@ from by_path import load
 from monitor.documents import from_document, to_document
 from monitor.reporting.health.answers import answers, reason, to_do
 from monitor.reporting.health.concern import concern
+from monitor.reporting.health.news import Drifting
 from monitor.reporting.health.page import fleet_context
 from monitor.reporting.health.records import (
     MachineHealth,
@@ -20,7 +21,6 @@ from monitor.reporting.health.records import (
     by_urgency,
     fleet_row,
 )
-from monitor.reporting.health.sentences import Drifting
 
 first_page = load("first_page", Path(__file__).with_name("test_first_page.py"))
 

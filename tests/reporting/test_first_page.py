@@ -16,6 +16,7 @@ from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
 from monitor.reporting.health.attention import attention, look_at
 from monitor.reporting.health.comparison import MissingEffect, ModelHealth
+from monitor.reporting.health.news import CheckKind, NextCheck
 from monitor.reporting.health.page import fleet_context
 from monitor.reporting.health.records import (
     Change,
@@ -31,7 +32,6 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import health_html, health_pdf
-from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.plain_names import plain_name
 

@@ -8,25 +8,27 @@ from datetime import date, datetime
 import pytest
 
 from monitor.documents import Said, Sentence, from_document, to_document
-from monitor.reporting.health.sentences import (
-    BadPoint,
+from monitor.reporting.health.news import (
     BallMoved,
     CheckKind,
     Drifting,
-    ErrorOf,
-    Factor,
     ImportsRefused,
-    MachineNamed,
     ModelLacks,
     NewThisWeek,
     NextCheck,
     NotMeasured,
     ParameterChanged,
+    SteppedAtEvent,
+)
+from monitor.reporting.health.sentences import (
+    BadPoint,
+    ErrorOf,
+    Factor,
+    MachineNamed,
     Pose,
     Position,
     RunsNamed,
     ScatteringBall,
-    SteppedAtEvent,
 )
 from monitor.reporting.lacks import Undecided
 from monitor.web.schemas import Schemas

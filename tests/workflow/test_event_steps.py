@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from monitor.cli.trend_output import _event_step
-from monitor.reporting.health.sentences import SteppedAtEvent
+from monitor.reporting.health.news import SteppedAtEvent
 from monitor.reporting.lacks import Undecided
 from monitor.store import MachineEvent
 from monitor.workflow.history.changes import ChangeSearch

@@ -27,7 +27,7 @@ def run(options: Namespace) -> int:
         {
             "campaign": row.campaign,
             "machine": row.machine,
-            "method": row.method,
+            "method": f"{row.method}, simulated" if row.simulated else row.method,
             "runs": row.runs if row.rows is None else f"{row.rows} rows",
             "days": row.days,
             "first_run_at": _day(row.first_run_at),

@@ -18,6 +18,7 @@ from monitor.reporting.messages import (
     campaigns_of_same_hours,
     machines_lacking,
     machines_refuted,
+    machines_simulated,
     numbers_of_older_version,
 )
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
@@ -117,6 +118,8 @@ def _say_of_machines(answer: FleetAnswer) -> None:
             output.say(campaigns_of_same_hours(machine, campaigns))
     for machine, name in (answer.tolerances_of_type or {}).items():
         output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
+    if answer.simulated:
+        output.say(machines_simulated(answer.simulated, MOST_NAMED))
     if answer.models_refuted:
         latest = {machine: refuted.campaign for machine, refuted in answer.models_refuted.items()}
         output.say(machines_refuted(latest, MOST_NAMED))

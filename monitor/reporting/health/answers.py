@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from monitor.reporting.health.comparison import MissingEffect
 from monitor.reporting.health.concern import DRIFT_P, binding_shares, concern, likeliest_out, volumetric_binds
+from monitor.reporting.health.news import CheckKind, NextCheck
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
@@ -20,7 +21,6 @@ from monitor.reporting.health.records import (
     State,
     is_due,
 )
-from monitor.reporting.health.sentences import CheckKind, NextCheck
 from monitor.reporting.health.words import day, in_words, percent, plain
 from monitor.reporting.messages import DRIFT_OR_SEASON
 

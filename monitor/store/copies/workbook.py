@@ -14,6 +14,7 @@ from monitor.exceptions import InputError, StoreError
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
 from monitor.store.copies.workbook_sheets import ComputedChange, Sheet, sheets
+from monitor.store.past.simulated import simulated_campaigns
 
 if TYPE_CHECKING:
     from openpyxl.worksheet._write_only import WriteOnlyWorksheet
@@ -78,6 +79,11 @@ def _about(db: Database, written: tuple[Sheet, ...]) -> Sheet:
         ("database", Path(db.path).name, ""),
         ("written at / UTC", utc_now(), ""),
         ("software", f"machine-health-monitor {__version__}", ""),
+        *(
+            ("campaign", name, "simulated, nobody measured it")
+            for names in simulated_campaigns(db).values()
+            for name in names
+        ),
     ]
     rows += [
         (sheet.name, column, meaning)

@@ -246,6 +246,7 @@ def routes() -> APIRouter:
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
             older=_older(answer),
+            simulated=() if answer is None else answer.simulated or (),
         )  # fmt: skip
 
     @router.post("/fleet/identify")

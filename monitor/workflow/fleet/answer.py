@@ -78,6 +78,7 @@ class FleetAnswer:
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
     ``models_lacking`` by machine those whose stored comparison says that something is missing from it.
+    ``simulated`` by machine are campaigns that nobody measured.
     ``same_hours`` by machine are groups of campaigns that hold runs of the same hours: its numbers mix them.
     """
 
@@ -94,4 +95,5 @@ class FleetAnswer:
     models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     older_versions: Mapping[str, tuple[OlderVersion, ...]] | None = field(default=None, metadata=OMITTED)
+    simulated: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]] | None = field(default=None, metadata=OMITTED)

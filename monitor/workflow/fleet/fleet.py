@@ -25,6 +25,7 @@ from monitor.store import (
     machines_with_runs,
     older_numbers,
     refuted_machines,
+    simulated_campaigns,
     tolerance_types,
     unexplained_machines,
     without_part,
@@ -162,6 +163,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
         models_refuted=_refuted(db, request.model) or None,
+        simulated=simulated_campaigns(db) or None,
         same_hours=_same_hours(sums.same_hours) or None,
         **_by_their_own_models(db, request.model, numbered),
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from monitor.documents import Said
 from monitor.reporting.frames import referred
+from monitor.reporting.health.news import BallMoved, EventNoted, ParameterChanged, SteppedAtEvent
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -19,14 +20,7 @@ from monitor.reporting.health.records import (
     ParameterHealth,
     RefusedImport,
 )
-from monitor.reporting.health.sentences import (
-    BadPoint,
-    BallMoved,
-    EventNoted,
-    ParameterChanged,
-    ScatteringBall,
-    SteppedAtEvent,
-)
+from monitor.reporting.health.sentences import BadPoint, ScatteringBall
 from monitor.reporting.health.settling import ParameterSettled
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of

@@ -9,17 +9,11 @@ from itertools import compress
 from monitor.documents import Said
 from monitor.methods import Unable, method_named
 from monitor.records import VOLUMETRIC
+from monitor.reporting.health.news import CheckKind, NextCheck, NotMeasured
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
-from monitor.reporting.health.sentences import (
-    CheckKind,
-    LimitWithoutMap,
-    MachineNamed,
-    NextCheck,
-    NotMeasured,
-    RunNamed,
-    TolerancesOfType,
-)
+from monitor.reporting.health.sentences import LimitWithoutMap, MachineNamed, RunNamed, TolerancesOfType
 from monitor.reporting.plain_names import plain_name
+from monitor.reporting.run_notes import SimulatedNoted
 from monitor.store import (
     Database,
     MachineEvent,
@@ -30,6 +24,7 @@ from monitor.store import (
     machine_events,
     machine_history,
     machine_runs,
+    simulated_campaigns,
     stored_analyses,
     type_in_use,
 )
@@ -110,9 +105,14 @@ class MachineWeek:
 def named_machines(db: Database) -> list[MachineName]:
     """Return every machine that counts, by name."""
     machines = []
+    simulated = simulated_campaigns(db)
     for machine in machine_descriptions(db):
         description = MachineNamed(
-            machine.manufacturer, machine.model, machine.serial_number, machine.topology
+            machine.manufacturer,
+            machine.model,
+            machine.serial_number,
+            machine.topology,
+            machine.machine in simulated,
         )
         machines.append(MachineName(machine.machine, description, machine.location))
     return machines
@@ -151,7 +151,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         return _not_measured(db, past)
     last = measured.last
     results, failures = stored_with(db, past.results, computed, measured)
-    remarks = [*past.remarks, *failures]
+    remarks = [*past.remarks, *failures, *_simulated(db, past)]
     stated, explanation = results.uncertainty, results.explanation
     model = measured.model
     history = machine_history(db, past.name.machine, model=model.name, version=model.version)
@@ -211,6 +211,13 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         quality=quality,
         map=error_map, due=due,
     )  # fmt: skip
+
+
+def _simulated(db: Database, past: MachineWeek) -> list[Said]:
+    """A remark on the campaigns up to the end of the week that nobody measured."""
+    names = {run.campaign for run in past.runs}
+    simulated = simulated_campaigns(db, names).get(past.name.machine, ())
+    return [SimulatedNoted(simulated, len(names))] if simulated else []
 
 
 def _refuted_p(history: MachineHistory, measured: MeasuredWeek) -> float | None:
@@ -273,7 +280,7 @@ def _not_measured(db: Database, past: MachineWeek) -> MachineHealth:
         next_check=NextCheck(check), run="", basis="", factor="", parameters=(),
         changes=tuple(event_noted(event, past.week) for event in reversed(past.events)),
         conditions=(), model=None,
-        quality=DataQuality(0, 0, 0, (), (), (), past.remarks, past.refused), map=None,
+        quality=DataQuality(0, 0, 0, (), (), (), (*past.remarks, *_simulated(db, past)), past.refused), map=None,
     )  # fmt: skip
 
 

@@ -12,6 +12,14 @@ import numpy as np
 from monitor.documents import Said
 from monitor.records import VOLUMETRIC, Verdict
 from monitor.reporting.health.concern import DRIFT_P, drifting_without_limit, largest_shares, volumetric_binds
+from monitor.reporting.health.news import (
+    CheckKind,
+    Drifting,
+    ImportsRefused,
+    ModelLacks,
+    NewThisWeek,
+    NextCheck,
+)
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
@@ -22,16 +30,7 @@ from monitor.reporting.health.records import (
     State,
     VolumetricMap,
 )
-from monitor.reporting.health.sentences import (
-    CheckKind,
-    Drifting,
-    Factor,
-    ImportsRefused,
-    ModelLacks,
-    NewThisWeek,
-    NextCheck,
-    NoFactor,
-)
+from monitor.reporting.health.sentences import Factor, NoFactor
 from monitor.statistics import control_false_discoveries
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
