@@ -18,7 +18,9 @@ class FleetTableRow:
     ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``season_not_told``: a
     yearly season can be all of the slope, the history is too short to tell. ``refers_to`` says in words what the
     parameter is stated relative to, where it is an error of the chain. ``since`` is the last event: what is judged
-    begins with it. ``onset`` is the moment since which the row holds, by ``onset_is``.
+    begins with it. ``onset`` is the moment since which the row holds, by ``onset_is``. ``probability_out`` is that of
+    the last run to lie beyond the limit, ``in_tolerance_at_next_check`` that of a run at the ``next_check`` not to;
+    left out where there is no limit, the second where the history is too short to foretell anything.
     """
 
     rank: int
@@ -53,6 +55,9 @@ class FleetTableRow:
     refers_to: str | None = field(default=None, metadata=OMITTED)
     onset: str | None = field(default=None, metadata=OMITTED)
     onset_is: Onset | None = field(default=None, metadata=OMITTED)
+    probability_out: float | None = field(default=None, metadata=OMITTED)
+    in_tolerance_at_next_check: float | None = field(default=None, metadata=OMITTED)
+    next_check: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -40,11 +40,12 @@ from monitor.workflow.fleet.ranking import (
     cell_tests,
     means_p,
     ranked,
-    split_times,
     warmth_beside,
 )
 from monitor.workflow.fleet.request import FleetRequest
+from monitor.workflow.fleet.steps import split_times
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
+from monitor.workflow.history.forecast import NEXT_CHECK_D
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
 from monitor.workflow.history.runs import overlapping
 from monitor.workflow.models import label_of, resolve
@@ -82,7 +83,7 @@ class _Cells:
         sums, attention = self.sums, ATTENTION[int(self.ranking.kind[index])]
         if attention is Attention.OUT and np.isfinite(sums.beyond_d[index]):
             return float(sums.beyond_d[index]), Onset.BEYOND
-        if attention in (Attention.OUT, Attention.STANDS_OUT):
+        if attention in (Attention.OUT, Attention.MAY_BE_OUT, Attention.STANDS_OUT):
             return float(sums.last_d[index]), Onset.LATEST
         if attention is Attention.DAYS_DIFFER:
             return float(self.differs_d[index]), Onset.DIFFERS
@@ -120,7 +121,10 @@ class _Cells:
             latest_at=_date(float(self.sums.last_d[index])),
             since=_date(float(self.sums.since_d[index])),
             limit=_number(self.limit[index]),
-            years_to_limit=_number(self.ranking.years[index]) if self.ranking.kind[index] == 1 else None,
+            years_to_limit=_number(self.ranking.years[index]),
+            probability_out=_number(self.ranking.near.out[index]),
+            in_tolerance_at_next_check=_number(self.ranking.near.inside[index]),
+            next_check=_date(self.sums.check_d[index]) if np.isfinite(self.limit[index]) else None,
             temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
             season_not_told=True if self.drift.season_p[index] >= REFUTED else None,
             onset=_date(onset),
@@ -231,7 +235,7 @@ def _cells_of(db: Database, model: str | None) -> _Cells:
     stored = None if model is None else resolve(db, model)
     name, version = (None, None) if stored is None else (stored.name, stored.version)
     limits = latest_tolerances(db)
-    sums = fleet_sums(db, name, version, cut=CUT, limits=limits)
+    sums = fleet_sums(db, name, version, cut=CUT, limits=limits, apart_d=NEXT_CHECK_D)
     cells, drift = cell_tests(sums)
     keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
     limit = np.array([limits.get(key, np.nan) for key in keys])
