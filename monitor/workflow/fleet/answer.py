@@ -64,7 +64,7 @@ class FleetTableRow:
 class OlderVersion:
     """The version of a model (``NAME@VERSION``) that the numbers of a machine come from, and the ``newest``.
 
-    Nobody identified the machine by that yet.
+    Not all of its campaigns were identified by that yet.
     """
 
     model: str
@@ -77,8 +77,9 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that the numbers of their machine come from: they
     have no part in it. ``older_versions`` by machine say where these are of an older version than the newest of the
-    method's own model, as nobody identified the machine by that yet. ``tolerances_of_type`` names
-    the machine type by machine, where its campaign states no tolerances.
+    method's own model, as not all of its campaigns were identified by that yet. ``left_out`` names by machine with
+    numbers the campaigns that have no part in them. ``tolerances_of_type`` names the machine
+    type by machine, where its campaign states no tolerances.
     ``without_numbers`` are machines of which no run has numbers, which no row stands for; not said of a model that was
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
@@ -100,5 +101,6 @@ class FleetAnswer:
     models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     older_versions: Mapping[str, tuple[OlderVersion, ...]] | None = field(default=None, metadata=OMITTED)
+    left_out: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     simulated: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]] | None = field(default=None, metadata=OMITTED)

@@ -19,6 +19,7 @@ from monitor.store import (
     Database,
     FleetSums,
     GroupHours,
+    campaign_machines,
     fleet_sums,
     latest_frames,
     latest_tolerances,
@@ -180,8 +181,15 @@ def _by_their_own_models(db: Database, model: str | None, numbered: Container[st
     """
     if model is not None:
         return {"not_identified": ()}
+    without = without_part(db)
+    machine_of = campaign_machines(db) if without else {}
+    left_out: dict[str, tuple[str, ...]] = {}
+    for campaign in without:
+        if (machine := machine_of[campaign]) in numbered:
+            left_out[machine] = (*left_out.get(machine, ()), campaign)
     return {
-        "not_identified": without_part(db),
+        "not_identified": without,
+        "left_out": left_out or None,
         "models_lacking": unexplained_machines(db) or None,
         "without_numbers": _without_numbers(db, numbered) or None,
         "older_versions": _older_versions(db) or None,
