@@ -23,12 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Urgency:
-    """How urgent a class of the fleet is: a colour (class of the style sheet), a shape, a word, and the next step."""
+    """How urgent a class of the fleet is: a colour (class of the style sheet), a shape, a word, and the next step,
+    which ``adjusts`` the machine by the values or not."""
 
     colour: str
     shape: str
     word: str
     next_step: str
+    adjusts: bool = False
 
 
 #: The colour of what cannot wait.
@@ -48,15 +50,23 @@ URGENCIES = dict(
                 _STOP.shape,
                 _STOP.word,
                 "stop precision work; adjust or compensate, then measure again",
+                adjusts=True,
             ),
             Urgency(
                 _STOP.colour,
                 _STOP.shape,
                 _STOP.word,
                 "measure again now, before precision work; if it stays, adjust or compensate",
+                adjusts=True,
             ),
             Urgency(_SOON.colour, _SOON.shape, _SOON.word, "measure again before the next check is due"),
-            Urgency(_SOON.colour, _SOON.shape, _SOON.word, "plan an adjustment before the limit is reached"),
+            Urgency(
+                _SOON.colour,
+                _SOON.shape,
+                _SOON.word,
+                "plan an adjustment before the limit is reached",
+                adjusts=True,
+            ),
             Urgency(
                 _LOOK.colour,
                 _LOOK.shape,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from monitor.records import VOLUMETRIC
+from monitor.reporting.adjusting import SEE_FIRST
 from monitor.reporting.health.records import State
 from monitor.store import Database, machine_history, save_analysis
 from monitor.uncertainty.conformity import conformity
@@ -148,3 +149,14 @@ def test_a_map_that_may_be_beyond_its_limit_says_so_in_the_fleet(tmp_path: Path)
                 row for row in fleet(db, FleetRequest(None, 0)).table if row.parameter == "volumetric error"
             )
             assert row.attention is attention
+
+
+def test_the_fleet_page_adjusts_nothing_by_a_model_that_does_not_explain(
+    rows: dict[str, FleetTableRow],
+) -> None:
+    for machine in ("c-out", "a-near", "f-drifts"):
+        (explained,) = machine_rows([rows[machine]], {}, {}, {})
+        (doubted,) = machine_rows([rows[machine]], {}, {machine: "campaign"}, {})
+        assert "adjust" in explained.next_step
+        assert doubted.next_step == SEE_FIRST
+        assert (doubted.attention, doubted.urgency) == (explained.attention, explained.urgency)

@@ -13,6 +13,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
+from monitor.reporting.adjusting import adjusting
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
@@ -83,7 +84,10 @@ class MachineRow:
     @property
     def next_step(self) -> str:
         """What its class asks for; where its numbers are mixed only what cannot wait until the campaign is chosen."""
-        return "" if self.same_hours and self.urgency.colour != STOP else self.urgency.next_step
+        if self.same_hours and self.urgency.colour != STOP:
+            return ""
+        is_doubted = self.urgency.adjusts and bool(self.unexplained)
+        return adjusting(self.urgency.next_step, is_doubted=is_doubted)
 
 
 def machine_rows(
