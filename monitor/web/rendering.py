@@ -79,6 +79,7 @@ def _environment() -> Environment:
         "day": words.day,
         "counted": words.counted,
         "so_far": words.so_far,
+        "earliest_and_latest": words.earliest_and_latest,
         "listed": words.listed,
         "what_breaks": words.what_breaks,
         "embedded": _embedded,

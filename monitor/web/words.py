@@ -153,6 +153,16 @@ def day(moment: str | datetime | None) -> str:
     return text[:10]
 
 
+def earliest_and_latest(interval: tuple[str | None, str | None] | None) -> str:
+    """Say within which days something lies, in brackets; an end that is open is named as such."""
+    if interval is None or interval == (None, None):
+        return ""
+    first, last = interval
+    if last is None:
+        return f" ({day(first)} at the earliest, perhaps never)"
+    return f" ({day(last)} at the latest)" if first is None else f" (between {day(first)} and {day(last)})"
+
+
 def how_far(row: FleetTableRow) -> str:
     """Say how far a parameter is, in words that its class asks for."""
     unit = "" if row.unit == "1" else f" {row.unit}"

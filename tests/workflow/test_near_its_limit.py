@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from monitor.cli.trend_output import _crosses
 from monitor.records import VOLUMETRIC
 from monitor.reporting.adjusting import SEE_FIRST
 from monitor.reporting.health.records import State
 from monitor.store import Database, machine_history, save_analysis
 from monitor.uncertainty.conformity import conformity
 from monitor.web.pages.fleet import machine_rows
-from monitor.web.words import how_far
+from monitor.web.words import earliest_and_latest, how_far
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.attention import Attention
 from monitor.workflow.fleet.fleet import fleet
@@ -30,7 +32,7 @@ LIMIT = 50.0
 #: What the readings cannot tell, in the stored u of each run.
 U = 1.0
 NOTHING = SimpleNamespace(suspect=())
-MACHINES = ("a-near", "b-far", "c-out", "d-scatters", "e-stepped", "f-drifts", "g-weekly")
+MACHINES = ("a-near", "b-far", "c-out", "d-scatters", "e-stepped", "f-drifts", "g-weekly", "h-back")
 
 
 def _levels(machine: str) -> np.ndarray:
@@ -45,6 +47,7 @@ def _levels(machine: str) -> np.ndarray:
         "e-stepped": np.where(day < 15, 45.0, 12.0) + 1.0 * scatter,
         "f-drifts": 10.0 + 14.0 * day / (DAYS - 1) + 0.5 * scatter,
         "g-weekly": 20.0 + 2.0 * scatter,
+        "h-back": np.where(day < 3, 40.0, 72.0 - 10.0 * day / (DAYS - 1)),
     }[machine]
 
 
@@ -118,12 +121,13 @@ def test_a_limit_that_is_near_goes_before_days_that_differ(rows: dict[str, Fleet
         name: row.attention for name, row in rows.items() if name not in ("b-far", "e-stepped", "g-weekly")
     } == {
         "c-out": Attention.OUT,
+        "h-back": Attention.OUT,
         "a-near": Attention.MAY_BE_OUT,
         "d-scatters": Attention.DUE,
         "f-drifts": Attention.DRIFTS_OUT,
         "z-no-limit": Attention.DAYS_DIFFER,
     }
-    assert list(rows)[:2] == ["c-out", "a-near"]
+    assert list(rows)[:3] == ["c-out", "h-back", "a-near"]
     # A step of the past is not a limit that is near.
     assert {rows["b-far"].attention, rows["e-stepped"].attention} <= {
         Attention.DAYS_DIFFER,
@@ -134,6 +138,33 @@ def test_a_limit_that_is_near_goes_before_days_that_differ(rows: dict[str, Fleet
     (row,) = machine_rows([near], {}, {}, {})
     assert (row.urgency.word, row.worst) == ("act now", near)
     assert "in tolerance at the next check (" in how_far(rows["d-scatters"])
+
+
+@pytest.mark.parametrize("machine", ["c-out", "h-back"])
+def test_what_is_beyond_its_limit_is_so_since_a_day_and_reaches_none(
+    shop: Path, rows: dict[str, FleetTableRow], machine: str
+) -> None:
+    """The line of the second comes back to the limit some day: that day is not when the limit is reached."""
+    with Database(shop, threads=1, read_only=True) as db:
+        stated = trend(db, TrendRequest(machine)).parameters["EXX"]
+        history = machine_history(db, machine)
+    values = np.abs(history.values[:, 0])
+    first = history.started_at[int(np.flatnonzero(values <= LIMIT)[-1]) + 1]
+    forecast = stated.forecast
+    assert forecast.beyond_since is not None
+    assert datetime.fromisoformat(forecast.beyond_since) == first.replace(microsecond=0)
+    assert rows[machine].onset == first.isoformat()
+    assert (forecast.crosses_limit_at, forecast.crosses_limit_interval) == (None, None)
+    assert _crosses(stated) == f"since {first:%Y-%m-%d}"
+
+
+def test_an_open_end_of_an_interval_has_words() -> None:
+    assert (
+        earliest_and_latest(("2026-11-10T12:00:00", None)) == " (2026-11-10 at the earliest, perhaps never)"
+    )
+    assert earliest_and_latest((None, "2026-11-10")) == " (2026-11-10 at the latest)"
+    assert earliest_and_latest(("2026-11-10", "2027-01-02")) == " (between 2026-11-10 and 2027-01-02)"
+    assert earliest_and_latest(None) == ""
 
 
 def test_a_map_that_may_be_beyond_its_limit_says_so_in_the_fleet(tmp_path: Path) -> None:
