@@ -189,7 +189,11 @@ class WarmUp:
 
 @dataclass(frozen=True)
 class LimitForecast:
-    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check."""
+    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check.
+
+    ``beyond_since`` is the first of the runs without a break that are beyond the limit, where the last one is: then it
+    is not reached any more, and ``crosses_limit_at`` is None.
+    """
 
     limit: float | None
     crosses_limit_at: str | None
@@ -199,6 +203,7 @@ class LimitForecast:
     recommended_interval_days: float | None
     recommended_by: str | None
     why_no_forecast: Lack | None = field(metadata=WORDED)
+    beyond_since: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
