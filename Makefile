@@ -107,7 +107,7 @@ object-store: setup  ## a lake whose files lie in an object store, that of moto 
 growth: setup  ## bytes a campaign over simulated years, backups, archive, compaction (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/growth.py $(ARGS)
 
-newest-duckdb: setup  ## the tests of the store against the newest DuckDB that can be had (docs/reliability.md)
+newest-duckdb: setup  ## the whole suite against the newest DuckDB that can be had (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/setup/newest_duckdb.py $(ARGS)
 
 lake: setup  ## plants that publish to one lake at once, some killed in the middle (docs/scale.md); needs PostgreSQL

@@ -216,7 +216,7 @@ def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
         if wave.p_value is not None and wave.p_value < STATED_P:
             yield _cycle(name, wave)
     warmth = parameter.warm_up
-    if warmth is not None and warmth.p_value < STATED_P and warmth.stable_after_h is not None:
+    if warmth is not None and warmth.q_value is not None and warmth.q_value < STATED_P:
         yield _warm_up(name, warmth)
 
 
@@ -230,10 +230,25 @@ def _cycle(name: str, wave: Cycle) -> str:
 
 
 def _warm_up(name: str, warmth: WarmUp) -> str:
-    return (
-        f"{name}: warms up by {warmth.amplitude:.3g} {warmth.unit} with a time constant of "
-        f"{warmth.tau_h:.2g} h; stable after {warmth.stable_after_h:.2g} h"
+    moves, within, stable = (
+        "falls" if warmth.amplitude > 0.0 else "rises",
+        warmth.recorded_h,
+        warmth.stable_after_h,
     )
+    ends = (
+        f"not yet stable after the {_hours(within)} h recorded"
+        if stable is None or stable > within
+        else f"stable after {_hours(stable)} h"
+    )
+    return (
+        f"{name}: warms up: {moves} by {abs(warmth.amplitude):.3g} {warmth.unit} within {_hours(within)} h, time "
+        f"constant {_hours(warmth.tau_h)} h; {ends}"
+    )
+
+
+def _hours(hours: float) -> str:
+    """Two digits, never in powers of ten."""
+    return f"{float(f'{hours:.2g}'):.10g}"
 
 
 def _minute(at: str | None) -> str:

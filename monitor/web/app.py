@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -63,14 +64,18 @@ _PAGES = (
 )
 
 
-def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:
-    """Return the server of an open database. Raises InputError for a file of users that is wrong."""
+def application(
+    db: Database, settings: ServerSettings, working_folder: Path,
+    newer: Callable[[], Database | None] | None = None,
+) -> Gate:  # fmt: skip
+    """Return the server of an open database; ``newer`` as in ``Served``. Raises InputError for a file of users that is
+    wrong."""
     role = Role.VIEWER if settings.reading_only else Role.APPROVER
     users = None if settings.users is None else UserFile(settings.users, looking_only=settings.reading_only)
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     db.type_tolerances = settings.tolerances
-    asker = Asker(db, settings.trusted_signers)
+    asker = Asker(db, settings.trusted_signers, newer)
     app.state.settings = settings
     app.state.sessions = Sessions(users, User(host_user_name(), role))
     app.state.asker = asker

@@ -173,7 +173,7 @@ def terminal(environment: dict[str, str], tmp_path: Path) -> Callable[..., str]:
         leader, follower = pty.openpty()
         own = {**environment, "TERM": "xterm-256color", "COLUMNS": str(columns)}
         with subprocess.Popen(
-            [sys.executable, "-m", "monitor.cli", *(str(one) for one in arguments)],
+            [sys.executable, "-m", "monitor", *(str(one) for one in arguments)],
             stdin=follower, stdout=follower, stderr=follower, env=own, cwd=tmp_path, close_fds=True,
         ) as process:  # fmt: skip
             os.close(follower)

@@ -6,6 +6,8 @@ import argparse
 import importlib
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,12 @@ def test_json_and_quiet_are_taken_before_the_verb_too(typed: Any) -> None:
         2,
         "monitor: --quiet says nothing and --json says all: choose one\n",
     )
+
+
+def test_the_package_is_the_command(capfd: pytest.CaptureFixture[str]) -> None:
+    """``python -m monitor``, for those who do not have the command on their path."""
+    subprocess.run([sys.executable, "-m", "monitor", "--version"], check=True)
+    assert capfd.readouterr().out == f"monitor {__version__}\n"
 
 
 def test_version(typed: Any) -> None:

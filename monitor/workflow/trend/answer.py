@@ -167,18 +167,24 @@ class Cycle:
 
 @dataclass(frozen=True)
 class WarmUp:
-    """The warm-up of a campaign that was begun cold or hot: its time constant, and when the machine is stable."""
+    """The warm-up of the days that a campaign began cold or hot: its time constant, and when the machine is stable.
+
+    ``amplitude`` is by how much the first run of a day lies above what it comes to within the hours recorded;
+    ``q_value`` the false discovery rate over all parameters.
+    """
 
     campaign: str
     amplitude: float
     u: float
     unit: str
+    recorded_h: float
     tau_h: float
     tau_interval_h: tuple[float | None, float | None]
     stable_after_h: float | None
     stable_interval_h: tuple[float | None, float | None]
     stable_within: float
     p_value: float
+    q_value: float | None = None
 
 
 @dataclass(frozen=True)

@@ -52,10 +52,10 @@ from monitor.workflow.trend.parameter import (
     drift_statement,
     latest_mean,
     number,
-    warming,
 )
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
+from monitor.workflow.trend.warming import warming
 
 #: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
 NEXT_CHECK_D = 30.0
@@ -289,7 +289,7 @@ class _Page:
         effects, why_no_effects = conditions(series, self._channels(past), drift.begins)
         waves, why_no_waves = cycles(drift.piece)
         rng = np.random.default_rng([SEED, len(series.t)])
-        warmth, why_no_warmth = warming(series, self.history.campaign[past.mask], rng)
+        warmth, why_no_warmth = warming(series, self.history.campaign[past.mask], search.changes, rng)
         test, why_no_test = backtested(drift)
         limit = self.history.tolerances.get(series.name)
         return ParameterTrend(
@@ -346,10 +346,20 @@ def _with_event_steps(
 
 
 def _with_discovery_rates(parameters: Mapping[str, ParameterTrend]) -> dict[str, ParameterTrend]:
-    """The parameters with the false discovery rate over the drifts of all of them."""
-    p_values = [parameter.drift.p_value for parameter in parameters.values()]
-    q = control_false_discoveries([np.nan if p is None else p for p in p_values]).q_value
+    """The parameters with the false discovery rates over the drifts of all of them, and over their warm-ups."""
+
+    def rates(p_values: list[float | None]) -> Array:
+        return control_false_discoveries([np.nan if p is None else p for p in p_values]).q_value
+
+    drifts = rates([parameter.drift.p_value for parameter in parameters.values()])
+    warm_ups = rates(
+        [None if (warmth := each.warm_up) is None else warmth.p_value for each in parameters.values()]
+    )
     return {
-        name: replace(parameter, q_value=number(float(rate)))
-        for (name, parameter), rate in zip(parameters.items(), q, strict=True)
+        name: replace(
+            parameter,
+            q_value=number(float(drift)),
+            warm_up=parameter.warm_up and replace(parameter.warm_up, q_value=number(float(warmth))),
+        )
+        for (name, parameter), drift, warmth in zip(parameters.items(), drifts, warm_ups, strict=True)
     }
