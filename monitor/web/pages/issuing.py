@@ -25,6 +25,7 @@ from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
 from monitor.web.laboratory_form import box_of, form_words, groups, laboratory_file, texts_of_file
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 from monitor.web.users import User
@@ -146,6 +147,7 @@ def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Res
     from monitor.workflow.certificate.request import METHODS, RULES
 
     campaign = texts.get("campaign", "")
+    named_campaign(request, campaign)
     runs = request.app.state.asker(request.state.user, "runs", {"campaign": campaign}).runs
     return page(
         request, "certificate_new.html", status=outcome.refusal.status if outcome.refusal else 200,
