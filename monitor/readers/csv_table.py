@@ -9,11 +9,15 @@ from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.cut_files import CUT, is_cut
+from monitor.readers.delimited import is_number
 from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.foreign_units import foreign_unit
 from monitor.readers.spreadsheet import plain_csv
 
 #: Lines at the top of a file among which the head may stand under a title.
 LOOKED_AT = 8
+#: In a row of units: of a column that has none.
+_NO_UNIT = frozenset({"-", "–", "—", "1"})
 _NAME = re.compile(r"[A-Za-z]\w*")
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
@@ -53,6 +57,7 @@ def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False
     lines = plain_csv(file, text, faults).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
+    lines = _without_empty_columns(lines)
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)
     if longest is None:
         faults.add(file, 1, None, "the file is empty; its first line names the columns")
@@ -79,6 +84,18 @@ def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False
     if not _header_is_sound(file, header, faults):
         return None
     return _body(file, header, lines, faults, of_workbook=of_workbook)
+
+
+def _without_empty_columns(lines: list[str]) -> list[str]:
+    """Return the lines without the columns at the right that hold nothing, name included, as spreadsheets save them."""
+    head = lines[0].rstrip("\r") if lines else ""
+    count = len(head) - len(head.rstrip(","))
+    if not count or not head.strip(","):
+        return lines
+    ends = [line.rstrip("\r") for line in lines]
+    if not all(line.endswith("," * count) for line in ends if line):
+        return lines
+    return [line[:-count] for line in ends]
 
 
 def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
@@ -135,15 +152,18 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_
     damaged: list[tuple[str, ...]] = []
     width = len(header)
     for number, row in _rows(lines):
-        if not isinstance(row, csv.Error) and len(row) == width:
-            rows.append(row)
-            at.append(number)
-            continue
         if isinstance(row, csv.Error):
             faults.add(file, number, None, _what(row))
             damaged.append(())
-        elif not row:
-            faults.add(file, number, None, "the line is empty; remove it")
+            continue
+        is_whole = len(row) == width
+        # Of a million rows those alone are looked at that may be none.
+        may_be_none = number == 2 or not is_whole or not row[-1] or not row[0]
+        if may_be_none and (why := _why_no_row(number, row, width)):
+            faults.add(file, number, None, why)
+        elif is_whole:
+            rows.append(row)
+            at.append(number)
         else:
             hint = "; is a comma used as decimal point?" if len(row) > width and not of_workbook else ""
             faults.add(file, number, None, f"{len(row)} cells where the header has {width}{hint}")
@@ -152,6 +172,19 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_
         faults.add(file, 1, None, "there is only a header; at least one row must follow")
     columns = list(zip(*rows, strict=True)) if rows else [()] * width
     return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged), of_workbook)
+
+
+def _why_no_row(number: int, row: list[str], width: int) -> str:
+    """Return why a line is no row: nothing in it, units under the head, a remark; empty where it may be one."""
+    cells = [cell.strip() for cell in row if cell.strip()]
+    if not cells:
+        return "the line is empty; remove it"
+    units = [foreign_unit(cell.strip("[]()")) for cell in cells if cell not in _NO_UNIT]
+    if number == 2 and len(units) > 1 and None not in units:
+        return "this is a row of units; remove it: the names of the columns have their units"
+    if len(cells) == 1 and width > 2 and not is_number(cells[0]) and cells[0] == row[0].strip():
+        return f"this is no row of the table, only {quoted(cells[0])}; remove it"
+    return ""
 
 
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:

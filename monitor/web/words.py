@@ -180,6 +180,22 @@ def so_far(ticket: Ticket) -> str:
     return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"
 
 
+def importing(ticket: Ticket) -> str:
+    """Say at which of its folders an import is."""
+    total = len(ticket.document["folders"])
+    if not ticket.said:
+        return "The upload is here and waits for another import"
+    return f"Importing {ticket.said[-1]}" + (f", {len(ticket.said)} of {total} folders" if total > 1 else "")
+
+
+def asked_for(ticket: Ticket) -> str:
+    """Say what is being computed: the question with what it is about."""
+    folders = ticket.document.get("folders")
+    if folders is not None:
+        return f"import of {counted(len(folders), 'folder')}: {listed(folders)}"
+    return " ".join([ticket.question, *(f"{key} {value}" for key, value in ticket.document.items())])
+
+
 def without_option(text: str) -> str:
     """Return a refusal without the dashes of the option that it begins with: the box of a page has its name."""
     return re.sub(r"^--([a-z-]+ )", r"\1", text)

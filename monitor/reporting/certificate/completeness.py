@@ -25,6 +25,8 @@ _STATED = {
 }
 #: Written where nothing is known: a reader learns no more from it than from a blank. Not "na", which is a name too.
 _PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba", "t.b.d."})
+#: Units that have neither a letter nor a digit: of a relative humidity, of an angle.
+_UNITS_OF_SIGNS = frozenset({"%", "‰", "°", "′", "″"})
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ def gaps_of_text(text: str) -> list[str]:
     if not text.strip():
         return [""]
     said = text.strip().casefold()
-    if said in _PLACEHOLDERS or not any(sign.isalnum() for sign in said):
+    if said in _PLACEHOLDERS or not (said in _UNITS_OF_SIGNS or any(sign.isalnum() for sign in said)):
         return [f"{text.strip()!r} says nothing"]
     return []
 

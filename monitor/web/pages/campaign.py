@@ -28,14 +28,20 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/campaigns")
-    def campaigns(request: Request, most: int = MOST_LISTED) -> Response:
-        """List the latest so many campaigns."""
+    def campaigns(
+        request: Request, most: int = MOST_LISTED, containing: str = "", machine: str = "", method: str = ""
+    ) -> Response:
+        """List the latest so many campaigns, of all or of those that were searched."""
+        ask, user = request.app.state.asker, request.state.user
+        wanted = {"containing": containing, "machine": machine, "method": method}
+        filled = {name: text for name, text in wanted.items() if text.strip()}
+        every = ask(user, "campaigns", {"latest": most})
+        answer = ask(user, "campaigns", {"latest": most, **filled}) if filled else every
         return page(
-            request,
-            "campaigns.html",
-            most=most,
-            answer=request.app.state.asker(request.state.user, "campaigns", {"latest": most}),
-        )
+            request, "campaigns.html", most=most, answer=answer, wanted=wanted, filled=filled,
+            machines=sorted({row.machine for row in every.campaigns} | {machine} - {""}),
+            methods=sorted({row.method for row in every.campaigns} | {method} - {""}),
+        )  # fmt: skip
 
     @router.get("/campaign")
     def campaign(

@@ -77,8 +77,8 @@ def routes() -> APIRouter:
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if len(missing) > 1 else None,
             falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
-            versions=versions, current=current, latest=_latest(versions, label), pinned=pinned,
-            changes=changes,
+            versions=_of_method(versions, row.method, label), current=current, latest=_latest(versions, label),
+            pinned=pinned, changes=changes,
             waiting=answers.waiting,
         )  # fmt: skip
 
@@ -212,6 +212,21 @@ def _latest(versions: Any, label: str) -> Any:
     name = label.partition("@")[0]
     of_model = [version for version in versions if version.name == name]
     return max(of_model, key=lambda version: version.version, default=None)
+
+
+def _of_method(versions: Any, method: str, shown: str) -> list[Any]:
+    """The versions that descend from a method's own model, whose base effects alone fit its campaigns; and what is
+    shown, whatever it is."""
+    parents = {pinned(version.model): version.parent for version in versions}
+
+    def root(label: str) -> str:
+        while parents.get(label):
+            label = pinned(parents[label])
+        return label.partition("@")[0]
+
+    return [
+        version for version in versions if version.model == shown or root(pinned(version.model)) == method
+    ]
 
 
 def _version(versions: Any, name: str) -> Any:

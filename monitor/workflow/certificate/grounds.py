@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from monitor.exceptions import InputError, RefusedResultError
 from monitor.records import Campaign
+from monitor.reporting.certificate.completeness import MissingItem
 from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.store import StoredModel
@@ -13,6 +14,25 @@ from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 #: Grounds of one run that speak against the others too, whose covariance is pooled with it.
 OF_ANY_RUN = (GroundKind.UNITS, GroundKind.GROSS_READINGS)
+
+
+class RefusedGroundsError(RefusedResultError):
+    """A certificate against which ``grounds`` speak that nobody accepts; ``missing`` is what else it lacks."""
+
+    def __init__(self, grounds: Sequence[Ground], missing: Sequence[MissingItem] = ()) -> None:
+        self.grounds, self.missing = tuple(grounds), tuple(missing)
+        texts = texts_of()
+        kinds = dict.fromkeys(ground.kind for ground in grounds)
+        options = " ".join(f"--accept {kind}=REASON" for kind in kinds)
+        lines = [
+            "the certificate is refused:",
+            *(f"  {ground.kind}: {ground_sentence(ground, texts)}" for ground in grounds),
+            "Correct what is wrong; or, where the laboratory can answer for it, say why, which is printed on the "
+            f"certificate: {options}",
+        ]
+        if missing:
+            lines += ["and besides it lacks:", *(f"  {gap}" for gap in missing)]
+        super().__init__("\n".join(lines))
 
 
 def grounds_against(
@@ -44,7 +64,7 @@ def accepted_grounds(
 ) -> tuple[AcceptedGround, ...]:
     """The grounds with the reasons for which they are accepted.
 
-    Raises RefusedResultError naming every ground that is not, InputError for one that is accepted and not there.
+    Raises RefusedGroundsError naming every ground that is not, InputError for one that is accepted and not there.
     """
     by_kind: dict[GroundKind, list[Ground]] = {}
     for ground in grounds:
@@ -54,19 +74,7 @@ def accepted_grounds(
         raise InputError(
             f"--accept {absent[0]}: there is nothing to accept, no such ground speaks against this certificate"
         )
-    refused = {kind: of_kind for kind, of_kind in by_kind.items() if kind not in reasons}
+    refused = [ground for kind, of_kind in by_kind.items() if kind not in reasons for ground in of_kind]
     if refused:
-        texts = texts_of()
-        lines = [
-            f"  {kind}: {ground_sentence(ground, texts)}"
-            for kind, of_kind in refused.items()
-            for ground in of_kind
-        ]
-        options = " ".join(f"--accept {kind}=REASON" for kind in refused)
-        raise RefusedResultError(
-            "the certificate is refused:\n"
-            + "\n".join(lines)
-            + "\nCorrect what is wrong; or, where the laboratory can "
-            f"answer for it, say why, which is printed on the certificate: {options}"
-        )
+        raise RefusedGroundsError(refused)
     return tuple(AcceptedGround(kind, tuple(of_kind), reasons[kind]) for kind, of_kind in by_kind.items())

@@ -12,7 +12,9 @@ from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
+from monitor.reporting.certificate.completeness import missing_items
 from monitor.reporting.certificate.dcc_elements import NEWEST
+from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord
@@ -33,7 +35,7 @@ from monitor.workflow.certificate.certified import CertifiedRun, certified_run, 
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.effects import effects_of
 from monitor.workflow.certificate.files import finish_left, keep_issued, path_of, prepared, publish
-from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
+from monitor.workflow.certificate.grounds import RefusedGroundsError, accepted_grounds, grounds_against
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
     check_adjustment,
@@ -57,8 +59,8 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     """Issue a certificate: the PDF as a file, record and document in the database.
 
     Raises IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open,
-    RefusedResultError with the grounds that speak against it and are not accepted, InputError where the campaign states
-    no tolerances or the key does not open.
+    RefusedGroundsError with the grounds that speak against it and are not accepted, and what is left open besides;
+    InputError where the campaign states no tolerances or the key does not open.
     """
     stated = read_laboratory(request.laboratory)
     campaign = machine_campaign(db, request.campaign, "certificate issue", lambda method: method.certificate)
@@ -78,7 +80,13 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     grounds = grounds_against(campaign, model, stored)
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
-    accepted = accepted_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
+    accepted: tuple[AcceptedGround, ...] = ()
+    refused = None
+    try:
+        accepted = accepted_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
+    except RefusedGroundsError as refusal:
+        # Who has to answer for it hears at once what else is missing.
+        refused = refusal
     inputs = inputs_of(runs, request.asked, request.fonts)
     effects = [effects_of(db, run.evaluated) for run in runs]
 
@@ -99,6 +107,9 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
             dcc_version=_dcc_version(request, stated),
         )
 
+    if refused is not None:
+        missing = missing_items(recorded(request.number or next_number(db, day.year)))
+        raise RefusedGroundsError(refused.grounds, missing) from refused
     for _ in range(_NUMBERS):
         # Nobody waits while a page is rendered; whoever was quicker has the number, and this one takes the next.
         with contextlib.suppress(TakenNumberError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
-from monitor.records import Array
+from monitor.records import VOLUMETRIC, Array
 from monitor.reporting import messages
 from monitor.statistics import control_false_discoveries
 from monitor.store import (
@@ -29,7 +29,6 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
-from monitor.units import CONDITION_SUFFIXES
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -166,7 +165,7 @@ def _answer(
             *_simulated(db, history),
             *_not_followed(history),
             *_of_older_version(db, request),
-            *_limits_of_type(db, history),
+            *_limits_of_type(db, history, past if request.parameter is None else None),
             *_refuted(refuted),
         ),
         false_alarm=FALSE_ALARM,
@@ -205,12 +204,19 @@ def _answer(
     )
 
 
-def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
-    """Where the limits come from, where they are not the campaign's own."""
+def _limits_of_type(db: Database, history: MachineHistory, past: Collection[str] | None) -> tuple[str, ...]:
+    """Where the limits come from, where they are not the campaign's own, or that none is of a parameter of ``past``.
+
+    ``past`` is None where not all parameters were asked for.
+    """
     name = tolerance_types(db).get(history.machine)
     if name is None:
         return ()
-    return (messages.limits_of_type(name),)
+    limits = db.type_tolerances[name]
+    if past is None or not {VOLUMETRIC, *past}.isdisjoint(limits):
+        return (messages.limits_of_type(name),)
+    hint = next(filter(None, (did_you_mean(limit, past) for limit in limits)), "")
+    return (messages.limits_of_others(name, tuple(limits), hint),)
 
 
 def _simulated(db: Database, history: MachineHistory) -> tuple[str, ...]:
@@ -310,11 +316,7 @@ class _Page:
         """The recorded conditions of the runs, not what instruments read. The method, with its instruments where setups
         name them, is one too: 1 for the runs of each but the first."""
         mask = past.mask
-        channels = {
-            name: values[mask]
-            for name, values in self.history.conditions.items()
-            if name not in self.history.channels or name.rpartition("_")[2] in CONDITION_SUFFIXES
-        }
+        channels = {name: values[mask] for name, values in self.history.true_conditions.items()}
         if len(set(self.history.measured_by.tolist())) > 1:
             method = self.history.measured_by[mask]
             for name in list(dict.fromkeys(method.tolist()))[1:]:
