@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
+from monitor.cli.forecast_output import forecast_start
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -67,6 +68,8 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
         )
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
+    for name, parameter in parameters:
+        yield from forecast_start(name, parameter)
     yield from _charts(answer)
     latest = max((parameter.mean.latest_at or "" for _, parameter in parameters), default="")
     yield from _volumetric(answer.volumetric_error, latest)
