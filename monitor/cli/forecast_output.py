@@ -27,11 +27,11 @@ def forecast_start(name: str, parameter: ParameterTrend) -> Iterator[str]:
     unit, by = parameter.unit, ""
     if start.temperature is not None and start.by_temperature is not None:
         by = (
-            f" at {start.temperature:.1f} °C, the mean of its runs ({start.by_temperature:.2g} {unit} of the difference "
-            f"go with the {start.latest_temperature:.1f} °C of the latest)"
+            f" at {start.temperature:.1f} °C, the mean of its runs ({start.by_temperature:.2g} {unit} of the "
+            f"difference go with the {start.latest_temperature:.1f} °C of the latest)"
         )
     yield (
-        f"{name}: the day at the limit is counted from {start.value:.3g} {unit}, where the line through all days stands "
-        f"at the last run{by}; by the same slope the latest mean, {parameter.mean.latest:.3g} {unit}, comes to it on "
-        f"{start.from_latest_at[:10]}"
+        f"{name}: the day at the limit is counted from {start.value:.3g} {unit}, where the line through all days "
+        f"stands at the last run{by}; by the same slope the latest mean, {parameter.mean.latest:.3g} {unit}, comes "
+        f"to it on {start.from_latest_at[:10]}"
     )
