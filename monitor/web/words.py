@@ -265,15 +265,9 @@ def _another_instrument(test: TestAnswer | None) -> str:
 def what_breaks(tie: Tie) -> str:
     """Say what tells the rivals of a tie apart."""
     drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
-    recorded = "both" if len(tie.drivers) == 2 else "it"
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: (
-            f"measure runs within which {drivers} change{', not together' if len(tie.drivers) == 2 else 's'}, and "
-            f"record {recorded}"
-            if tie.within_runs
-            else f"measure runs at several values of {drivers}, and record {recorded}"
-        ),
+        TieBreak.DRIVERS: f"measure {tie.what_to_measure.replace('_', ' ')}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
         TieBreak.MORE_POSES: (
