@@ -79,6 +79,8 @@ def _environment() -> Environment:
         "day": words.day,
         "counted": words.counted,
         "so_far": words.so_far,
+        "aligned": words.aligned,
+        "as_fine_as": words.as_fine_as,
         "earliest_and_latest": words.earliest_and_latest,
         "listed": words.listed,
         "what_breaks": words.what_breaks,

@@ -92,6 +92,7 @@ NOT_IDENTIFIED = Urgency(
     _OPEN.word,
     "identify: its readings are here, its errors are not computed from them by this version of its model yet",
 )
+BEING_COMPUTED = Urgency(_OPEN.colour, _OPEN.shape, _OPEN.word, "its numbers are being computed")
 #: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
 UNEXPLAINED = "the model does not explain the latest readings"
 DOES_NOT_FIT = Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "")
@@ -110,6 +111,24 @@ def number(value: float | None, digits: int = 3) -> str:
     if "e" in text and 1e-4 <= abs(value) < 1e7:
         text = f"{value:.0f}"
     return text.replace("-", "−")
+
+
+def aligned(value: float | None, digits: int = 3) -> str:
+    """Return a number of a column with all its digits, zeros at the end too: 41.0 beside 22.3."""
+    text = number(value, digits)
+    if value is None or not math.isfinite(value) or "e" in text:
+        return text
+    lacking = digits - len(text.lstrip("−0.").replace(".", ""))
+    if lacking <= 0 or value == 0.0:
+        return text
+    return f"{text}{'' if '.' in text else '.'}{'0' * lacking}"
+
+
+def as_fine_as(value: float | None, u: float | None) -> str:
+    """Return a value with as many decimals as its uncertainty has of two digits (JCGM 100, 7.2.6)."""
+    if value is None or u is None or not math.isfinite(value) or not math.isfinite(u) or u <= 0.0:
+        return number(value)
+    return written(round_result(value, u).estimate).replace("-", "−")
 
 
 def channel(name: str) -> str:
