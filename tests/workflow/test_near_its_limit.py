@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from monitor.cli.trend_output import _crosses
+from monitor.cli.trend_output import _change, _crosses
 from monitor.records import VOLUMETRIC
 from monitor.reporting.adjusting import SEE_FIRST
 from monitor.reporting.health.records import State
@@ -191,3 +191,14 @@ def test_the_fleet_page_adjusts_nothing_by_a_model_that_does_not_explain(
         assert "adjust" in explained.next_step
         assert doubted.next_step == SEE_FIRST
         assert (doubted.attention, doubted.urgency) == (explained.attention, explained.urgency)
+
+
+def test_one_step_asked_for_alone_and_with_others_has_a_bound_and_not_two_p_values(tmp_path: Path) -> None:
+    with Database(tmp_path / "monitor.duckdb", threads=1) as db:
+        levels = np.where(np.arange(DAYS) < 15, 40.0, 10.0)
+        rng = np.random.default_rng(3)
+        keep(db, "M", [(level + rng.normal(size=3)).tolist() for level in levels], "M")
+        (change,) = trend(db, TrendRequest("M")).parameters["EXX"].changes
+    assert change.p_value == pytest.approx(1.0 / 2000.0)
+    assert change.p_at_most
+    assert "p at most 0.0005" in _change("EXX", change)
