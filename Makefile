@@ -101,13 +101,13 @@ soak: setup  ## a shop for an hour: imports, reports, pages, publishing and kill
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/soak.py $(ARGS)
 
 object-store: setup  ## a lake whose files lie in an object store, that of moto on loopback (docs/scale.md)
-	@$(RUN) -c 'import moto.server, flask' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt 'moto[server,s3]>=5'
+	@sh tests/setup/object_store.sh
 	@OMP_NUM_THREADS=1 $(RUN) -m pytest -n 0 -q tests/store/test_object_store.py $(ARGS)
 
 growth: setup  ## bytes a campaign over simulated years, backups, archive, compaction (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/growth.py $(ARGS)
 
-newest-duckdb: setup  ## the tests of the store against the newest DuckDB that can be had (docs/reliability.md)
+newest-duckdb: setup  ## the whole suite against the newest DuckDB that can be had (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/setup/newest_duckdb.py $(ARGS)
 
 lake: setup  ## plants that publish to one lake at once, some killed in the middle (docs/scale.md); needs PostgreSQL

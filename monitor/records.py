@@ -222,6 +222,10 @@ class LShape:
         return min(range(len(self.modules)), key=lambda index: sum(c**2 for c in self.modules[index].centre))
 
 
+#: The kinds of readings that tell where the tool point is against the work point, in the machine's own coordinates.
+FROM_TOOL_POINT = frozenset({"vector", "component", "distance", "displacement", "offset"})
+
+
 @dataclass(frozen=True)
 class Setup:
     """One way in which an instrument is set up: what one of its readings is a statement about.
@@ -254,6 +258,11 @@ class Setup:
     certificate: str | None = None
     drift_uncertainty: float | None = None
     tool_point_uncertainty: float | None = None
+
+    @property
+    def takes_tool_point(self) -> bool:
+        """Whether its readings count from a tool point that is taken as it is stated."""
+        return self.reading in FROM_TOOL_POINT and self.tool_point_uncertainty is None
 
 
 @dataclass(frozen=True)

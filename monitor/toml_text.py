@@ -1,13 +1,42 @@
-"""Says in plain words why a text is no TOML, where the parser's own words would not help."""
+"""Reads TOML that people write, and says in plain words why a text is none, where those of the parser do not help."""
 
 from __future__ import annotations
 
 import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
+from monitor.exceptions import InputError
 
 #: What the parser's message ends in.
 _WHERE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 #: A number behind a key with a comma where TOML has a point: ``EC0Y = 20,0``.
 _DECIMAL_COMMA = re.compile(r"[^#=\"']*=\s*([+-]?[0-9]+,[0-9]+)\s*(?:#.*)?")
+
+
+def toml_file(path: Path) -> dict[str, Any]:
+    """Return the tables of a file of settings. Raises InputError, with the line, for one that cannot be read."""
+    try:
+        content = read_bounded(path, LARGEST_SETTINGS)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+    return toml_tables(path, content)
+
+
+def toml_tables(file: object, content: bytes) -> dict[str, Any]:
+    """Return the tables in the bytes of a file. Raises InputError that names the file and the line."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(encoding_refusal(file, error)) from error
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{file}: brackets or names are nested too deeply to be read") from error
+    except ValueError as error:  # also a number of thousands of digits, which is no TOMLDecodeError
+        raise InputError(toml_refusal(file, error, text)) from error
 
 
 def toml_fault(error: ValueError, text: str) -> tuple[int | None, str]:

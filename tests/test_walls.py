@@ -66,6 +66,8 @@ ROOMS: dict[str, set[str]] = {
 ALLOWED: dict[str, set[str]] = {
     **dict.fromkeys(GROUND, GROUND),
     "__init__": set(),
+    # `python -m monitor`.
+    "__main__": {"cli"},
     **{room: GROUND | rooms for room, rooms in ROOMS.items()},
     # Data only: SQL and templates, found through importlib.resources.
     "migrations": set(),

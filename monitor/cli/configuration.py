@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import os
 import re
-import tomllib
 import zoneinfo
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import InputError, StoreError, did_you_mean
-from monitor.toml_text import encoding_refusal, toml_refusal
+from monitor.toml_text import toml_file
 
 NAME = "monitor.toml"
 #: The units of angle that a screen may have.
@@ -25,6 +24,7 @@ _TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
 _TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*|[A-Za-z0-9]+:\S+")
 _EFFECT_SIGN = ":"
+_AXIS_IN_SMALL_LETTERS = re.compile(r"(E[XYZABC]0?)([xyzabc][0-9]*)")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.
 # Paths without a leading / are counted from the folder of this file.
@@ -87,16 +87,7 @@ def configuration() -> Configuration:
 
 def read(file: Path) -> Configuration:
     """Read a configuration. Raises InputError with every fault of the file."""
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(encoding_refusal(file, error)) from error
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(toml_refusal(file, error, text)) from error
+    document = toml_file(file)
     faults = [fault for key, value in document.items() for fault in _faults(key, value, file)]
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
@@ -148,7 +139,11 @@ def _wrong_term(term: str) -> str:
             "no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, as an effect such as EXX:reversal, or "
             "volumetric"
         )
-    return _wrong_effect(term) if _EFFECT_SIGN in term else ""
+    if _EFFECT_SIGN in term:
+        return _wrong_effect(term)
+    if small := _AXIS_IN_SMALL_LETTERS.fullmatch(term):
+        return f"axes are named by capital letters; did you mean {small[1]}{small[2].upper()}?"
+    return ""
 
 
 def _one_type_twice(types: Iterable[str]) -> str | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import getpass
 import os
+import shlex
 import sys
 from argparse import Namespace
 from collections.abc import Callable
@@ -163,11 +164,13 @@ def check_path(path: str, *, may_be_new: bool) -> None:
 
         check_database_name(path)
     if not may_be_new and Path(path).parent.is_dir() and not Path(path).exists():
-        raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
+        raise NotFoundError(
+            f"there is no database {path}; `monitor --db {shlex.quote(str(path))} import FOLDER` makes one"
+        )
     if not may_be_new and Path(path).is_file() and Path(path).stat().st_size == 0:
         raise NotFoundError(
             f"{path} is an empty file, as a full disk leaves one: restore a backup with `monitor --db OTHER restore "
-            f"BACKUP`; where there was no database yet, `monitor --db {path} import FOLDER` makes one"
+            f"BACKUP`; where there was no database yet, `monitor --db {shlex.quote(str(path))} import FOLDER` makes one"
         )
 
 

@@ -40,6 +40,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     _taken_up(answer)
+    _as_stated(answer)
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
@@ -62,6 +63,20 @@ def _taken_up(answer: IdentifyAnswer) -> None:
     unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
     if unseen:
         output.say(f"such readings see nothing of {', '.join(unseen)}")
+
+
+def _as_stated(answer: IdentifyAnswer) -> None:
+    """The stated tool points that numbers count from."""
+    for stated in answer.as_stated or ():
+        moved = ", ".join(f"{' and '.join(names)} with its {axis}" for axis, names in stated.moved.items())
+        output.say(
+            f"tool_point_mm of {stated.name} is taken as stated: {moved} {'moves' if _is_one(stated.moved) else 'move'}"
+            ", and u does not say how well it is known (state tool_point_standard_uncertainty_mm)"
+        )
+
+
+def _is_one(moved: Mapping[str, tuple[str, ...]]) -> bool:
+    return sum(map(len, moved.values())) == 1
 
 
 def _doing_the_same(names: tuple[str, ...]) -> str:

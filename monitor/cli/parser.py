@@ -73,6 +73,13 @@ AT_HOME = ("demo", "restore", "serve", "watch", "config", "completion")
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 
 
+#: What argparse says of a number, and what would be right.
+_SAID_OF_NUMBERS = {
+    "invalid int value: (.*)$": r"a whole number, such as 3, not \1",
+    "invalid float value: (.*)$": r"a number, such as 0.95, not \1",
+}
+
+
 class _TypedOnce(argparse.Action):
     """Takes one value; refuses a second one, of which argparse would take the last without a word."""
 
@@ -106,7 +113,10 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(*arguments, **keywords)
 
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {message}; {self._hint(message)}`{self.prog} --help` shows how", file=sys.stderr)
+        hint = self._hint(message)
+        for wrong, right in _SAID_OF_NUMBERS.items():
+            message = re.sub(wrong, right, message)
+        print(f"{self.prog}: {message}; {hint}`{self.prog} --help` shows how", file=sys.stderr)
         sys.exit(2)
 
     def _hint(self, message: str) -> str:

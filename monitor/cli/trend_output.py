@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
+from monitor.cli.forecast_output import forecast_start
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -67,18 +68,30 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
         )
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
+    for name, parameter in parameters:
+        yield from forecast_start(name, parameter)
     yield from _charts(answer)
     latest = max((parameter.mean.latest_at or "" for _, parameter in parameters), default="")
     yield from _volumetric(answer.volumetric_error, latest)
     yield from _next_check(answer)
     yield from _backtest(answer)
     yield from resemblance(answer)
-    yield from dict.fromkeys(str(parameter.drift.why) for _, parameter in parameters if parameter.drift.why)
+    yield from _no_slopes(answer)
     if answer.weekly_looks is not None:
         yield from weekly_lines(answer.weekly_looks)
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
     yield from answer.figures or ()
+
+
+def _no_slopes(answer: TrendAnswer) -> Iterator[str]:
+    """Why parameters have no slope a year; which ones, where others have one or lack it for another reason."""
+    lacking: dict[str, list[str]] = {}
+    for name, parameter in answer.parameters.items():
+        if parameter.drift.why is not None:
+            lacking.setdefault(str(parameter.drift.why), []).append(name)
+    for why, names in lacking.items():
+        yield why if len(names) == len(answer.parameters) else f"{', '.join(names)}: {why}"
 
 
 def out_of_tolerance(name: str, parameter: ParameterTrend) -> Iterator[str]:
@@ -224,7 +237,7 @@ def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
         if wave.p_value is not None and wave.p_value < STATED_P:
             yield _cycle(name, wave)
     warmth = parameter.warm_up
-    if warmth is not None and warmth.p_value < STATED_P and warmth.stable_after_h is not None:
+    if warmth is not None and warmth.q_value is not None and warmth.q_value < STATED_P:
         yield _warm_up(name, warmth)
 
 
@@ -238,10 +251,25 @@ def _cycle(name: str, wave: Cycle) -> str:
 
 
 def _warm_up(name: str, warmth: WarmUp) -> str:
-    return (
-        f"{name}: warms up by {warmth.amplitude:.3g} {warmth.unit} with a time constant of "
-        f"{warmth.tau_h:.2g} h; stable after {warmth.stable_after_h:.2g} h"
+    moves, within, stable = (
+        "falls" if warmth.amplitude > 0.0 else "rises",
+        warmth.recorded_h,
+        warmth.stable_after_h,
     )
+    ends = (
+        f"not yet stable after the {_hours(within)} h recorded"
+        if stable is None or stable > within
+        else f"stable after {_hours(stable)} h"
+    )
+    return (
+        f"{name}: warms up: {moves} by {abs(warmth.amplitude):.3g} {warmth.unit} within {_hours(within)} h, time "
+        f"constant {_hours(warmth.tau_h)} h; {ends}"
+    )
+
+
+def _hours(hours: float) -> str:
+    """Two digits, never in powers of ten."""
+    return f"{float(f'{hours:.2g}'):.10g}"
 
 
 def _minute(at: str | None) -> str:

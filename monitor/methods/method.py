@@ -23,7 +23,7 @@ from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
-    from monitor.methods.chain.identification import Identification, StepwiseCoefficient, TakenUp
+    from monitor.methods.chain.identification import AsStated, Identification, StepwiseCoefficient, TakenUp
     from monitor.methods.chain.least_squares import Solution
     from monitor.methods.chain.results import AdviceOf
     from monitor.methods.curve.fit import CurveFit
@@ -339,6 +339,11 @@ def nothing_taken_up(problem: ChainProblem) -> tuple[TakenUp, ...]:
     return ()
 
 
+def nothing_as_stated(problem: ChainProblem) -> tuple[AsStated, ...]:
+    """Name no stated place."""
+    return ()
+
+
 NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STANDARDS = Unable(
     "its rows are no test of ISO 230-2, -4, -6 or -7; set up a laser or a ball bar (method instruments) for that"
@@ -358,7 +363,8 @@ class ChainMethod(Method):
     ``refuse`` raises DataError for a campaign that has too little to be identified. ``gross_times`` stated standard
     uncertainties in the residual are first of all a mistake of the file; of a run of more than ``trial_rows`` some
     poses suffice to try such a mistake (None: all rows are needed). ``taken_as_known`` counts as free of errors, so
-    that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own;
+    that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own, ``as_stated``
+    the stated places of instruments that numbers count from;
     ``shares_base`` says that all runs of a campaign may share the base effects.
     """
 
@@ -370,6 +376,7 @@ class ChainMethod(Method):
     trial_rows: int | None = None
     taken_as_known: tuple[str, ...] = ()
     taken_up: Callable[[ChainProblem], tuple[TakenUp, ...]] = nothing_taken_up
+    as_stated: Callable[[ChainProblem], tuple[AsStated, ...]] = nothing_as_stated
     shares_base: bool = False
     statistics: Able | Unable = YES
     coordinates: Able | Unable = YES
@@ -401,7 +408,9 @@ class ChainMethod(Method):
         except DataError as error:
             raise type(error)(f"{error}{problem.unsettled}{_suspected(problem)}") from error
         return replace(
-            identification(campaign, model, problem, solution, self.advice), taken_up=self.taken_up(problem)
+            identification(campaign, model, problem, solution, self.advice),
+            taken_up=self.taken_up(problem),
+            as_stated=self.as_stated(problem),
         )
 
 

@@ -46,12 +46,13 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
         if any(file.name.lower().endswith(WORKBOOK) for file in files):
             raise InputError(
                 f"a workbook of Excel holds the tables of a campaign, and {CAMPAIGN_FILES[0]} says of which machine "
-                "and method they are: choose both files together (docs/campaign-format.md)"
+                "and method they are: choose both files together; the manual says what stands in them, in its chapter "
+                "on the campaign format (docs/campaign-format.md)"
             )
         raise InputError(
             f"no folder of the upload has a {CAMPAIGN_FILES[0]} or a {CAMPAIGN_FILES[1]}; choose the folder of a "
-            "campaign or a zip of it "
-            "(docs/campaign-format.md says which files it has)"
+            "campaign or a zip of it. The manual says which files it has, in its chapter on the campaign format "
+            "(docs/campaign-format.md)"
         )
     return campaigns
 

@@ -57,7 +57,7 @@ def mistaken_axes(campaign: Campaign) -> MistakenAxes | None:
         return None
     if declared is None:
         return _out_of_their_faces(campaign)
-    steps, nominal = pairs(campaign, declared.places, at_zero=True)
+    steps, nominal = pairs(campaign, declared, at_zero=True)
     if len(nominal) < FEWEST_STEPS or off_places(campaign) is not None:
         return None
     nominal = nominal * _signs(campaign)

@@ -9,16 +9,22 @@ from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.cut_files import CUT, is_cut
+from monitor.readers.delimited import is_number
 from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.foreign_units import foreign_unit
 from monitor.readers.spreadsheet import plain_csv
 
 #: Lines at the top of a file among which the head may stand under a title.
 LOOKED_AT = 8
+#: In a row of units: of a column that has none.
+_NO_UNIT = frozenset({"-", "–", "—", "1"})
 _NAME = re.compile(r"[A-Za-z]\w*")
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
 #: Most lines of one file: two years of touching without a pause, at one touch a minute.
 MOST_LINES = 1_000_000
+#: How many rows are held before their cells go into the columns.
+_ROWS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,7 @@ def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False
     lines = plain_csv(file, text, faults).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
+    lines = _without_empty_columns(lines)
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)
     if longest is None:
         faults.add(file, 1, None, "the file is empty; its first line names the columns")
@@ -79,6 +86,18 @@ def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False
     if not _header_is_sound(file, header, faults):
         return None
     return _body(file, header, lines, faults, of_workbook=of_workbook)
+
+
+def _without_empty_columns(lines: list[str]) -> list[str]:
+    """Return the lines without the columns at the right that hold nothing, name included, as spreadsheets save them."""
+    head = lines[0].rstrip("\r") if lines else ""
+    count = len(head) - len(head.rstrip(","))
+    if not count or not head.strip(","):
+        return lines
+    ends = [line.rstrip("\r") for line in lines]
+    if not all(line.endswith("," * count) for line in ends if line):
+        return lines
+    return [line[:-count] for line in ends]
 
 
 def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
@@ -130,34 +149,63 @@ def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
 
 
 def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_workbook: bool) -> CsvTable:
+    columns: list[list[str]] = [[] for _ in header]
     rows: list[list[str]] = []
     at: list[int] = []
     damaged: list[tuple[str, ...]] = []
     width = len(header)
     for number, row in _rows(lines):
-        if not isinstance(row, csv.Error) and len(row) == width:
-            rows.append(row)
-            at.append(number)
-            continue
         if isinstance(row, csv.Error):
             faults.add(file, number, None, _what(row))
             damaged.append(())
-        elif not row:
-            faults.add(file, number, None, "the line is empty; remove it")
+            continue
+        is_whole = len(row) == width
+        # Of a million rows those alone are looked at that may be none.
+        may_be_none = number == 2 or not is_whole or not row[-1] or not row[0]
+        if may_be_none and (why := _why_no_row(number, row, width)):
+            faults.add(file, number, None, why)
+        elif is_whole:
+            rows.append(row)
+            at.append(number)
+            if len(rows) == _ROWS_AT_ONCE:
+                _move(rows, columns)
         else:
             hint = "; is a comma used as decimal point?" if len(row) > width and not of_workbook else ""
             faults.add(file, number, None, f"{len(row)} cells where the header has {width}{hint}")
             damaged.append(tuple(row[:width]))
-    if not rows and not damaged:
+    if not at and not damaged:
         faults.add(file, 1, None, "there is only a header; at least one row must follow")
-    columns = list(zip(*rows, strict=True)) if rows else [()] * width
+    _move(rows, columns)
     return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged), of_workbook)
 
 
+def _move(rows: list[list[str]], columns: list[list[str]]) -> None:
+    """Put rows at the end of the columns and empty their list: all at once they would be twice in memory."""
+    for column, cells in zip(columns, zip(*rows, strict=True), strict=False):
+        column.extend(cells)
+    rows.clear()
+
+
+def _why_no_row(number: int, row: list[str], width: int) -> str:
+    """Return why a line is no row: nothing in it, units under the head, a remark; empty where it may be one."""
+    cells = [cell.strip() for cell in row if cell.strip()]
+    if not cells:
+        return "the line is empty; remove it"
+    units = [foreign_unit(cell.strip("[]()")) for cell in cells if cell not in _NO_UNIT]
+    if number == 2 and len(units) > 1 and None not in units:
+        return "this is a row of units; remove it: the names of the columns have their units"
+    if len(cells) == 1 and width > 2 and not is_number(cells[0]) and cells[0] == row[0].strip():
+        return f"this is no row of the table, only {quoted(cells[0])}; remove it"
+    return ""
+
+
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
-    """Yield every line after the header with its number. A quote has to close on its line."""
-    body = lines[1:]
-    if not any('"' in line or "\r" in line[:-1] for line in body):
+    """Yield every line after the header with its number, and take it out of the list. A quote has to close on its
+    line."""
+    is_plain = not any('"' in line or "\r" in line[:-1] for line in lines[1:])
+    body = _taken_out(lines)
+    next(body)
+    if is_plain:
         yield from enumerate(csv.reader(body), start=2)
         return
     for number, line in enumerate(body, start=2):
@@ -165,6 +213,13 @@ def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
             yield number, _cells(line)
         except csv.Error as error:
             yield number, error
+
+
+def _taken_out(lines: list[str]) -> Iterator[str]:
+    """Yield the lines in their order, each of which is then no longer in the list."""
+    lines.reverse()
+    while lines:
+        yield lines.pop()
 
 
 def _cells(line: str) -> list[str]:

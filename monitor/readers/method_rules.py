@@ -36,10 +36,12 @@ class Plan:
 @dataclass(frozen=True)
 class DeclaredPlaces:
     """Where the targets stand by their declaration, up to a rigid motion: ``noun`` in the plural is what they are,
-    ``places`` (3,) mm by name."""
+    ``places`` (3,) mm by name. ``by_normals``: what is read stands off from the place, by one length along the row's
+    normal."""
 
     noun: str
     places: Mapping[str, Array]
+    by_normals: bool = False
 
 
 def nothing_declared(artefact: Artefact) -> DeclaredPlaces | None:

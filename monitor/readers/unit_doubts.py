@@ -4,7 +4,6 @@ others. Typed, so that a certificate can be refused on it; ``doubts`` makes the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +55,7 @@ def off_places(campaign: Campaign) -> OffPlaces | None:
     declared = declared_places(campaign)
     if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
         return None
-    steps, declared_steps = pairs(campaign, declared.places)
+    steps, declared_steps = pairs(campaign, declared)
     nominal = np.linalg.norm(declared_steps, axis=1)
     if not len(nominal):
         return None
@@ -86,22 +85,27 @@ def declared_places(campaign: Campaign) -> DeclaredPlaces | None:
     return DeclaredPlaces("points", dict(zip(probings.target.tolist(), nominal, strict=True)))
 
 
-def pairs(campaign: Campaign, declared: Mapping[str, Array], *, at_zero: bool = False) -> tuple[Array, Array]:
+def pairs(campaign: Campaign, declared: DeclaredPlaces, *, at_zero: bool = False) -> tuple[Array, Array]:
     """Return the steps (n, 3) of the readings of X, Y, Z between targets probed at one pose of the first run, and the
-    declared ones (n, 3), in mm; ``at_zero``: at the pose with all rotary axes at zero alone."""
-    probings = campaign.probings
+    declared ones (n, 3), in mm; ``at_zero``: at the pose with all rotary axes at zero alone. Readings that stand off
+    along normals are compared where these are the same."""
+    probings, places = campaign.probings, declared.places
     rows = np.flatnonzero(probings.run == probings.run[0])[:MOST_ROWS]
     fixed = [
         values[rows] for axis, values in probings.readings.items() if not campaign.machine.is_linear(axis)
     ]
     fixed += [probings.channels[name][rows] for name in ("placement",) if name in probings.channels]
+    alike = list(fixed)
+    if declared.by_normals:
+        alike += [np.round(probings.channels[f"normal_{axis}"][rows], 3) for axis in "xyz"]
     pose: npt.NDArray[np.int64] = np.zeros(len(rows), dtype=np.int64)
-    if fixed:
-        _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
+    if alike:
+        # Beside 0.0 there is -0.0, which counts as another row.
+        _, pose = np.unique(np.column_stack(alike) + 0.0, axis=0, return_inverse=True)
     pose = pose.reshape(-1)
-    has_place = np.array([name in declared for name in probings.target[rows].tolist()])
+    has_place = np.array([name in places for name in probings.target[rows].tolist()])
     read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
-    at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    at = np.array([places.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
     if at_zero:
         has_place &= np.all([np.abs(values) < ZERO_RAD for values in fixed], axis=0)
     first, second = np.triu_indices(len(rows), 1)

@@ -17,7 +17,7 @@ from monitor.readers.faults import Faults
 
 #: Unpacked, a workbook of a million rows has some 200 MiB; what is larger is an attack on memory.
 UNPACKED_BYTES = 512 * 2**20
-#: What zipfile and openpyxl raise for a file that is no workbook, or a damaged one.
+#: What zipfile raises for a file that is no archive, or a damaged one.
 UNREADABLE = (zipfile.BadZipFile, zlib.error, KeyError, ValueError, OSError, SyntaxError)
 #: The first bytes of a compound file ([MS-CFB], 2.2): a workbook of Excel 97 (.xls), or an encrypted one.
 _COMPOUND = b"\xd0\xcf\x11\xe0"
@@ -68,20 +68,24 @@ def read_sheet(
                 return None
             with_percent, with_formulas = _has_percent(packed), _has_formulas(packed)
         book = _opened(content, results=True)
-    except UNREADABLE:
+        names = tuple(book.sheetnames)
+    except Exception:  # a damaged workbook breaks its reader in as many ways as there are bytes
         _note_no_workbook(file, content, faults)
         return None
-    title = _title(file, book.sheetnames, sheet, faults, or_first=or_first)
+    title = _title(file, names, sheet, faults, or_first=or_first)
     if title is None:
         return None
     try:
-        rows = _rows_with_percent(book[title]) if with_percent else _rows(book[title])
-        if with_formulas and _note_formulas(file, content, title, rows, faults):
-            return None
-    except UNREADABLE:  # a damaged sheet of a workbook that is whole elsewhere
+        with warnings.catch_warnings():
+            # Sheets are parsed as they are read. A moment of no calendar is then a cell with an error, and refused.
+            warnings.simplefilter("ignore")
+            rows = _rows_with_percent(book[title]) if with_percent else _rows(book[title])
+            if with_formulas and _note_formulas(file, content, title, rows, faults):
+                return None
+    except Exception:  # a damaged sheet of a workbook that is whole elsewhere
         _note_no_workbook(file, content, faults)
         return None
-    return Sheet(title, rows, tuple(book.sheetnames))
+    return Sheet(title, rows, names)
 
 
 def _opened(content: bytes, *, results: bool) -> Any:

@@ -317,6 +317,15 @@ def limits_of_type(machine_type: str) -> str:
     return f"limits are those of {whose}: the latest campaign states none"
 
 
+def limits_of_others(machine_type: str, limits: Sequence[str], hint: str) -> str:
+    """Return that none of the ``limits`` of a machine type is of a parameter of the machine; ``hint`` may be empty."""
+    named = ", ".join(limits[:5]) + (f" and {len(limits) - 5} more" if len(limits) > 5 else "")
+    return (
+        f"no limit holds: the machine type '{machine_type}' in the configuration limits {named}, of which the model of "
+        f"this machine has none; {hint}`monitor config show` names the file"
+    )
+
+
 def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
     """Return which campaigns a trend leaves out, and how to have them."""
     return (

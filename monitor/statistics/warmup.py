@@ -2,6 +2,7 @@
 
 The time constant is found by profiling: for each tau of a fine grid the rest is a straight fit, so there is
 no start value and no failed iteration; the interval of tau and of the stable time is what the profile allows.
+Several days that each begin cold are one warm-up: hours since the start of the day, a level of its own for each day.
 """
 
 from __future__ import annotations
@@ -14,11 +15,16 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
 
 #: Time constants tried, as fractions of the span of the times: below the first, one run holds the whole
 #: effect; above the last, the curve is a straight line to 1/24 of its fall and tau means nothing.
 GRID = (0.005, 3.0, 400)
+#: Different times that an exponential needs: five of runs that share none, four where others of the same time show
+#: the scatter (level, amplitude and time constant, and one to spare).
+FEWEST_TIMES = (5, 4)
+#: A column that the others explain but for this share of its length is no column.
+DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -26,7 +32,8 @@ class WarmUp:
     """``final`` and ``amplitude`` in the unit of the values; ``tau`` and ``stable_after`` in that of the times.
 
     ``p_value`` is that of there being no such exponential, the search over tau allowed for. An upper end of
-    infinity says that the times do not bound it. ``tolerance`` is the remaining amplitude called stable.
+    infinity says that the times do not bound it. ``tolerance`` is the remaining amplitude called stable. ``span`` is
+    from the first time to the last.
     """
 
     final: float
@@ -41,10 +48,24 @@ class WarmUp:
     residual_sd: float
     level: float
     trials: int
+    span: float
+
+    @property
+    def settles(self) -> bool:
+        """Whether the curve bends within the times seen; a longer time constant than their span is a straight line."""
+        return self.tau <= self.span
+
+    @property
+    def share_seen(self) -> float:
+        """Share of the amplitude that passed between the first time and the last; the rest is extrapolated."""
+        return -float(np.expm1(-self.span / self.tau))
 
 
 @dataclass(frozen=True)
 class _Profile:
+    """The fits for every time constant; ``base`` (n, k) spans what is fitted beside the exponential."""
+
+    base: Array
     tau: Array
     unit: Array
     norm: Array
@@ -53,21 +74,29 @@ class _Profile:
     unexplained: float
 
 
-def _profile(y: Array, t: Array, weight: Array) -> _Profile:
-    """For every tau of the grid: the exponential's part that a constant does not have, and the fit."""
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis (n, k) of what columns (n, e) span; those that the others explain add nothing."""
+    left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(left[:, sizes > DEPENDENT * sizes[0]])
+
+
+def _profile(y: Array, t: Array, weight: Array, beside: Array) -> _Profile:
+    """For every tau of the grid: the exponential's part that a constant and ``beside`` do not have, and the fit."""
     span = float(np.ptp(t))
     tau = span * np.geomspace(*GRID[:2], GRID[2])
-    root = np.sqrt(weight)
-    base = root / np.sqrt(weight.sum())
-    shape = root[:, np.newaxis] * np.exp(-(t - t.min())[:, np.newaxis] / tau)
-    shape -= np.outer(base, base @ shape)
+    root = np.sqrt(weight)[:, np.newaxis]
+    base = _basis(root * np.column_stack([np.ones_like(t), beside]))
+    whole = root * np.exp(-(t - t.min())[:, np.newaxis] / tau)
+    shape = whole - base @ (base.T @ whole)
     norm = np.sqrt((shape**2).sum(axis=0))
+    if (norm <= DEPENDENT * np.sqrt((whole**2).sum(axis=0))).any():
+        raise DataError("what is fitted beside the exponential explains it; no warm-up can be told from it.")
     unit = shape / norm
-    wanted = root * y
-    wanted = wanted - base * (base @ wanted)
+    wanted = root[:, 0] * y
+    wanted = wanted - base @ (base.T @ wanted)
     along = unit.T @ wanted
     total = float(wanted @ wanted)
-    return _Profile(tau, unit, norm, np.maximum(total - along**2, 0.0), along / norm, total)
+    return _Profile(base, tau, unit, norm, np.maximum(total - along**2, 0.0), along / norm, total)
 
 
 def _p_value(profile: _Profile, rng: np.random.Generator, trials: int) -> float:
@@ -76,19 +105,12 @@ def _p_value(profile: _Profile, rng: np.random.Generator, trials: int) -> float:
     if profile.unexplained == 0.0:
         return 1.0
     draws = rng.standard_normal((n, trials))
-    weighted = profile.unit
-    # The units lie in the space without the constant; a chi-square of n - 1 is all that is left of the noise.
-    base = _constant(weighted)
-    draws -= np.outer(base, base @ draws)
-    best = ((weighted.T @ draws) ** 2).max(axis=0) / (draws**2).sum(axis=0)
+    # The units lie in the space without what stands beside them: the noise in it is all that counts.
+    base = profile.base
+    draws -= base @ (base.T @ draws)
+    best = ((profile.unit.T @ draws) ** 2).max(axis=0) / (draws**2).sum(axis=0)
     explained = 1.0 - profile.rss.min() / profile.unexplained
     return float((1 + (best >= explained).sum()) / (trials + 1))
-
-
-def _constant(unit: Array) -> Array:
-    """Any unit vector outside the span of the profile's columns (the weighted constant)."""
-    left_vectors, _, _ = np.linalg.svd(unit, full_matrices=True)
-    return np.asarray(left_vectors[:, -1])
 
 
 def warm_up(
@@ -97,6 +119,7 @@ def warm_up(
     *,
     rng: np.random.Generator,
     u: npt.ArrayLike | None = None,
+    beside: npt.ArrayLike | None = None,
     tolerance: float | None = None,
     level: float = 0.95,
     trials: int = 1999,
@@ -104,14 +127,22 @@ def warm_up(
     """Exponential warm-up of ``values`` (n,) over ``times`` (n,) since the machine was started.
 
     ``tolerance`` (unit of the values) is the remaining drift called stable; None takes the scatter of one run.
-    ``u`` (n,) weighs the runs. ``amplitude`` is that at the first time. Raises ``DataError`` for fewer than 6
-    runs or 5 different times, a tolerance not above zero, non-finite values. Intervals: profile of the
-    residual sum of squares against F with 1 and n - 3 degrees of freedom.
+    ``u`` (n,) weighs the runs. ``beside`` (n, e) are columns that are fitted beside it, such as the levels of days
+    that each begin cold, or a step that was found; the p-value allows for them. ``amplitude`` is that at the first
+    time. Raises ``DataError`` for fewer than 6 runs, 4 different times (5 where no two runs share one), fewer runs
+    than are fitted, columns that explain the exponential, a tolerance not above zero, non-finite values.
+    Intervals: profile of the residual sum of squares against F with 1 and n - 3 degrees of freedom, less one for each
+    independent column beside it.
     """
     y = as_vector(values, "values", least=6)
     t = as_vector(times, "times", length=len(y))
-    if len(np.unique(t)) < 5:
-        raise DataError(f"times has {len(np.unique(t))} different values; an exponential needs at least 5.")
+    different = len(np.unique(t))
+    needed = FEWEST_TIMES[0] if different == len(t) else FEWEST_TIMES[1]
+    if different < needed:
+        raise DataError(f"times has {different} different values; an exponential needs at least {needed}.")
+    columns = np.empty((len(y), 0)) if beside is None else as_matrix(beside, "beside")
+    if len(columns) != len(y):
+        raise DataError(f"beside has {len(columns)} rows; {len(y)} are needed, one for each run.")
     if tolerance is not None and not tolerance > 0.0:
         raise DataError(f"tolerance is {tolerance}; it must be above zero.")
     if trials < 99:
@@ -119,10 +150,13 @@ def warm_up(
     as_probability(level, "level")
     weight = np.ones_like(y) if u is None else 1.0 / as_positive(u, "u", length=len(y)) ** 2
     weight = weight / weight.mean()
-    profile = _profile(y, t, weight)
-    n, best = len(y), int(profile.rss.argmin())
-    variance = float(profile.rss[best]) / (n - 3)
-    allowed = profile.rss[best] + variance * scipy.special.fdtri(1, n - 3, level)
+    profile = _profile(y, t, weight, columns)
+    best = int(profile.rss.argmin())
+    dof = len(y) - profile.base.shape[1] - 2
+    if dof < 1:
+        raise DataError(f"{len(y)} runs are too few for an exponential beside {columns.shape[1]} columns.")
+    variance = float(profile.rss[best]) / dof
+    allowed = profile.rss[best] + variance * scipy.special.fdtri(1, dof, level)
     inside = np.flatnonzero(profile.rss <= allowed)
     low = 0.0 if inside[0] == 0 else float(profile.tau[inside[0]])
     high = np.inf if inside[-1] == len(profile.tau) - 1 else float(profile.tau[inside[-1]])
@@ -130,8 +164,6 @@ def warm_up(
     sd = float(np.sqrt(variance))
     limit = tolerance if tolerance is not None else sd
     shape = np.exp(-(t - t.min()) / tau)
-    design = np.sqrt(weight)[:, np.newaxis] * np.column_stack([np.ones(n), shape])
-    covariance = variance * np.linalg.inv(design.T @ design)
     final = float(np.average(y - amplitude * shape, weights=weight))
     first = float(t.min())
     half = np.sqrt(allowed - profile.rss[inside]) / profile.norm[inside]
@@ -141,7 +173,7 @@ def warm_up(
     return WarmUp(
         final=final,
         amplitude=amplitude,
-        u_amplitude=float(np.sqrt(covariance[1, 1])),
+        u_amplitude=sd / float(profile.norm[best]),
         tau=tau,
         tau_interval=(low, high),
         p_value=_p_value(profile, rng, trials),
@@ -151,6 +183,7 @@ def warm_up(
         residual_sd=sd,
         level=level,
         trials=trials,
+        span=float(np.ptp(t)),
     )
 
 

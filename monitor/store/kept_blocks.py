@@ -226,7 +226,7 @@ def _state(headers: bytes) -> tuple[int, ...]:
 def _states(headers: bytes) -> list[tuple[int, ...]]:
     """Return what the two headers that take turns name, without one that is torn."""
     slots = [headers[begin : begin + _HEADER] for begin in (_HEADER, 2 * _HEADER)]
-    return [_STATE.unpack_from(slot, _CHECKSUM) for slot in slots if _is_whole(slot)]
+    return [_STATE.unpack_from(slot, _CHECKSUM) for slot in slots if len(slot) == _HEADER and _is_whole(slot)]
 
 
 def _block_size(headers: bytes) -> int:
@@ -283,6 +283,8 @@ def _read(path: str) -> _Copy | None:
         return None
     headers, rest = rest[:_HEADERS], rest[_HEADERS:]
     step = 8 + _block_size(headers)
+    if len(headers) < _HEADERS or len(rest) % step:  # none that was written here, whatever its sum
+        return None
     pieces = [rest[begin : begin + step] for begin in range(0, len(rest), step)]
     return _Copy(headers, {struct.unpack_from("<Q", piece)[0]: piece[8:] for piece in pieces})
 

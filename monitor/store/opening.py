@@ -320,7 +320,7 @@ def _in_words(path: str, read_only: bool, message: str) -> str:
     if "not a valid DuckDB database file" in message:
         return f"{path} is not a database of this software; name another file, or one that does not exist yet"
     if read_only and "does not exist" in message:
-        return f"there is no database {path}; `monitor --db {path} import FOLDER` makes one"
+        return f"there is no database {path}; `monitor --db {shlex.quote(str(path))} import FOLDER` makes one"
     if "No such file or directory" in message:
         return f"the folder of {path} does not exist; make it first"
     if "Is a directory" in message:

@@ -15,6 +15,7 @@ from contextlib import ExitStack, contextmanager
 
 from monitor.exceptions import StoreError
 from monitor.store.kept_blocks import own_descriptor
+from monitor.store.opening import connect
 
 #: How much of a file is copied at once, in bytes.
 _PIECE = 2**24
@@ -71,6 +72,21 @@ def private_copy(path: str) -> Iterator[str]:
                 f"{path} may not be written by this user, and there is no room for the copy in the temporary folder "
                 f"(TMPDIR) that this question needs: {fault.strerror}"
             ) from fault
+        yield copy
+
+
+@contextmanager
+def copy_of_one_moment(path: str) -> Iterator[str]:
+    """Yield the name of a private copy of a file that this process has not open; who writes it is waited for.
+
+    Raises StoreError where the file cannot be read, or there is no room.
+    """
+    with ExitStack() as copied:
+        connection = connect(path, True, None)
+        try:
+            copy = copied.enter_context(private_copy(path))
+        finally:
+            connection.close()
         yield copy
 
 

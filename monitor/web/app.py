@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -62,14 +64,18 @@ _PAGES = (
 )
 
 
-def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:
-    """Return the server of an open database. Raises InputError for a file of users that is wrong."""
+def application(
+    db: Database, settings: ServerSettings, working_folder: Path,
+    newer: Callable[[], Database | None] | None = None,
+) -> Gate:  # fmt: skip
+    """Return the server of an open database; ``newer`` as in ``Served``. Raises InputError for a file of users that is
+    wrong."""
     role = Role.VIEWER if settings.reading_only else Role.APPROVER
     users = None if settings.users is None else UserFile(settings.users, looking_only=settings.reading_only)
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     db.type_tolerances = settings.tolerances
-    asker = Asker(db, settings.trusted_signers)
+    asker = Asker(db, settings.trusted_signers, newer)
     app.state.settings = settings
     app.state.sessions = Sessions(users, User(host_user_name(), role))
     app.state.asker = asker
@@ -106,10 +112,15 @@ async def _of_http(request: Request, error: Exception) -> Response:
 async def _of_address(request: Request, error: Exception) -> Response:
     """Answer an address that lacks a part, or has one of another kind."""
     assert isinstance(error, RequestValidationError)
-    faults = (f"'{fault['loc'][-1]}': {str(fault['msg']).lower()}" for fault in error.errors())
-    return _refused(
-        request, Refusal(400, f"the address {request.url.path} is not complete: {'; '.join(faults)}")
-    )
+    faults = "; ".join(_fault_of_address(fault) for fault in error.errors())
+    return _refused(request, Refusal(400, f"the address {request.url.path} is not complete: {faults}"))
+
+
+def _fault_of_address(fault: Any) -> str:
+    name = fault["loc"][-1]
+    if fault["type"] == "missing":
+        return f"it lacks '{name}'; the first page leads to what there is"
+    return f"'{name}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}, not '{str(fault.get('input'))[:40]}'"
 
 
 async def _of_stale_form(request: Request, error: Exception) -> Response:

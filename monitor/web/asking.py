@@ -41,11 +41,18 @@ class _AnsweredError(Exception):
 class Asker:
     """Asks questions of the served database; ``freshness`` says which answers still hold.
 
-    ``trusted_signers`` is the server's own file of them, for whoever sends none.
+    ``trusted_signers`` is the server's own file of them, for whoever sends none. ``newer`` returns the database that is
+    served from now on, None as long as it is the same; without it the file must stay the one that it was.
     """
 
-    def __init__(self, db: Database, trusted_signers: Path | None = None) -> None:
+    def __init__(
+        self,
+        db: Database,
+        trusted_signers: Path | None = None,
+        newer: Callable[[], Database | None] | None = None,
+    ) -> None:
         self._db = db
+        self._newer = newer
         self.freshness = Freshness()
         self._path = os.path.abspath(db.path)
         self._file = _identity(self._path)
@@ -65,7 +72,9 @@ class Asker:
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
-        if _identity(self._path) != self._file:
+        if self._newer is not None:
+            self._follow(self._newer)
+        elif _identity(self._path) != self._file:
             # What is written from now on would go with the old file.
             raise ReplacedError(
                 f"{Path(self._path).name} was replaced or removed while it is served: nothing is shown or stored "
@@ -80,6 +89,14 @@ class Asker:
             answer = self._asked(user, question, document or {}, {}, None)
             self.freshness.remember(key, answer)
         return answer
+
+    def _follow(self, newer: Callable[[], Database | None]) -> None:
+        """Ask the newer database from now on, where there is one; no answer of before holds."""
+        db = newer()
+        if db is not None:
+            db.type_tolerances = self._db.type_tolerances
+            self._db = db
+            self.freshness.wrote(None)
 
     def _tried(self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any]) -> Any:
         """Ask in a transaction that is taken back: who writes meanwhile waits."""

@@ -184,7 +184,8 @@ class Desk:
         self._answered_last: dict[tuple[str, str], Ticket] = {}
         # What is answered at once is noted by whoever asks, who holds it already.
         self._lock = RLock()
-        self._count = 0
+        # Numbers of an earlier server are smaller (ms since 1970): an address that was kept never shows other work.
+        self._first = self._count = time.time_ns() // 1_000_000
 
     def ask(
         self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any] | None = None,
@@ -308,6 +309,11 @@ class Desk:
 
     def begun(self, user: User, number: int) -> Ticket:
         """Return the ticket of work that was begun. Raises NotFoundError for one that is gone or somebody else's."""
+        if number < self._first:
+            raise NotFoundError(
+                "the server was started anew since, and what was under way then was cut off; what went in before "
+                "stands in the list of the page Campaigns"
+            )
         with self._lock:
             ticket = self._written.get(number)
         if ticket is None or not ticket.may_be_taken_back_by(user):
@@ -315,6 +321,12 @@ class Desk:
                 "this is not known any more, or was begun by somebody else; the page Campaigns lists what was imported"
             )
         return ticket
+
+    def begun_by(self, user: User) -> list[Ticket]:
+        """Return the work that was begun and that this user may see, the latest first."""
+        with self._lock:
+            written = list(self._written.values())
+        return [ticket for ticket in reversed(written) if ticket.may_be_taken_back_by(user)]
 
     def standing(self, question: str, document: Mapping[str, Any]) -> Ticket | None:
         """Return the ticket of a question that was asked since the last change, None where nobody did; asks nothing."""
@@ -357,7 +369,7 @@ class Desk:
             (ticket for ticket in every if not ticket.future.done()), key=lambda ticket: ticket.number
         )
 
-    def take_back(self, user: User, number: int) -> None:
+    def take_back(self, user: User, number: int) -> Ticket:
         """Take back a question: one that waits at once, one that is being computed at its next checkpoint.
 
         Raises NotFoundError where it is answered already, ForbiddenError for whoever neither asked it nor approves.
@@ -372,6 +384,7 @@ class Desk:
         ticket.taken_back_by = user.name
         ticket.stop.set()
         ticket.future.cancel()
+        return ticket
 
     def ask_again(self, number: int) -> None:
         """Forget that a question was taken back: the next page that needs it asks it anew."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,6 +45,18 @@ def relabelled(value: Any, labels: Mapping[str, str]) -> Any:
     if isinstance(value, dict):
         return {key: relabelled(element, labels) for key, element in value.items()}
     return [relabelled(element, labels) for element in value] if isinstance(value, list | tuple) else value
+
+
+def by_field(text: str, fields: Iterable[str]) -> str:
+    """Return a text that names the fields of a document where it names options of the command line."""
+
+    def named(option: re.Match[str]) -> str:
+        name = option[1].replace("-", "_")
+        # A field may have its unit behind it: --volumetric-limit is volumetric_limit_um.
+        of_name = [field for field in fields if field == name or field.startswith(f"{name}_")]
+        return f"'{of_name[0]}'" if len(of_name) == 1 else option[0]
+
+    return re.sub(r"(?<![\w-])--([a-z][a-z-]*)", named, text)
 
 
 def refusal_of(error: Exception, labels: Mapping[str, str] | None = None) -> Refusal:

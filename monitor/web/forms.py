@@ -148,9 +148,9 @@ def _press(request: Request, session: str, once: object, texts: dict[str, str]) 
     return hashlib.sha256(content.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def whole_number(name: str, text: str) -> int:
+def whole_number(name: str, text: str, digits: int = 9) -> int:
     """Return the number that a field of a form holds. Raises InputError for another text."""
-    if not text.isdecimal() or len(text) > 9:
+    if not text.isdecimal() or len(text) > digits:
         raise InputError(f"'{name}' is a whole number, such as 20, not '{text}'")
     return int(text)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,9 @@ from starlette.responses import JSONResponse, Response
 
 from monitor.documents import to_document
 from monitor.exceptions import MonitorError
-from monitor.web.access import ROOT, address_of, offered
+from monitor.web.access import ROOT, address_of, offered, taken_fields
 from monitor.web.asking import Asker, check_role
-from monitor.web.faults import refusal_of, relabelled
+from monitor.web.faults import by_field, refusal_of, relabelled
 from monitor.web.openapi import openapi
 from monitor.web.parcel import MEDIA_TYPE, packed
 from monitor.web.received import Body, ReceivedQuestion, read_body, received
@@ -61,7 +62,7 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
                 body = await read_body(request, question, content)
                 return await run_in_threadpool(_answered, asker, user, question, body, working_folder)
         except Exception as error:
-            return _refused(error)
+            return _refused(question, error)
         finally:
             await request.close()
 
@@ -74,13 +75,18 @@ def _answered(asker: Asker, user: User, question: str, body: Body, working_folde
         try:
             answer = asker(user, question, asked.document, asked.files, asked.tolerances)
         except MonitorError as error:
-            return _refused(error, asked)
+            return _refused(question, error, asked)
         return _response(question, asked, relabelled(to_document(answer), asked.labels), working_folder)
 
 
-def _refused(error: Exception, asked: ReceivedQuestion | None = None) -> JSONResponse:
-    """Return a refusal as a document: ``error``, and the ``faults`` of a folder; without the server's own paths."""
+def _refused(question: str, error: Exception, asked: ReceivedQuestion | None = None) -> JSONResponse:
+    """Return a refusal as a document: ``error``, and the ``faults`` of a folder; without the server's own paths.
+
+    The command line, which sends parcels, reads of its options; whoever sends a document reads of its fields.
+    """
     refusal = refusal_of(error, {} if asked is None else asked.labels)
+    if asked is None or not asked.is_parcel:
+        refusal = replace(refusal, error=by_field(refusal.error, taken_fields(question)))
     if refusal.status == 500:
         _log.error("a question failed", exc_info=error)
     more = {"faults": refusal.faults, "in_full": refusal.in_full}

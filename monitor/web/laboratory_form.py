@@ -6,7 +6,6 @@ are numbered, ``authorised_by.0.name``. What does not apply is said in a box of 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory import MAY_NOT_APPLY
 from monitor.reporting.certificate.laboratory_keys import REPEATED, SECTIONS
 from monitor.reporting.texts import ENGLISH, Texts, languages, texts_of
+from monitor.toml_text import toml_tables
 from monitor.web.days import typed_day
 
 #: Entries that the form has boxes for: persons who authorise, measurement standards.
@@ -177,10 +177,7 @@ def _quoted(text: str) -> str:
 
 def texts_of_file(content: bytes) -> dict[str, str]:
     """Return what a laboratory's file says as texts of the form. Raises InputError for what is no TOML."""
-    try:
-        tables = tomllib.loads(content.decode("utf-8-sig"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"this is no laboratory's file: {error}") from error
+    tables = toml_tables("the laboratory's file", content)
     texts: dict[str, str] = {}
     for section in SECTIONS:
         value = tables.get(section)

@@ -20,6 +20,7 @@ from monitor.web import words
 from monitor.web.faults import Refusal
 from monitor.web.forms import Typed, own_address
 from monitor.web.sessions import Sessions
+from monitor.web.static import maps_style
 
 
 def page(request: Request, template: str, *, status: int = 200, **context: Any) -> HTMLResponse:
@@ -71,6 +72,7 @@ def _environment() -> Environment:
     environment.globals |= {
         "version": __version__,
         "link": link,
+        "maps_style": maps_style,
         "plain_name": plain_name,
         "number": words.number,
         "with_u": words.with_u,
@@ -81,6 +83,8 @@ def _environment() -> Environment:
         "so_far": words.so_far,
         "aligned": words.aligned,
         "as_fine_as": words.as_fine_as,
+        "importing": words.importing,
+        "asked_for": words.asked_for,
         "earliest_and_latest": words.earliest_and_latest,
         "listed": words.listed,
         "what_breaks": words.what_breaks,

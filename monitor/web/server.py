@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from socket import socket
 
@@ -64,8 +65,13 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
         for taken in sockets:
             beside.callback(taken.close)
         working_folder = Path(folder).resolve()
-        with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
-            gate = application(db, settings, working_folder)
+        with opened(settings.database, working_folder, must_exist=settings.reading_only) as served:
+            if served.unwritten is not None:
+                settings = replace(settings, reading_only=True)
+                say(
+                    f"{served.unwritten}: nobody can change anything here; what others store is seen with the next page"
+                )
+            gate = application(served.db, settings, working_folder, served.newer)
             config = configuration(gate, settings)
             scheme = "http" if settings.certificate is None else "https"
 

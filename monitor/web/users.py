@@ -12,12 +12,12 @@ import logging
 import os
 import re
 import secrets
-import tomllib
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
 
 from monitor.exceptions import InputError
+from monitor.toml_text import toml_file
 from monitor.web.passwords import check_hash, hashed, matches
 
 _log = logging.getLogger("monitor.web")
@@ -86,10 +86,7 @@ def _digest(token: str) -> str:
 
 def read_users(path: Path) -> Users:
     """Read a file of users. Raises InputError that names the user and the rule."""
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path} cannot be read as TOML: {error}") from error
+    document = toml_file(path)
     users = Users({}, {}, {})
     entries = document.get("users", {})
     for name, entry in entries.items() if isinstance(entries, dict) else ():

@@ -241,6 +241,22 @@ def so_far(ticket: Ticket) -> str:
     return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"
 
 
+def importing(ticket: Ticket) -> str:
+    """Say at which of its folders an import is."""
+    total = len(ticket.document["folders"])
+    if not ticket.said:
+        return "The upload is here and waits for another import"
+    return f"Importing {ticket.said[-1]}" + (f", {len(ticket.said)} of {total} folders" if total > 1 else "")
+
+
+def asked_for(ticket: Ticket) -> str:
+    """Say what is being computed: the question with what it is about."""
+    folders = ticket.document.get("folders")
+    if folders is not None:
+        return f"import of {counted(len(folders), 'folder')}: {listed(folders)}"
+    return " ".join([ticket.question, *(f"{key} {value}" for key, value in ticket.document.items())])
+
+
 def without_option(text: str) -> str:
     """Return a refusal without the dashes of the option that it begins with: the box of a page has its name."""
     return re.sub(r"^--([a-z-]+ )", r"\1", text)
@@ -268,15 +284,9 @@ def _another_instrument(test: TestAnswer | None) -> str:
 def what_breaks(tie: Tie) -> str:
     """Say what tells the rivals of a tie apart."""
     drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
-    recorded = "both" if len(tie.drivers) == 2 else "it"
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: (
-            f"measure runs within which {drivers} change{', not together' if len(tie.drivers) == 2 else 's'}, and "
-            f"record {recorded}"
-            if tie.within_runs
-            else f"measure runs at several values of {drivers}, and record {recorded}"
-        ),
+        TieBreak.DRIVERS: f"measure {tie.what_to_measure.replace('_', ' ')}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
         TieBreak.MORE_POSES: (

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from monitor.documents import INLINED, OMITTED
@@ -68,7 +70,8 @@ class CatalogueEffect:
 class EffectsAnswer:
     """The effects of the catalogue, beside those of the base model.
 
-    A topology has neither campaign nor machine and drivers; a curve has a campaign alone.
+    A topology has neither campaign nor machine and drivers; a curve has a campaign alone. ``nearest`` is the word of an
+    effect that is nearest to one that none contains.
     """
 
     campaign: str | None = field(default=None, metadata=OMITTED)
@@ -77,6 +80,7 @@ class EffectsAnswer:
     drivers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     base: tuple[str, ...] = ()
     effects: tuple[CatalogueEffect, ...] = ()
+    nearest: str | None = field(default=None, metadata=OMITTED)
 
 
 def effects(request: EffectsRequest) -> EffectsAnswer:
@@ -106,7 +110,21 @@ def _selected(answer: EffectsAnswer, text: str | None) -> EffectsAnswer:
     """Leave out the effects that do not contain a text in any of their fields."""
     if text is None:
         return answer
-    return replace(answer, effects=tuple(effect for effect in answer.effects if effect.contains(text)))
+    selected = tuple(effect for effect in answer.effects if effect.contains(text))
+    return replace(answer, effects=selected, nearest=None if selected else _nearest(answer.effects, text))
+
+
+def _nearest(effects: Iterable[CatalogueEffect], text: str) -> str | None:
+    """Return the word of a name or a description that is nearest to a text; None where none is near."""
+    terms = {
+        word
+        for effect in effects
+        for word in re.findall(
+            r"[\w:@.-]{3,}", " ".join((effect.effect, *astuple(effect.description))).lower()
+        )
+    }
+    near = get_close_matches(text[:100].lower(), sorted(terms), n=1, cutoff=0.7)
+    return near[0] if near else None
 
 
 def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:

@@ -19,6 +19,18 @@ function coloured(value) {
   return value;
 }
 
+// A name from outside as plotly.js shows it as it was typed, without reading markup in it.
+function plain(text) {
+  return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("%", "&#37;");
+}
+
+// plotly.js empties the style attributes of a scale of colours, which our policy refuses as it refuses any that is set;
+// to remove one does the same.
+const setAttribute = Element.prototype.setAttribute;
+Element.prototype.setAttribute = function (name, value) {
+  return name === "style" && value === "" ? this.removeAttribute(name) : setAttribute.call(this, name, value);
+};
+
 function read(id) {
   const element = document.getElementById(id);
   return element === null ? null : JSON.parse(element.textContent);
@@ -75,6 +87,26 @@ function fitted(layout, canvas) {
   return { ...layout, scene: { ...layout.scene, ...axes, camera: { ...camera, eye, center } } };
 }
 
+// The buttons of a chart are one stop of the Tab key, as a toolbar is; the arrow keys go from one to the next.
+function oneStop(canvas) {
+  const settle = () => canvas.querySelectorAll(".modebar-btn").forEach((button, index) => { button.tabIndex = index === 0 ? 0 : -1; });
+  settle();
+  if (canvas.dataset.oneStop) {
+    return;
+  }
+  canvas.dataset.oneStop = "1";
+  canvas.on("plotly_afterplot", settle);
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    const buttons = [...canvas.querySelectorAll(".modebar-btn")];
+    const at = buttons.indexOf(event.target);
+    if (step && at >= 0) {
+      event.preventDefault();
+      buttons[(at + step + buttons.length) % buttons.length].focus();
+    }
+  });
+}
+
 function draw(figure) {
   const chart = JSON.parse(figure.querySelector("script.figure").textContent);
   const canvas = figure.querySelector(".canvas");
@@ -84,6 +116,7 @@ function draw(figure) {
     canvas.style.height = chart.layout.height + "px"; // what the style sheet has no rule for
     Plotly.react(canvas, coloured(chart.data), fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
       canvas.dataset.drawn = "1";
+      oneStop(canvas);
       if (figure.dataset.key === "trend") {
         takeTimes(canvas);
       }
@@ -126,7 +159,7 @@ function traces(list, magnification, name, shade, visible) {
       head[axis].push(end[index]);
     });
     ["u", "v", "w"].forEach((axis, index) => head[axis].push(magnification * vector[index]));
-    head.text.push(target + ": " + Math.hypot(...vector).toFixed(2) + " µm");
+    head.text.push(plain(target) + ": " + Math.hypot(...vector).toFixed(2) + " µm");
   }
   return [line, head];
 }
@@ -158,11 +191,12 @@ function drawScene(canvas, chart) {
     }));
   }
   if (effect !== null) {
-    data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + effect.effect, colour("orange"), true));
-    data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + effect.effect, colour("teal"), "legendonly"));
+    data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + plain(effect.effect), colour("orange"), true));
+    data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + plain(effect.effect), colour("teal"), "legendonly"));
   }
   return Plotly.react(canvas, data, fitted(coloured(chart.layout), canvas), SETTINGS).then(() => {
     canvas.dataset.drawn = "1";
+    oneStop(canvas);
     if (effect !== null && scene.swung !== effect) {
       scene.swung = effect;
       swing(canvas, coloured(chart.data), effect);
@@ -338,8 +372,12 @@ function watchLater(section) {
   watcher.observe(section);
 }
 
+// The server is asked before a page loads itself again: while it is away the browser would show its own page of errors.
 function loadAgain() {
-  setTimeout(() => location.reload(), 2000);
+  setTimeout(() => fetch("/work/state?number=0", { credentials: "same-origin" }).then(() => location.reload(), () => {
+    document.querySelectorAll(".so-far").forEach((words) => { words.textContent = "The server does not answer now; this page waits for it."; });
+    loadAgain();
+  }), 2000);
 }
 
 // A page that waits loads itself again once that is computed: to make and draw it anew takes the time of what it waits for.
@@ -354,6 +392,10 @@ function waitFor(note) {
     waited = true;
     return answer.json().then((work) => {
       note.querySelector(".so-far").textContent = work.so_far;
+      if (work.at) {
+        note.querySelector(".at").textContent = work.at;
+        note.querySelector("progress")?.setAttribute("value", work.done);
+      }
       return ask();
     });
   });
@@ -361,7 +403,7 @@ function waitFor(note) {
 }
 
 // In the browser's own way an address that ends in #scene would not be loaded anew.
-document.querySelectorAll("p.waiting").forEach((note) => (note.dataset.number ? waitFor(note) : loadAgain()));
+document.querySelectorAll(".waiting, [data-waits]").forEach((note) => (note.dataset.number ? waitFor(note) : loadAgain()));
 document.querySelectorAll("[data-later]").forEach(watchLater);
 prepareScene();
 drawAll();

@@ -57,7 +57,7 @@ TREND_PAGES = {
 @contextmanager
 def served(database: Path) -> Iterator[int]:
     """A server in a process of its own; yields its port."""
-    command = [sys.executable, "-m", "monitor.cli", "--db", str(database), "serve", "--port", "0"]
+    command = [sys.executable, "-m", "monitor", "--db", str(database), "serve", "--port", "0"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:

@@ -69,7 +69,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     if CHROMIUM is None:
         pytest.skip("there is no chromium; make pages installs Debian's")
     database = tmp_path_factory.mktemp("pages") / "monitor.duckdb"
-    monitor = [sys.executable, "-m", "monitor.cli", "--db", str(database)]
+    monitor = [sys.executable, "-m", "monitor", "--db", str(database)]
     folders = [
         str(EXAMPLES / name) for name in ("five-days", "hidden-spindle-growth", "tilting-table", "load-cell")
     ]

@@ -85,7 +85,7 @@ def started(environment: dict[str, str], tmp_path: Path) -> Callable[..., subpro
     def start(*arguments: object, **options: Any) -> subprocess.Popen[str]:
         own = {**environment, **options.pop("env", {})}
         return subprocess.Popen(
-            [sys.executable, "-m", "monitor.cli", *(str(one) for one in arguments)],
+            [sys.executable, "-m", "monitor", *(str(one) for one in arguments)],
             env=own, cwd=tmp_path, text=True, stdin=subprocess.DEVNULL,
             **{"encoding": "utf-8", "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options},
         )  # fmt: skip

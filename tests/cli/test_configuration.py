@@ -137,6 +137,14 @@ def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(type
     assert "limits of HU40-T are those of the machine type 'hu40-t'" in typed("fleet", db=db).out
 
 
+def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(typed: Any, db: Path) -> None:
+    configured('[tolerances."*"]\nEB0C9 = 5\n')
+    notes = typed("trend", "HU40-T", "--json", db=db).document["notes"]
+    (note,) = (note for note in notes if "machine type" in note)
+    assert note.startswith("no limit holds: the machine type '*' in the configuration limits EB0C9, of which")
+    assert "did you mean 'EB0C'?" in note
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -146,6 +154,7 @@ def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(type
         ("[tolerances.x]\nEC0Y = true", "EC0Y = True: a number above 0"),
         ("[tolerances.x]\nEC0Y = inf", "EC0Y = inf: a number above 0"),
         ("[tolerances.x]\nsquareness = 1", "squareness: no name of a term"),
+        ('[tolerances."*"]\nEZ0a = 3', "EZ0a: axes are named by capital letters; did you mean EZ0A?"),
         ("[tolerance.x]\nEC0Y = 1", "did you mean 'tolerances'?"),
         (
             '[tolerances.x]\n"EXX:reversl" = 5',

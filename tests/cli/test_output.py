@@ -159,6 +159,7 @@ def test_effects_can_be_searched_line_by_line(typed: Any) -> None:
     assert len(out) == 2 + len(typed("effects", "--json").document["effects"])
     assert any(line.startswith("EXX:reversal ") and "X reverses" in line for line in out)
     assert "no effect says 'zzz'; try another word" in typed("effects", "zzz").out
+    assert "no effect says 'backlsh'; did you mean 'backlash'? Else try" in typed("effects", "backlsh").out
 
 
 # On a terminal and on pipes, as processes of their own.
@@ -172,7 +173,7 @@ def terminal(environment: dict[str, str], tmp_path: Path) -> Callable[..., str]:
         leader, follower = pty.openpty()
         own = {**environment, "TERM": "xterm-256color", "COLUMNS": str(columns)}
         with subprocess.Popen(
-            [sys.executable, "-m", "monitor.cli", *(str(one) for one in arguments)],
+            [sys.executable, "-m", "monitor", *(str(one) for one in arguments)],
             stdin=follower, stdout=follower, stderr=follower, env=own, cwd=tmp_path, close_fds=True,
         ) as process:  # fmt: skip
             os.close(follower)

@@ -19,7 +19,7 @@ def test_a_server_stopped_by_sigterm_closes_its_database(
     temporary.mkdir()
     assert main(["--db", str(database), "import", str(examples / "cold-cold")]) == 0
     server = subprocess.Popen(
-        [sys.executable, "-m", "monitor.cli", "--db", str(database), "serve", "--port", "0"],
+        [sys.executable, "-m", "monitor", "--db", str(database), "serve", "--port", "0"],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, **environment, "TMPDIR": str(temporary)},

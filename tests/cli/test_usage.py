@@ -6,6 +6,8 @@ import argparse
 import importlib
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -64,6 +66,12 @@ def test_json_and_quiet_are_taken_before_the_verb_too(typed: Any) -> None:
     )
 
 
+def test_the_package_is_the_command(capfd: pytest.CaptureFixture[str]) -> None:
+    """``python -m monitor``, for those who do not have the command on their path."""
+    subprocess.run([sys.executable, "-m", "monitor", "--version"], check=True)
+    assert capfd.readouterr().out == f"monitor {__version__}\n"
+
+
 def test_version(typed: Any) -> None:
     assert typed("--version").out == f"monitor {__version__}\n"
 
@@ -71,6 +79,8 @@ def test_version(typed: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["identify", "--run", "eins"], "argument --run: a whole number, such as 3, not 'eins'; "),
+        (["explain", "x", "--rate", "5%"], "argument --rate: a number, such as 0.95, not '5%'; "),
         (["bogus"], "there is no verb 'bogus'; there are demo, import"),
         (["CAMPAIGNS"], "there is no verb 'CAMPAIGNS'"),
         (["--db"], "--db: expected one argument"),
@@ -80,13 +90,16 @@ def test_version(typed: Any) -> None:
         (["runs", "a", "b"], "unrecognized arguments: b"),
         (["certificate"], "required: issue|show|verify|amend|withdraw"),
         (["certificate", "bogus"], "invalid choice: 'bogus'"),
-        (["certificate", "issue", "five-days", "--run", "x", "--laboratory", "y"], "invalid int value: 'x'"),
+        (
+            ["certificate", "issue", "five-days", "--run", "x", "--laboratory", "y"],
+            "a whole number, such as 3, not 'x'",
+        ),
         (["model"], "required: list|show|add|remove|use|history"),
         (["model", "add", "EXX:reversal"], "required: --to"),
-        (["uncertainty", "five-days", "--seed", "1.5"], "invalid int value: '1.5'"),
-        (["simulate", "x", "--peak", "much"], "invalid float value: 'much'"),
+        (["uncertainty", "five-days", "--seed", "1.5"], "a whole number, such as 3, not '1.5'"),
+        (["simulate", "x", "--peak", "much"], "a number, such as 0.95, not 'much'"),
         (["export", "x", "--format", "ods"], "choose from"),
-        (["audit", "--last", "x"], "invalid int value"),
+        (["audit", "--last", "x"], "a whole number"),
     ],
     ids=" ".join,
 )
@@ -113,6 +126,9 @@ def test_monitor_db_names_the_database_and_the_option_wins(
 ) -> None:
     monkeypatch.setenv("MONITOR_DB", str(db))
     assert len(typed("campaigns", "--json").document["campaigns"]) == 3
+    assert (
+        "`monitor --db 'a b.duckdb' import FOLDER` makes one" in typed("--db", "a b.duckdb", "campaigns").err
+    )
     assert "there is no database other.duckdb" in typed("--db", "other.duckdb", "campaigns").err
     # An empty variable is no name.
     monkeypatch.setenv("MONITOR_DB", "")

@@ -65,6 +65,7 @@ def test_pontius_certified_coefficients_to_eleven_digits(curve: Any) -> None:
     assert digits(found.deviation, float(certified["residual_sd"])) > 11.0
 
 
+@pytest.mark.slow
 def test_loadcell_lack_of_fit_112_then_0_35(told: dict[str, Any]) -> None:
     before, after = told["loadcell"].history
     assert effects(told, "loadcell") == ["load:poly2"]

@@ -61,6 +61,7 @@ def test_a_drive_that_is_wound_up_is_named_with_its_width(virtual_campaigns, exp
         assert answer.suspect == ()
 
 
+@pytest.mark.slow
 def test_growth_after_every_pause_is_named_with_its_time_constant(virtual_campaigns, explained, seeds):
     """Before, it was an error of the table in eight parts of a free shape, and its size was nowhere."""
     for seed in seeds(20, 2):

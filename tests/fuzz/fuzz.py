@@ -8,163 +8,27 @@ such an input is kept in ``fuzz-output/`` and belongs into a test.
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+from targets import CHECKOUT, TARGETS
+
 FINDINGS = CHECKOUT / "fuzz-output"
-TOPOLOGY = "w C B X b Z Y (C1) t"
-
-
-def effects() -> Callable[[bytes], object]:
-    from monitor.effects.effect import parse_effect
-    from monitor.machine import parse_topology
-
-    chain = parse_topology(TOPOLOGY)
-    return lambda content: parse_effect(content.decode(errors="replace"), chain)
-
-
-def curves() -> Callable[[bytes], object]:
-    from monitor.effects.curve.language import parse_curve_effect
-
-    return lambda content: parse_curve_effect(content.decode(errors="replace"))
-
-
-def topologies() -> Callable[[bytes], object]:
-    from monitor.machine import parse_topology
-
-    return lambda content: parse_topology(content.decode(errors="replace"))
-
-
-def conditions() -> Callable[[bytes], object]:
-    """Conditions on the runs of a campaign, as `select --where` takes them."""
-    from monitor.readers import read_campaign
-    from monitor.workflow.run_statistics.columns import campaign_columns, selected
-
-    campaign = read_campaign(CHECKOUT / "examples" / "five-days")
-    columns = campaign_columns(campaign)
-    return lambda content: selected(columns, content.decode(errors="replace"), len(campaign.runs))
-
-
-def campaigns() -> Callable[[bytes], object]:
-    """The three files of a campaign, with a zero byte between them."""
-    from monitor.readers import read_campaign
-
-    folder = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
-
-    def read(content: bytes) -> object:
-        for name, part in zip(
-            ("campaign.toml", "runs.csv", "probings.csv"), content.split(b"\0", 2), strict=False
-        ):
-            (folder / name).write_bytes(part)
-        return read_campaign(folder)
-
-    return read
-
-
-def exports() -> Callable[[bytes], object]:
-    """A file of an instrument and its mapping: the first byte says which sample's place it takes."""
-    import shutil
-
-    from monitor.readers import read_campaign
-
-    samples = _samples()
-    room = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
-    for folder in {path.parent for path in samples}:
-        shutil.copytree(folder, room / folder.name)
-
-    def read(content: bytes) -> object:
-        sample = samples[content[0] % len(samples) if content else 0]
-        spoilt = room / sample.parent.name / sample.name
-        spoilt.write_bytes(content[1:])
-        try:
-            return read_campaign(spoilt.parent)
-        finally:
-            shutil.copyfile(sample, spoilt)
-
-    return read
-
-
-def _samples() -> list[Path]:
-    folders = [CHECKOUT / "examples" / name for name in ("files-as-they-come", "files-of-a-plate")]
-    return [path for folder in folders for path in sorted(folder.iterdir()) if path.name != "README.md"]
-
-
-def requests() -> Callable[[bytes], object]:
-    """A question and the JSON of its request, as they come over HTTP."""
-    from monitor.exceptions import InputError
-    from monitor.web.asking import request_of
-    from monitor.workflow.contract import QUESTIONS
-
-    names = sorted(QUESTIONS)
-
-    def ask(content: bytes) -> object:
-        if not content:
-            raise InputError("nothing")
-        try:
-            document = json.loads(content[1:])
-        except (ValueError, RecursionError) as error:
-            raise InputError("no JSON") from error
-        if not isinstance(document, dict):
-            raise InputError("no document")
-        return request_of(names[content[0] % len(names)], document, {})
-
-    return ask
-
-
-TARGETS = {
-    "effects": effects,
-    "curves": curves,
-    "topologies": topologies,
-    "conditions": conditions,
-    "campaigns": campaigns,
-    "exports": exports,
-    "requests": requests,
-}
-
-
-def seeds(target: str) -> Iterator[bytes]:
-    """What the fuzzer begins from."""
-    texts = [path.read_text("utf-8") for path in [*CHECKOUT.glob("docs/*.md"), CHECKOUT / "README.md"]]
-    if target == "campaigns":
-        for folder in sorted((CHECKOUT / "examples").iterdir()):
-            files = [folder / name for name in ("campaign.toml", "runs.csv", "probings.csv")]
-            if all(file.is_file() for file in files):
-                toml, runs, probings = (file.read_bytes() for file in files)
-                # A few rows: what counts is the form.
-                yield b"\0".join(
-                    (toml, b"\n".join(runs.splitlines()[:4]), b"\n".join(probings.splitlines()[:9]))
-                )
-    elif target == "exports":
-        for number, path in enumerate(_samples()):
-            yield bytes([number]) + path.read_bytes()
-    elif target == "requests":
-        from monitor.web.asking import taken_fields
-        from monitor.workflow.contract import QUESTIONS
-
-        for number, question in enumerate(sorted(QUESTIONS)):
-            for value in ("x", 1, -0.5, None, [], ["2026-01-01"], {"a": True}):
-                yield bytes([number]) + json.dumps(dict.fromkeys(taken_fields(question), value)).encode()
-    elif target == "topologies":
-        yield from (
-            text.encode() for text in (TOPOLOGY, "w X Y b Z t", "w b A1 A2 A3 A4 A5 A6 t", "w X b Y t")
-        )
-    else:
-        for text in texts:
-            yield from (code.encode() for code in re.findall(r"`([^`\n]{2,80})`", text))
+# What is instrumented: of workbooks also the reader that is not ours, whose faults have to be refused in our words.
+INSTRUMENTED = {"workbooks": ["monitor", "openpyxl"]}
 
 
 def fuzz(target: str, seconds: int) -> None:
     """Run a target in this process; libFuzzer ends it."""
     import atheris
 
-    with atheris.instrument_imports(include=["monitor"], enable_loader_override=False):
-        take = TARGETS[target]()
+    with atheris.instrument_imports(
+        include=INSTRUMENTED.get(target, ["monitor"]), enable_loader_override=False
+    ):
+        take = TARGETS[target].make()
         from monitor.exceptions import MonitorError
 
     def one_input(content: bytes) -> None:
@@ -178,7 +42,7 @@ def fuzz(target: str, seconds: int) -> None:
             raise AssertionError("a refusal without words")
 
     with tempfile.TemporaryDirectory() as corpus:
-        for number, content in enumerate(seeds(target)):
+        for number, content in enumerate(TARGETS[target].seeds()):
             (Path(corpus) / f"{number:05d}").write_bytes(content)
         FINDINGS.mkdir(exist_ok=True)
         atheris.Setup(

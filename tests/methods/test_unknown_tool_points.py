@@ -14,6 +14,7 @@ import pytest
 from monitor.exceptions import CampaignError, NotConvergedError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
+from monitor.methods.instruments.as_stated import as_stated
 from monitor.readers import read_campaign
 from monitor.readers.writer import write_campaign
 from monitor.records import Campaign
@@ -118,3 +119,67 @@ def test_readings_of_angles_have_no_such_key(tmp_path: Path) -> None:
         )
     with pytest.raises(CampaignError, match="tool_point_standard_uncertainty_mm"):
         read_campaign(path)
+
+
+@pytest.mark.parametrize("key", ["", pytest.param(KEY, marks=pytest.mark.slow)])
+def test_a_point_off_along_the_axis_of_the_head_moves_the_place_of_the_table_alone(
+    tmp_path: Path, key: str
+) -> None:
+    """At b04ae590 the bar across the plane x = 0 was tilted by the millimetre, and EXX went by 13 u."""
+    fits = []
+    for off, of_fit in ((np.zeros(3), ""), (np.array([1.0, 0.0, 0.0]), key)):
+        path, _ = _campaign(tmp_path / f"{off[0]}", 12000, off, of_fit)
+        problem = campaign_method(campaign := _read(path)).problem_of(campaign)
+        fits.append((problem, solve_problem(problem)))
+    (problem, right), (_, moved) = fits
+    u = np.sqrt(np.diag(right.local_covariance[0]))
+    for index, name in enumerate(problem.base_names):
+        change = moved.local[0, index] - right.local[0, index]
+        if name == "EX0B":
+            assert change == pytest.approx(-1.0, abs=1e-5)
+            assert (np.sqrt(moved.local_covariance[0, index, index]) > 0.9) == bool(key)
+        else:
+            # What the point may do along the head adds to u; without it nothing moves.
+            assert abs(change) < (1.5 if key else 0.4) * u[index], name
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"), [("", {"x": ("EX0B",)}), pytest.param(KEY, None, marks=pytest.mark.slow)]
+)
+def test_what_counts_from_a_stated_tool_point_is_told(
+    tmp_path: Path, key: str, expected: dict[str, tuple[str, ...]] | None
+) -> None:
+    """B carries the sphere, and A shows the point across its axis: only x is taken as stated."""
+    path, _ = _campaign(tmp_path, 9000, np.zeros(3), key)
+    problem = campaign_method(campaign := _read(path)).problem_of(campaign)
+    assert {each.name: each.moved for each in as_stated(problem)} == (
+        {} if expected is None else {"R-test": expected}
+    )
+
+
+def test_a_bar_off_the_plane_of_its_swing_has_the_derivatives_of_its_readings(tmp_path: Path) -> None:
+    """The centre follows the mean of what errors do across the plane; differences of readings say so too."""
+    path, _ = _campaign(tmp_path, 9000)
+    problem = campaign_method(campaign := _read(path)).problem_of(campaign)
+    (bar,) = (part for part in problem.parts if part.id == "bar-yz")
+    guess = bar.rows.guess.copy()
+    guess[:, 9:] += 1.4 * np.array([1.0, 0.0, 0.0])
+    parts = tuple(
+        replace(part, rows=replace(part.rows, guess=guess), tool_point=1.0) if part is bar else part
+        for part in problem.parts
+    )
+    wide = replace(problem, parts=parts, is_whole=True, has_products=True)
+    rows = slice(bar.at[0], bar.at[-1] + 1)
+    by_local = wide.linearise(wide.start, wide.common_start).local[0]
+    numbers = wide.sigma.shape[1]
+    columns = [index for index, name in enumerate(wide.local_names) if "tool point" in name]
+    for index in (*range(len(wide.base_names)), *columns):
+        step = np.zeros_like(wide.start)
+        step[0, index] = 1e-4
+        ahead, behind = (
+            wide.evaluated(wide.start + sign * step, wide.common_start).residual[rows, 0] for sign in (1, -1)
+        )
+        expected = (ahead - behind) / 2e-4 / wide.sigma[rows, 0]
+        np.testing.assert_allclose(
+            by_local[rows.start * numbers : rows.stop * numbers : numbers, index], expected, atol=2e-3
+        )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from math import cos, radians, sin
 from pathlib import Path
 
 import pytest
 
 from monitor.readers import read_campaign, write_campaign
+from monitor.readers.doubts import doubts
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples/tilting-table"
 
@@ -95,3 +97,82 @@ def test_a_ball_touched_too_seldom(folder, faults_of):
     assert any(
         "ball 'K1' was touched 1 times; a sphere of unknown centre" in fault.message for fault in found
     )
+
+
+CENTRES = {"Kugel 1": (90.0, 0.0, 60.0), "Kugel 2": (0.0, 85.0, 75.0), "Kugel 3": (-80.0, -30.0, 50.0)}
+SIDES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@pytest.fixture
+def balls(tmp_path):
+    """Three balls on a turning table without errors, each touched from four sides at four angles of C; radius 14 mm."""
+    rows = []
+    for c in (0, 90, 180, 270):
+        turn = cos(radians(c)), sin(radians(c))
+        for name, centre in CENTRES.items():
+            for normal in SIDES:
+                x, y, z = (at + 14.0 * along for at, along in zip(centre, normal, strict=True))
+                x, y = x * turn[0] - y * turn[1], x * turn[1] + y * turn[0]
+                cells = (f"{value:.4f}" for value in (x, y, z))
+                rows.append(
+                    ",".join(
+                        [
+                            "1",
+                            str(len(rows) + 1),
+                            str(8.0 * len(rows)),
+                            name,
+                            *cells,
+                            str(c),
+                            *map(str, normal),
+                        ]
+                    )
+                )
+    head = "run,sequence,time_s,target,x_mm,y_mm,z_mm,c_deg,normal_x,normal_y,normal_z"
+    (tmp_path / "probings.csv").write_text("\n".join([head, *rows]) + "\n")
+    (tmp_path / "runs.csv").write_text(
+        "run,started_at,day,warm_up,ambient_degC\n1,2026-03-02T08:00:00+01:00,1,false,20.0\n"
+    )
+    declared = "".join(
+        f'[[artefact.balls]]\nid = "{name}"\nnominal_mm = {list(centre)}\ndiameter_mm = 25.0\n'
+        for name, centre in CENTRES.items()
+    )
+    (tmp_path / "campaign.toml").write_text(
+        'format = 1\ncampaign = "balls"\nmethod = "rotary-probing"\n[machine]\nid = "M"\ntopology = "w C b Y X Z t"\n'
+        '[probe]\nid = "P"\nmodel = "touch"\nstandard_uncertainty_um = 0.6\n[artefact]\nid = "three"\n'
+        + declared
+    )
+    return tmp_path
+
+
+def rewritten(folder: Path, file: str, old: str, new: str, count: int = -1) -> Path:
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new, count))
+    return folder
+
+
+def test_balls_touched_from_their_sides_raise_no_doubt(balls):
+    assert doubts(read_campaign(balls)) == ()
+
+
+def test_exchanged_columns_are_seen_by_balls_touched_from_one_side(balls):
+    (told,) = doubts(read_campaign(rewritten(balls, "probings.csv", "x_mm,y_mm", "y_mm,x_mm")))
+    assert "steps between balls are the declared ones only with x_mm and y_mm exchanged" in told
+
+
+def test_readings_of_balls_in_inches_are_seen(balls):
+    head, *rows = (balls / "probings.csv").read_text().splitlines()
+    for at, row in enumerate(rows):
+        cells = row.split(",")
+        cells[4:7] = [f"{float(cell) / 25.4:.5f}" for cell in cells[4:7]]
+        rows[at] = ",".join(cells)
+    (balls / "probings.csv").write_text("\n".join([head, *rows]) + "\n")
+    told = doubts(read_campaign(balls))
+    assert any("it looks as if x_mm, y_mm and z_mm were in inches" in sentence for sentence in told)
+
+
+def test_a_misspelt_ball_is_no_point_of_a_surface(balls, faults_of):
+    """It was taken for a point and told to get more names."""
+    (fault,) = faults_of(rewritten(balls, "probings.csv", "Kugel 2", "Kugle 2", 1))
+    assert (fault.line, fault.column) == (6, "target")
+    assert fault.message == "run 1: 'Kugle 2' is no ball of [[artefact.balls]]; did you mean 'Kugel 2'?"

@@ -186,6 +186,34 @@ def test_a_workbook_whose_sheet_is_damaged_is_refused_in_words(tmp_path: Path) -
         read_campaign(folder)
 
 
+@pytest.mark.parametrize(
+    ("part", "sound", "changed"),
+    [
+        (
+            "xl/worksheets/sheet1.xml",
+            b"summaryRight",
+            b"summiryRight",
+        ),  # TypeError of openpyxl, as its sheets are read
+        ("xl/styles.xml", b"<color theme", b"<color tHeme"),  # TypeError, as it is opened
+    ],
+)
+def test_a_workbook_with_xml_that_openpyxl_does_not_know_is_refused_in_words(
+    tmp_path: Path, part: str, sound: bytes, changed: bytes
+) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    as_workbook(folder, single=False)
+    path = folder / "data.xlsx"
+    with zipfile.ZipFile(path) as packed:
+        parts = {name: packed.read(name) for name in packed.namelist()}
+    assert sound in parts[part]
+    parts[part] = parts[part].replace(sound, changed, 1)
+    with zipfile.ZipFile(path, "w") as packed:
+        for name, content in parts.items():
+            packed.writestr(name, content)
+    with pytest.raises(CampaignError, match=r"data\.xlsx: this is no workbook of Excel .* that can be read"):
+        read_campaign(folder)
+
+
 def test_faults_of_a_workbook_name_its_file_and_row(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
     as_workbook(folder, single=False)
@@ -253,3 +281,41 @@ def test_a_table_in_windows_1252_is_the_same_campaign(tmp_path):
     (folder / "probings.csv").write_bytes(text.replace("target", "zi\u00e4l", 1).encode("cp1252"))
     with pytest.raises(CampaignError, match="byte 0xe4 is not UTF-8; save the file as UTF-8 text"):
         read_campaign(folder)
+
+
+@pytest.fixture
+def tilting(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(EXAMPLES / "tilting-table", tmp_path / "tilting-table"))
+
+
+@pytest.mark.parametrize("end", [";;\r\n", ";\r\n", ",,,\n"])
+def test_empty_columns_at_the_right_are_no_columns(tilting: Path, end: str) -> None:
+    original = read_campaign(tilting)
+    for name, rows in tables(tilting).items():
+        text = german(rows).decode() if end.startswith(";") else "".join(",".join(row) + "\n" for row in rows)
+        (tilting / name).write_bytes(text.replace("\r\n" if end.startswith(";") else "\n", end).encode())
+    assert_same(read_campaign(tilting), original)
+
+
+def test_an_empty_column_with_a_cell_is_no_empty_column(tilting: Path, faults_of: Any) -> None:
+    file = tilting / "runs.csv"
+    head, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([head + ",", *(row + "," for row in rows[:-1]), rows[-1] + ",late"]) + "\n")
+    assert "the header's cell 6 is empty" in faults_of(tilting)[0].message
+
+
+def test_a_row_of_units_a_remark_and_an_empty_line_are_a_fault_each(tilting: Path, faults_of: Any) -> None:
+    file = tilting / "probings.csv"
+    head, *rows = file.read_text().splitlines()
+    units = {"_mm": "mm", "_deg": "°", "_s": "s"}
+    row = ",".join(
+        next((unit for end, unit in units.items() if name.endswith(end)), "-") for name in head.split(",")
+    )
+    width = head.count(",")
+    file.write_text("\n".join([head, row, *rows, "," * width, "Geprüft: Jürgen" + "," * width]) + "\n")
+    faults = faults_of(tilting)
+    assert [(fault.line, fault.message.split(";")[0]) for fault in faults] == [
+        (2, "this is a row of units"),
+        (len(rows) + 3, "the line is empty"),
+        (len(rows) + 4, "this is no row of the table, only 'Geprüft: Jürgen'"),
+    ]

@@ -13,7 +13,12 @@ import pytest
 from monitor.exceptions import InputError
 from monitor.records import Campaign
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
-from monitor.reporting.certificate.completeness import check_complete, date_faults, missing_items
+from monitor.reporting.certificate.completeness import (
+    check_complete,
+    date_faults,
+    gaps_of_text,
+    missing_items,
+)
 from monitor.reporting.certificate.laboratory import read_laboratory
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord, NotApplicable, Replaced
 from monitor.reporting.certificate.results import ResultSet
@@ -138,6 +143,13 @@ def test_a_placeholder_is_quoted_where_it_stands(lacking: Callable[[str], set[tu
         ("7.8.2.1 e", "address: '-' says nothing"),
         ("7.8.2.1 k", "statement: 'N/A' says nothing"),
     }
+
+
+@pytest.mark.parametrize("unit", ["%", "‰", "°"])
+def test_a_unit_that_is_a_sign_states_something(unit: str) -> None:
+    """Relative humidity, which the campaign format names, was taken for a blank: no certificate could be issued."""
+    assert gaps_of_text(unit) == []
+    assert gaps_of_text(f" {unit}-") != []
 
 
 def test_dates_that_cannot_be_true_together_are_refused(make_record: Make) -> None:

@@ -138,5 +138,5 @@ def test_a_file_that_cannot_be_read_is_refused_in_words(tmp_path: Path) -> None:
         read_laboratory(written(tmp_path, "[laboratory"))
     place = tmp_path / "latin.toml"
     place.write_bytes(b'[laboratory]\nname = "M\xfcller"\n')
-    with pytest.raises(InputError, match="line 2, is not UTF-8; save the file as UTF-8 text"):
+    with pytest.raises(InputError, match="line 2: byte 0xfc is not UTF-8; save the file as UTF-8 text"):
         read_laboratory(place)

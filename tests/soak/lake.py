@@ -91,7 +91,7 @@ def fill(paths: list[Path], names: list[str], campaign: Campaign, identified: St
 
 def publishing(path: Path, address: str, files: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "monitor.cli", "--db", path, "publish", "--to", address, "--files", files],
+        [sys.executable, "-m", "monitor", "--db", path, "publish", "--to", address, "--files", files],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
 

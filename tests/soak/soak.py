@@ -156,7 +156,7 @@ def look(port: int, seconds: float, pause_s: float) -> tuple[int, str]:
 @contextmanager
 def served(database: Path, *, killed: bool) -> Iterator[tuple[int, int]]:
     """A server in a process of its own; yields its port and number. It is killed at the end, or asked to stop."""
-    command = [sys.executable, "-m", "monitor.cli", "--db", str(database), "serve", "--port", "0"]
+    command = [sys.executable, "-m", "monitor", "--db", str(database), "serve", "--port", "0"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:

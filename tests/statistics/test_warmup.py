@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.statistics import warm_up
@@ -59,10 +60,36 @@ def test_exact_exponential_is_recovered():
     assert fit.stable_after == pytest.approx(0.5 + 2.5 * np.log(10.0), rel=0.01)
 
 
+def test_days_of_one_warm_up_are_fitted_as_curve_fit_does():
+    rng = np.random.default_rng(8)
+    day, hour = np.divmod(np.arange(24), 8)
+    y = np.array([3.0, -5.0, 40.0])[day] + 6.0 * np.exp(-hour / 2.0) + 0.3 * rng.normal(size=24)
+    fit = warm_up(y, hour, rng=rng, beside=(day[:, np.newaxis] == [1, 2]).astype(float))
+
+    def curve(_, a, b, c, amplitude, tau):
+        return np.array([a, b, c])[day] + amplitude * np.exp(-hour / tau)
+
+    theirs, covariance = scipy.optimize.curve_fit(curve, hour, y, p0=[0.0, 0.0, 40.0, 5.0, 3.0])
+    assert fit.tau == pytest.approx(theirs[4], rel=0.01)
+    assert abs(fit.amplitude - theirs[3]) < 0.1 * np.sqrt(covariance[3, 3])
+    assert fit.final == pytest.approx(theirs[:3].mean(), abs=0.02)
+    assert fit.residual_sd == pytest.approx(
+        np.sqrt(np.mean((y - curve(0, *theirs)) ** 2) * 24 / 19), rel=1e-3
+    )
+    assert fit.settles
+    assert fit.share_seen == pytest.approx(1.0 - np.exp(-7.0 / theirs[4]), rel=0.01)
+
+
 def test_refusals_say_what_is_needed():
     rng = np.random.default_rng(0)
-    with pytest.raises(DataError, match="times has 3 different values; an exponential needs at least 5"):
+    with pytest.raises(DataError, match="times has 3 different values; an exponential needs at least 4"):
         warm_up(np.arange(6.0), [0, 0, 1, 1, 2, 2], rng=rng)
+    with pytest.raises(DataError, match="beside has 5 rows; 6 are needed"):
+        warm_up(np.arange(6.0), np.arange(6.0), rng=rng, beside=np.ones(5))
+    with pytest.raises(DataError, match="6 runs are too few for an exponential beside 3 columns"):
+        warm_up(np.arange(6.0), np.arange(6.0), rng=rng, beside=np.eye(6)[:, 1:4])
+    with pytest.raises(DataError, match="what is fitted beside the exponential explains it"):
+        warm_up(np.arange(7.0), [0, 0, 1, 1, 2, 2, 3], rng=rng, beside=np.eye(4)[[0, 0, 1, 1, 2, 2, 3]])
     with pytest.raises(DataError, match="tolerance is 0; it must be above zero"):
         warm_up(np.arange(6.0), np.arange(6.0), rng=rng, tolerance=0)
     with pytest.raises(DataError, match="at least 6 are needed"):

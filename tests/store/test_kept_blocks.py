@@ -5,6 +5,7 @@ A crash is made of the files as they lay: the file before and after the checkpoi
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import stat
@@ -117,6 +118,17 @@ def test_a_copy_that_was_not_finished_is_removed(crash: Crash) -> None:
     copy = Path(f"{crash.path}.blocks")
     copy.write_bytes(copy.read_bytes()[:-1])
     crash.check()
+
+
+@pytest.mark.parametrize("length", [0, 6, 3 * 4096 + 6, 3 * 4096 + 8 + 5000])
+def test_a_copy_of_another_form_is_none_although_its_sum_is_right(crash: Crash, length: int) -> None:
+    """It ended in ``struct.error``."""
+    copy = Path(f"{crash.path}.blocks")
+    other = (crash.path.read_bytes()[: 3 * 4096] + bytes(6000))[:length]
+    copy.write_bytes(kept_blocks._BEGIN + hashlib.sha256(other).digest() + other)
+    assert not kept_blocks.has_torn_blocks(str(crash.path))
+    assert kept_blocks.settle_blocks(str(crash.path)) == 0
+    assert not copy.exists()
 
 
 def test_a_copy_puts_nothing_into_a_file_that_is_whole(crash: Crash) -> None:

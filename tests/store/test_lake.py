@@ -130,7 +130,7 @@ def test_while_the_lake_is_away_the_plant_can_write_and_who_waits_is_told(
 
     def write(pause: float) -> None:
         event = ["event", campaign.machine.id, f"moved {len(wrote)} times", *words]
-        command = [sys.executable, "-m", "monitor.cli", *event, "--db", str(path)]
+        command = [sys.executable, "-m", "monitor", *event, "--db", str(path)]
         wrote.append(subprocess.run(command, capture_output=True, text=True))
 
     wrote: list[subprocess.CompletedProcess[str]] = []

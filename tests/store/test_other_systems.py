@@ -133,6 +133,7 @@ VERBS = """watch in --once --rest 0 then campaigns then backup 1.duckdb then arc
     then compact then --db again.duckdb restore 1.duckdb then export tables"""
 
 
+@pytest.mark.slow
 def test_without_posix_campaigns_are_watched_and_read_and_files_are_copied(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "tables").mkdir()

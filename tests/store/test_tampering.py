@@ -88,6 +88,7 @@ def _columns(db: Database) -> list[tuple[str, str, str]]:
     )
 
 
+@pytest.mark.slow
 def test_every_column_of_every_table_is_verified(
     all_tables: Database, seeds: Callable[[int, int], range]
 ) -> None:

@@ -16,7 +16,9 @@ from by_path import load
 
 from monitor.discovery import fit
 from monitor.methods import campaign_method
+from monitor.methods.chain.shared_effects import followed_effects
 from monitor.readers import read_campaign
+from monitor.reporting.budget import HoldsFor
 from monitor.sources import Quantity, Sharing, Source
 from monitor.store.models import StoredModel
 from monitor.uncertainty import measured_run, sensitivity_of
@@ -24,10 +26,11 @@ from monitor.uncertainty.runs.row_run import repeated_readings
 from monitor.uncertainty.type_b import source_columns
 from monitor.workflow.models import as_model
 from monitor.workflow.selections.readings import SelectedReadings
+from monitor.workflow.uncertainty.effect_scatter import _between_days, _beyond
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
 from monitor.workflow.uncertainty.inputs import reading_inputs, readings_of_runs
 from monitor.workflow.uncertainty.request import UncertaintyRequest
-from monitor.workflow.uncertainty.with_effects import _beyond, effect_outputs, source_effect
+from monitor.workflow.uncertainty.with_effects import effect_outputs, source_effect
 from tests.simulator import horizontal_centre as centre
 
 own = load("own_machine", Path(__file__).resolve().parents[1] / "benchmarks" / "own_machine.py")
@@ -111,16 +114,54 @@ def test_a_run_takes_up_what_its_own_effect_is_off_the_mean(touched) -> None:
     assert np.abs(ratio).max() < 0.2
 
 
-def test_two_days_that_differ_are_no_part_of_one_degree_of_freedom(touched) -> None:
+def test_two_days_that_differ_are_known_to_one_degree_of_freedom(touched) -> None:
+    """The mean of two days has half their difference for its standard uncertainty, and Student's t of 1 reaches far."""
     campaign = campaign_of(touched, [1.0, 1.0, 1.0, 3.5, 3.5, 3.5], [0, 0, 0, 1, 1, 1])
-    result = evaluated(campaign, fitted(campaign))
+    fit_ = fitted(campaign)
+    result = evaluated(campaign, fit_)
     (scatter,) = [line for line in result.framework.budget if line.source == SCATTER]
-    assert scatter.dof == 5.0
-    assert np.isfinite(result.framework.k_q)
+    assert scatter.dof == 1.0
+    by_run = followed_effects(fit_.problem, fit_.solution).estimate[:, 0]
+    apart = by_run[3:].mean() - by_run[:3].mean()
+    assert result.framework.u[-1] == pytest.approx(abs(apart) / 2.0, rel=1e-6)
+    # Readings alone would have 2.87; what they leave of u bounds the quantile of one degree of freedom, 12.7.
+    assert 4.0 < result.framework.k_q < 12.8
+
+
+def test_days_of_an_effect_stand_beside_those_of_the_parameters(touched) -> None:
+    """One-way analysis of variance of the amplitudes written into the machine, as good as without noise."""
+    amplitudes = np.array([1.0, 1.2, 3.0, 3.2, 5.0, 5.2])
+    campaign = campaign_of(touched, amplitudes, [0, 0, 1, 1, 2, 2], noise=1e-5)
+    result = evaluated(campaign, fitted(campaign))
+    days = result.behind.day_to_day
+    assert days.spread[EFFECT] == pytest.approx(4.0, abs=0.02)
+    assert days.u_day[EFFECT] == pytest.approx(math.sqrt(4.0 - 0.02 / 2.0), abs=0.02)
+    assert days.u_day.keys() == {*result.framework.names}
+
+
+def test_what_holds_over_a_campaign_has_the_days_of_an_effect_without_a_test(touched) -> None:
+    """Nine runs on three days that differ by less than a test sees: u is the scatter of the days' means."""
+    amplitudes = np.repeat([1.8, 2.0, 2.2], 3) + np.tile([-0.3, 0.0, 0.3], 3)
+    campaign = campaign_of(touched, amplitudes, np.repeat([0, 1, 2], 3))
+    fit_ = fitted(campaign)
+    by_run = followed_effects(fit_.problem, fit_.solution).estimate[:, 0].reshape(3, 3)
+    of_days = by_run.mean(axis=1).std(ddof=1) / math.sqrt(3.0)
+    result = evaluated(campaign, fit_)
+    assert result.behind.holds_for is HoldsFor.CAMPAIGN
+    assert result.framework.u[-1] >= 0.999 * of_days
+    drawn, inside = np.random.default_rng(58), 0
+    for _ in range(2000):
+        day = np.repeat(drawn.standard_normal(5), 4)
+        values = day + drawn.standard_normal(20)
+        beyond = _between_days(values, np.repeat(np.arange(5), 4), 1.0 / 20.0)
+        added = beyond[0].variance / 5.0 if beyond else 0.0
+        inside += abs(values.mean()) <= 2.78 * math.sqrt(1.0 / 20.0 + added)
+    # Student's law of four degrees of freedom has 95 % there; with the test of 5 % it is 92.9 there.
+    assert inside > 0.945 * 2000
 
 
 @pytest.mark.parametrize("dof", [math.inf, 12.0])
-@pytest.mark.parametrize(("days", "per_day"), [(1, 5), (2, 3), (3, 4), (6, 1)])
+@pytest.mark.parametrize(("days", "per_day"), [(1, 2), (1, 5), (2, 3), (3, 4), (6, 1)])
 def test_calm_effects_are_said_to_scatter_in_5_percent_at_most(days: int, per_day: int, dof: float) -> None:
     rng, runs, calm = np.random.default_rng(57), days * per_day, 2000
     labels = np.repeat(np.arange(days), per_day)

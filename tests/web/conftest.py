@@ -77,7 +77,7 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
             users = folder / "users.toml"
             tokens = {role: add_user(users, f"{role}-1", role) for role in ("viewer", "engineer", "approver")}
         context = opened(path, folder)
-        db = context.__enter__()
+        db = context.__enter__().db
         settings = ServerSettings(database=path, users=users)
         gate = application(db, settings, folder)
         gate._app.state.import_patience_s = 60.0  # type: ignore[attr-defined]

@@ -47,7 +47,7 @@ CHECKS = "not_a_server_error,status_code_conformance,content_type_conformance,re
 
 def started(database: Path) -> tuple[subprocess.Popen[str], str]:
     """A server of a database with something of everything, and its address."""
-    monitor = [sys.executable, "-m", "monitor.cli", "--db", str(database)]
+    monitor = [sys.executable, "-m", "monitor", "--db", str(database)]
     subprocess.run(
         [*monitor, "import", *(EXAMPLES / name for name in CAMPAIGNS)], check=True, capture_output=True
     )

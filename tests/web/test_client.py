@@ -150,8 +150,8 @@ def sides(imported: Path, tmp_path: Path) -> Iterator[Sides]:
     shutil.copyfile(imported, folder / "here.duckdb")
     shutil.copyfile(imported, folder / "there.duckdb")
     here = Database(folder / "here.duckdb", threads=1, actor=host_user_name())
-    with opened(folder / "there.duckdb", room) as there, here as db:
-        gate = application(there, ServerSettings(folder / "there.duckdb"), room)
+    with opened(folder / "there.duckdb", room) as served, here as db:
+        gate = application(served.db, ServerSettings(folder / "there.duckdb"), room)
         running = uvicorn.Server(uvicorn.Config(gate, port=0, log_level="warning", lifespan="off"))
         thread = threading.Thread(target=running.run)
         thread.start()

@@ -116,10 +116,10 @@ def test_a_refusal_stands_until_something_is_written_or_a_minute_went_by(asked: 
         for ticket in tickets:
             with pytest.raises(NotFoundError, match="nothing was identified"):
                 ticket.answer(60.0)
-    assert [ticket.number for ticket in tickets] == [1, 2]
+    assert tickets[1].number == tickets[0].number + 1
     tickets[0].asked_at -= desk_module.REFUSAL_STANDS_S + 5.0
     third = desk.ask(ADA, *questions[0])
-    assert third.number == 3
+    assert third.number == tickets[1].number + 1
     third.future.exception(60.0)
     asker.refuses = False
     asker.freshness.wrote(None)

@@ -19,9 +19,9 @@ from monitor.web.asking import Asker
 from monitor.web.opening import opened
 import monitor.web.app
 folder, path = map(Path, sys.argv[1:])
-with opened(path, folder) as db:
+with opened(path, folder) as served:
     user = monitor.web.app.User("somebody", monitor.web.app.Role.VIEWER)
-    machines = Asker(db)(user, "machines")
+    machines = Asker(served.db)(user, "machines")
 print(json.dumps([len(machines.rows), sorted(sys.modules)]))
 """
 

@@ -41,9 +41,15 @@ def _files(content: bytes = b"hello") -> dict[str, Any]:
             {"machine": "HU40-T", "text": "belt", "at": "yesterday"},
             {},
             400,
-            "is a moment, such as",
+            "write a day or a time as 2026-03-05",
         ),
-        ("/machine/event", {"machine": "HU41-T", "text": "belt"}, {}, 404, "did you mean &#39;HU40-T&#39;"),
+        (
+            "/machine/event",
+            {"machine": "HU41-T", "text": "belt", "at": "2026-03-05"},
+            {},
+            404,
+            "did you mean &#39;HU40-T&#39;",
+        ),
         ("/model/add", {"campaign": CAMPAIGN, "effect": "EZZ1:up", "to": "samba"}, {}, 400, "EZZ1"),
         ("/model/undo", {"campaign": CAMPAIGN, "effect": "EXX:reversal", "model": "none"}, {}, 404, "none"),
         ("/work/cancel", {"number": "one"}, {}, 400, "a whole number"),
@@ -62,7 +68,7 @@ def test_a_form_is_answered_with_the_address_of_its_outcome(
 
 
 def test_a_refusal_leads_back_to_its_form_and_to_no_other_server(local: Any) -> None:
-    fields = {"proof": local.proof(), "machine": "HU41-T", "text": "belt"}
+    fields = {"proof": local.proof(), "machine": "HU41-T", "text": "belt", "at": "2026-03-05"}
     for referer, wanted in (
         ("http://127.0.0.1:8765/machine?name=HU40-T&colour=day", "/machine?name=HU40-T&amp;colour=day"),
         ("http://127.0.0.1:8765//elsewhere.example/x", "/"),

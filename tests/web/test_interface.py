@@ -38,7 +38,7 @@ def test_the_answer_is_what_the_command_prints(imported: Path, local: Any, tmp_p
     command = [
         sys.executable,
         "-m",
-        "monitor.cli",
+        "monitor",
         "--db",
         str(copy),
         "compare",

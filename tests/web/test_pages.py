@@ -229,7 +229,7 @@ def test_two_periods_differ_as_numpy_says(local: Any) -> None:
         local,
         f"/machine/periods?name=HU40-T&since_1={names[0]}&until_1={names[1]}&since_2={names[3]}&until_2={names[4]}",
     )
-    assert "8 runs on 2 days against 8 runs on 2 days" in text
+    assert f"Earlier: {names[0]} to {names[1]} (8 runs on 2 days). Later: {names[3]} to {names[4]}" in text
 
 
 def test_downloads_of_a_machine_hold_that_machine(local: Any) -> None:
@@ -311,7 +311,10 @@ def test_a_period_says_which_of_its_days_is_none(local: Any) -> None:
     address = (
         "/machine/periods?name=HU40-T&since_1=2026-03-02&until_1={}&since_2=2026-03-02&until_2=2026-03-02"
     )
-    assert "the last day is a day, such as" in local.client.get(address.format("2026-13-02")).text
+    assert (
+        "&#39;earlier: to, whole day&#39; is a day, such as"
+        in local.client.get(address.format("2026-13-02")).text
+    )
     assert "no calendar has a day after 9999-12-31" in local.client.get(address.format("9999-12-31")).text
 
 

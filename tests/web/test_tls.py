@@ -65,7 +65,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     with log.open("w") as errors:
         server = subprocess.Popen(
             [
-                sys.executable, "-m", "monitor.cli", "--db", folder / "shop.duckdb", "serve", "--port", "0",
+                sys.executable, "-m", "monitor", "--db", folder / "shop.duckdb", "serve", "--port", "0",
                 "--certificate", certificate, "--key", key, "--users", users,
             ],
             stdout=subprocess.PIPE, stderr=errors, text=True,

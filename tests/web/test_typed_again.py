@@ -5,7 +5,8 @@ from __future__ import annotations
 import html
 import re
 import tomllib
-from datetime import date
+from datetime import date, datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,9 +31,9 @@ def _boxes(page: str) -> dict[str, str]:
     ("at", "says"),
     [
         ("2999-01-01T00:00:00Z", "lies in the future"),
-        ("2026-02-31T07:00:00Z", "&#39;at&#39;"),
-        ("04.03.2026 07:00", "&#39;at&#39;"),
-        ("9" * 400, "&#39;at&#39;"),
+        ("2026-02-31T07:00:00Z", "there is no such day or time"),
+        ("31.02.2026 07:00", "is a day, such as 2026-03-02 or 02.03.2026"),
+        ("9" * 400, "write a day or a time as 2026-03-05"),
     ],
 )
 def test_an_event_of_an_impossible_moment_is_mended_in_its_form(local: Any, at: str, says: str) -> None:
@@ -55,6 +56,34 @@ def test_an_event_of_an_impossible_moment_is_mended_in_its_form(local: Any, at: 
     # Once it is right, the form of the page is empty again.
     assert _boxes(local.client.get("/machine?name=HU40-T").text)["text"] == ""
     assert local.client.get("/machine?name=HU40-T&refused=guessed").status_code == 200
+
+
+def test_an_event_is_dated_as_people_write_and_its_page_stays_as_it_was_looked_at(
+    imported: Path, serve: Any, tmp_path: Path
+) -> None:
+    """Without an offset it is the time of the shop's clock, -05:00 for the runs of HU40-T."""
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    own = serve(copy, False)
+    looked_at(own, "/machine?name=HU40-T")
+    query = "name=HU40-T&parameter=EB0C&since=2026-03-03&until=2026-03-05&refused=before"
+    typed = {
+        "2026-03-04": "2026-03-04T00:00:00-05:00",
+        "05.03.2026": "2026-03-05T00:00:00-05:00",
+        "05.03.2026, 07:10 Uhr": "2026-03-05T07:10:00-05:00",
+        "2026-03-05 07:20": "2026-03-05T07:20:00-05:00",
+        "2026-03-05T14:30:00+01:00": "2026-03-05T08:30:00-05:00",
+    }
+    for at in typed:
+        texts = {"machine": "HU40-T", "text": at, "kind": "note", "at": at}
+        sent = own.client.post(
+            "/machine/event", data={"proof": own.proof(), **texts},
+            headers={"Referer": f"http://127.0.0.1:8765/machine?{query}"},
+        )  # fmt: skip
+        assert sent.headers["location"] == f"/machine?{query.replace('&refused=before', '')}#events"
+    recorded = own.ask("event", {"machine": "HU40-T"})[1]["events"]
+    moments = {event["description"]: datetime.fromisoformat(event["happened_at"]) for event in recorded}
+    assert moments == {at: datetime.fromisoformat(wanted) for at, wanted in typed.items()}
 
 
 @pytest.mark.parametrize("wanted", ["0,5x", "NaN", "-1", "1e400", "0", "<script>"])

@@ -54,7 +54,7 @@ def test_a_workbook_of_excel_is_imported_and_refused_at_its_cells(
 
 def test_an_address_that_lacks_a_part_is_refused_as_a_page(local: Any) -> None:
     for address, sentence in (
-        ("/machine", "'name': field required"),
+        ("/machine", "it lacks 'name'"),
         ("/?first=abc", "'first': input should be"),
     ):
         answer = local.client.get(address)

@@ -86,7 +86,7 @@ def test_no_worker_is_too_few(fleet: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for the workers in /proc")
 def test_ctrl_c_ends_the_workers_without_a_word_of_theirs(fleet: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "monitor.cli", "--db", str(fleet), "report", "--week", "2026-W10"]
+    command = [sys.executable, "-m", "monitor", "--db", str(fleet), "report", "--week", "2026-W10"]
     # On a busy machine the report may be made before the signal comes: it is made again then.
     for attempt in range(5):
         status, out, err, workers = interrupted(

@@ -17,10 +17,14 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
 from monitor.reporting.certificate.completeness import IncompleteCertificateError
 from monitor.reporting.covariance_source import CovarianceKind
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.uncertainty import measured_run
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
+from monitor.workflow.certificate.tool_points import tool_point_sentence
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
@@ -32,6 +36,7 @@ LABORATORY = EXAMPLES / "laboratory.toml"
 def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     with Database(tmp_path_factory.mktemp("verbs") / "shop.duckdb") as db:
         import_campaign(db, read_campaign(EXAMPLES / "r-test"))
+        import_campaign(db, read_campaign(EXAMPLES / "four-instruments"))
         import_campaign(db, _twice(read_campaign(EXAMPLES / "four-instruments"), "nest-and-dial"))
         yield db
 
@@ -134,3 +139,17 @@ def test_a_certificate_of_the_campaign_comes_first(
         answer = issue(db, CertificateRequest("named", laboratory=LABORATORY, out=tmp_path, draft=True))
     document = load_certificate(db, answer.certificate.number).record
     assert document["references"][0]["certificate"] == "4711"
+
+
+def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> None:
+    """A sphere that goes round with C tells where C is by the stated tool point; a dial on Z tells nothing of it."""
+    campaign = read_campaign(EXAMPLES / "four-instruments")
+    (stated,) = identify(db, IdentifyRequest("four-instruments")).as_stated or ()
+    assert (stated.name, dict(stated.moved)) == ("R-test", {"x": ("EX0C",), "y": ("EY0C",)})
+    sentence = tool_point_sentence(campaign, ("EX0C", "EY0C", "EC0X"), texts_of("en"))
+    assert sentence is not None
+    assert sentence.startswith("EX0C, EY0C count from the tool points as stated (R-test), whose uncertainty")
+    known = tuple(replace(setup, tool_point_uncertainty=0.002) for setup in campaign.artefact.setups)
+    sure = replace(campaign, artefact=replace(campaign.artefact, setups=known))
+    assert tool_point_sentence(sure, ("EX0C", "EY0C", "EC0X"), texts_of("en")) is None
+    assert tool_point_sentence(campaign, ("EC0X", "EXX"), texts_of("en")) is None

@@ -19,6 +19,8 @@ from monitor.store import Database
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.history.periods import Period, PeriodsRequest, periods
+from monitor.workflow.history.values import ValuesRequest, values_of_machine
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
@@ -124,6 +126,12 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
 def test_two_methods_share_one_trend_and_agree(simulator, tmp_path):
     with both_methods(simulator, tmp_path, SHARED) as own:
         found = trends(own, "M")
+        drawn = values_of_machine(own, ValuesRequest("M")).conditions
+        ends = [f"2026-03-{day:02d}T00:00:00+00:00" for day in (1, 9, 10)]
+        halves = [Period(*map(datetime.fromisoformat, pair)) for pair in (ends[:2], ends[1:])]
+        compared = periods(own, PeriodsRequest("M", *halves)).conditions
+    # How a touched surface lay is recorded touch by touch and is no condition of a run.
+    assert [name for name in (*drawn, *compared) if name.startswith("normal_")] == []
     assert found["methods"] == ["samba", "rotary-probing"]
     (pair,) = found["agreement"]
     assert pair["kind"] == "methods"

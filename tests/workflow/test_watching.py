@@ -136,7 +136,7 @@ def test_two_watchers_at_one_folder_share_the_work(path: Path, arrived: Path) ->
     command = [
         sys.executable,
         "-m",
-        "monitor.cli",
+        "monitor",
         "--db",
         str(path),
         "watch",

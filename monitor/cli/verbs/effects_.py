@@ -55,8 +55,9 @@ def run(options: Namespace) -> int:
         return 0
     answer = on_screen(answer)
     if not answer.effects:
+        hint = f"did you mean '{answer.nearest}'? Else " if answer.nearest else ""
         output.say(
-            f"no effect says '{options.text}'; try another word, such as backlash, thermal, worm or guideway"
+            f"no effect says '{options.text}'; {hint}try another word, such as backlash, thermal, worm or guideway"
         )
         return 0
     rows = [

@@ -47,6 +47,16 @@ class TakenUp:
 
 
 @dataclass(frozen=True)
+class AsStated:
+    """A tool point that is taken as stated, of an instrument or of setups, ``name``: ``moved`` has, by its coordinates
+    x, y and z, the errors that move with it and that no reading tells from it."""
+
+    name: str
+    setups: tuple[str, ...]
+    moved: Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
 class Identification:
     """All runs of a campaign under one model.
 
@@ -54,7 +64,7 @@ class Identification:
     common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units. ``gross``
     readings are wrong beyond doubt, and so are the numbers of their runs: they have weight here like all others.
     ``followed`` are the added effects as every run alone determines them. ``taken_up`` are errors without a number of
-    their own, where the method says them.
+    their own, where the method says them, ``as_stated`` the stated places that its numbers count from.
     """
 
     campaign: str
@@ -72,6 +82,7 @@ class Identification:
     gross: tuple[GrossReading, ...]
     followed: FollowedEffects
     taken_up: tuple[TakenUp, ...] = ()
+    as_stated: tuple[AsStated, ...] = ()
 
 
 @dataclass(frozen=True)

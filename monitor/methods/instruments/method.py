@@ -9,6 +9,7 @@ from monitor.machine import Chain
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
+from monitor.methods.instruments.as_stated import as_stated
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
 from monitor.methods.instruments.contrasts import contrasts, scatters
@@ -67,6 +68,7 @@ METHOD = ChainMethod(
     base_effects=usual_base,
     trial_rows=150,
     taken_up=without_numbers,
+    as_stated=as_stated,
     instruments=Instruments(shares, contrasts, scatters, drifts),
     standards=StandardTests(standard_tests),
     plan=InstrumentPlan(InstrumentForecast),

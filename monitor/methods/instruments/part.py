@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, mean_of_runs
 from monitor.records import Array, Setup
 
 #: What the tool point is off where it is stated with an uncertainty.
@@ -99,5 +99,8 @@ class Part:
             by_own = np.concatenate([by_own, np.eye(drifts) * elapsed[:, None, None]], axis=2)
         if self._of_tool:
             assert shown.by_shift is not None  # the reader allows it for lengths alone
-            by_own = np.concatenate([by_own, shown.by_shift @ stance.turned], axis=2)
+            by_point = shown.by_shift @ stance.turned
+            if shown.by_mean is not None:
+                by_point = by_point + shown.by_mean @ mean_of_runs(stance.turned, self.rows.run)
+            by_own = np.concatenate([by_own, by_point], axis=2)
         return replace(shown, by_own=by_own)

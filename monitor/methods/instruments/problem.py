@@ -256,7 +256,7 @@ class InstrumentProblem(ChainProblem):
             if shown.by_own is not None:
                 by_own[np.ix_(at, np.arange(kinds), columns)] = shown.by_own
             if by_error is not None:
-                derivatives = by_error_of(self.context.chain, shown, pose, sides, at)
+                derivatives = by_error_of(self.context.chain, shown, pose, sides, part)
                 by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
         residual += self._of_instruments(local, common)
         return InstrumentPose(residual, pose.by_tip, pose.work_rotation, by_error, by_own)

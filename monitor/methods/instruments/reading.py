@@ -87,14 +87,16 @@ class Shown:
     """What the instrument would show less what it showed, (m, k) in mm, and its derivatives.
 
     ``by_shift`` (m, k, 3) by r, ``by_turn`` (m, k, 3) per radian by the turn of the tool side against the work side,
-    both in the frame of the last work axis; ``by_tool`` and ``by_work`` (m, k, 3) by the turn of one side alone in the
-    bed's frame (a level). None: no such derivative. ``by_own`` (m, k, q) by the unknowns of the setup. ``along``
+    both in the frame of the last work axis; ``by_mean`` (m, k, 3) by the mean of r over the rows of the run, which a
+    placing follows; ``by_tool`` and ``by_work`` (m, k, 3) by the turn of one side alone in the bed's frame (a level).
+    None: no such derivative. ``by_own`` (m, k, q) by the unknowns of the setup. ``along``
     (m, k, 3) are unit vectors by which people see the numbers of angles, in the frame of the last work axis.
     """
 
     residual: Array
     by_shift: Array | None = None
     by_turn: Array | None = None
+    by_mean: Array | None = None
     by_tool: Array | None = None
     by_work: Array | None = None
     by_own: Array | None = None
@@ -199,6 +201,14 @@ def direction_of(setup: Setup) -> Array:
     """The direction (3,) of a setup whose kind has one."""
     assert setup.direction is not None  # the reader asks for it
     return np.array(setup.direction)
+
+
+def mean_of_runs(values: Array, run: npt.NDArray[np.int64]) -> Array:
+    """The mean (m, ...) of values (m, ...) over the rows of each row's run (m,)."""
+    runs, index, counts = np.unique(run, return_inverse=True, return_counts=True)
+    total = np.zeros((len(runs), *values.shape[1:]))
+    np.add.at(total, index, values)
+    return np.asarray((total.T / counts).T[index])
 
 
 def cross_matrix(vectors: Array) -> Array:

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.machine import Chain, ChainPose, Orientation
-from monitor.methods.instruments.reading import Shown
+from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.reading import Shown, mean_of_runs
 from monitor.records import Array
 
 # What is read of an error's displacement is at least this part, else it comes from products of errors alone.
@@ -16,18 +17,19 @@ SECOND_ORDER = 5e-3
 LEAST_LEVER, LEAST_READ = 1e-3, 2.0
 
 
-def by_error_of(
-    chain: Chain, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]
-) -> Array:
-    """Derivatives (m, k, J, 2, 6) of what a setup with the rows ``at`` (m,) shows by every error."""
+def by_error_of(chain: Chain, shown: Shown, pose: ChainPose, sides: Orientation, part: Part) -> Array:
+    """Derivatives (m, k, J, 2, 6) of what a setup shows by every error."""
     assert pose.by_error is not None
     assert sides.by_error is not None
-    joints = len(chain.joints)
+    joints, at = len(chain.joints), part.at
     total = np.zeros((len(at), shown.residual.shape[1], joints * 12))
     turns = sides.by_error[at].reshape(len(at), 3, joints * 12)
     on_tool = np.repeat(np.arange(joints) >= len(chain.work), 12)
     if shown.by_shift is not None:
         total += shown.by_shift @ pose.by_error[at].reshape(len(at), 3, joints * 12)
+    if shown.by_mean is not None:
+        mean = mean_of_runs(pose.by_error[at].reshape(len(at), 3, joints * 12), part.rows.run)
+        total += shown.by_mean @ mean
     if shown.by_turn is not None:
         relative = np.swapaxes(sides.work[at], 1, 2) @ (turns * np.where(on_tool, 1.0, -1.0))
         total += shown.by_turn @ relative

@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from monitor.exceptions import Fault
+from monitor.exceptions import Fault, did_you_mean
 from monitor.readers.faults import quoted
-from monitor.readers.method_rules import MethodRules, Plan
+from monitor.readers.method_rules import DeclaredPlaces, MethodRules, Plan
+from monitor.records import Artefact
 
 NORMAL = ("normal_x", "normal_y", "normal_z")
 # Four decimals of a direction are enough to be read as one; the length is divided out.
@@ -82,6 +83,16 @@ def _points(
                 )
             continue
         other = mine[~wrong[mine] & (np.linalg.norm(normal[mine] - normal[mine[0]], axis=1) > SAME_NORMAL)]
+        poses = len(np.unique(turned[mine], axis=0))
+        meant = did_you_mean(target, balls) if len(other) or poses < FEWEST_POSES else ""
+        if meant:
+            yield Fault(
+                plan.file,
+                line,
+                "target",
+                f"run {run}: {quoted(target)} is no ball of [[artefact.balls]]; {meant.strip()}",
+            )
+            continue
         if len(other) and not wrong[mine[0]]:
             yield Fault(
                 plan.file,
@@ -90,7 +101,6 @@ def _points(
                 f"run {run}: point {quoted(target)} has another normal than on line {line}; normals are in the frame "
                 "of the last work axis, where a point keeps its own; name each point of the surface differently",
             )
-        poses = len(np.unique(turned[mine], axis=0))
         if poses < FEWEST_POSES:
             yield Fault(
                 plan.file,
@@ -101,4 +111,13 @@ def _points(
             )
 
 
-RULES = MethodRules("rotary-probing", plain_columns=NORMAL, check=check)
+def declared(artefact: Artefact) -> DeclaredPlaces | None:
+    """The nominal centres of balls of one diameter, the commonest; None where fewer than two have it."""
+    by_diameter: dict[float, dict[str, npt.NDArray[np.float64]]] = {}
+    for ball in artefact.balls:
+        by_diameter.setdefault(ball.diameter, {})[ball.id] = np.array(ball.nominal)
+    places = max(by_diameter.values(), key=len, default={})
+    return DeclaredPlaces("balls", places, by_normals=True) if len(places) > 1 else None
+
+
+RULES = MethodRules("rotary-probing", plain_columns=NORMAL, check=check, declared=declared)

@@ -149,7 +149,7 @@ def _days(result: ResultSet, days: DayToDay, expanded: dict[str, float], texts: 
     heads = tuple(
         texts.markup(f"budget.{key}") for key in ("within_run", "between_runs", "u_day", "interval", "spread")
     )
-    # Effects of the model are one number of all runs: they have no components.
+    # An effect of the model that a run alone says nothing of has no components.
     names = [name for name in result.names if name in days.u_day]
     interval = [
         f"{_written(low, texts)} \N{HORIZONTAL ELLIPSIS} {_written(high, texts)}" if low == low else _UNKNOWN

@@ -7,10 +7,12 @@ said with a reason (``NotApplicable``).
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, RefusedResultError
+from monitor.reporting.certificate.grounds import Ground, ground_sentence
 from monitor.reporting.certificate.laboratory_keys import key_of
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord, Standard
 from monitor.reporting.certificate.results import ResultSet
@@ -25,6 +27,8 @@ _STATED = {
 }
 #: Written where nothing is known: a reader learns no more from it than from a blank. Not "na", which is a name too.
 _PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba", "t.b.d."})
+#: Units that have neither a letter nor a digit: of a relative humidity, of an angle.
+_UNITS_OF_SIGNS = frozenset({"%", "‰", "°", "′", "″"})
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,25 @@ class IncompleteCertificateError(InputError):
                 "the keys are those of the laboratory's file where no other is named; "
                 "`monitor certificate template` writes one with all of them"
             )
+        super().__init__("\n".join(lines))
+
+
+class RefusedGroundsError(RefusedResultError):
+    """A certificate against which ``grounds`` speak that nobody accepts; ``missing`` is what else it lacks."""
+
+    def __init__(self, grounds: Sequence[Ground], missing: Sequence[MissingItem] = ()) -> None:
+        self.grounds, self.missing = tuple(grounds), tuple(missing)
+        texts = texts_of()
+        kinds = dict.fromkeys(ground.kind for ground in grounds)
+        options = " ".join(f"--accept {kind}=REASON" for kind in kinds)
+        lines = [
+            "the certificate is refused:",
+            *(f"  {ground.kind}: {ground_sentence(ground, texts)}" for ground in grounds),
+            "Correct what is wrong; or, where the laboratory can answer for it, say why, which is printed on the "
+            f"certificate: {options}",
+        ]
+        if missing:
+            lines += ["and besides it lacks:", *(f"  {gap}" for gap in missing)]
         super().__init__("\n".join(lines))
 
 
@@ -159,7 +182,7 @@ def gaps_of_text(text: str) -> list[str]:
     if not text.strip():
         return [""]
     said = text.strip().casefold()
-    if said in _PLACEHOLDERS or not any(sign.isalnum() for sign in said):
+    if said in _PLACEHOLDERS or not (said in _UNITS_OF_SIGNS or any(sign.isalnum() for sign in said)):
         return [f"{text.strip()!r} says nothing"]
     return []
 

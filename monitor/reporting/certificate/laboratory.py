@@ -6,14 +6,12 @@ Nothing is filled in: a key that is absent stays None, and the certificate that 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.laboratory_keys import SECTIONS
@@ -22,7 +20,7 @@ from monitor.reporting.certificate.record import Accreditation, NotApplicable, P
 from monitor.reporting.certificate.samples import sample_faults
 from monitor.reporting.resources import report_text
 from monitor.reporting.texts import languages
-from monitor.toml_text import toml_refusal
+from monitor.toml_text import toml_file
 
 #: The keys that may be answered by ``{ not_applicable = "..." }``.
 MAY_NOT_APPLY = frozenset(
@@ -89,19 +87,11 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
     file = Path(path)
     try:
-        text = read_bounded(file, LARGEST_SETTINGS).decode("utf-8-sig")
-        tables = tomllib.loads(text)
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{file} cannot be read: {error.strerror}; `monitor certificate template` writes a file to fill in"
-        ) from error
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError(f"{file}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(toml_refusal(file, error, text)) from error
+        tables = toml_file(file)
+    except InputError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            raise InputError(f"{error}; `monitor certificate template` writes a file to fill in") from error
+        raise
     faults: list[str] = []
     answers = _answers(tables, faults)
     mark = read_mark(file, answers.get("laboratory.mark"), faults)

@@ -67,8 +67,12 @@ _LASTING = re.compile(
     r"|permission denied|must be owner|read-only file system|no space left"
 )
 #: What a standby server says until it is promoted, which takes seconds, and one that is only read, which stays: it is
-#: tried so often, for 7 to 21 s (the pauses are drawn).
-_STANDBY, _TRIES_OF_STANDBY = "read-only transaction", 13
+#: tried so often, for 7 to 21 s (the pauses are drawn). So is a server that answers whoever connects in words that are
+#: not known here, those of another language: a wrong password and a start that is not over are not told apart there.
+_STANDBY, _TRIES_OF_UNSURE = "read-only transaction", 13
+_ANSWER = re.compile(
+    r"failed: \w+:\s(?!.*(starting up|shutting down|recovery|not accepting|too many|slots|terminating))"
+)
 #: How DuckLake names the statement that its catalogue refused.
 _QUERY = re.compile(r'Failed to execute query ".*": (?=ERROR)', re.DOTALL)
 #: After how many seconds of trying somebody who waits is told.
@@ -362,12 +366,14 @@ def _may_pass(message: str, tries: int) -> bool:
     that was away.
 
     Whom a server does not let in, or what it does not have, stays so. DuckDB gives the words of a server without its
-    SQLSTATE: those of one that speaks another language are not told apart.
+    SQLSTATE.
     """
     said = message.lower()
-    if _STANDBY in said:
-        return tries < _TRIES_OF_STANDBY
-    return _LASTING.search(said) is None and any(phrase in said for phrase in _PASSING)
+    if _LASTING.search(said) is not None:
+        return False
+    if _STANDBY in said or _ANSWER.search(said) is not None:
+        return tries < _TRIES_OF_UNSURE
+    return any(phrase in said for phrase in _PASSING)
 
 
 def _without_queries(fault: Exception) -> str:

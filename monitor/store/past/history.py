@@ -22,6 +22,7 @@ from monitor.store.connection import Database
 from monitor.store.past.identified_values import IdentifiedValues, values_of
 from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
 from monitor.store.type_tolerances import types_in_use
+from monitor.units import CONDITION_SUFFIXES
 
 # Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the heads, which are long.
 _IDENTIFICATIONS = """
@@ -134,6 +135,16 @@ class MachineHistory:
     def seconds(self) -> Array:
         """Start of each run in seconds since 1970 (n,)."""
         return np.array([at.timestamp() for at in self.started_at])
+
+    @property
+    def true_conditions(self) -> dict[str, Array]:
+        """The conditions without what instruments read and how a surface lay: of the recorded channels those alone that
+        have the unit of a condition."""
+        return {
+            name: values
+            for name, values in self.conditions.items()
+            if name not in self.channels or name.rpartition("_")[2] in CONDITION_SUFFIXES
+        }
 
     def own_copy(self, parameter: str | None = None) -> MachineHistory:
         """Return the history with arrays of its own, of one parameter (none where the history lacks it) or of all."""

@@ -27,7 +27,33 @@ class Chart:
     @property
     def document(self) -> Mapping[str, Any]:
         """Return what the page's script hands to plotly.js."""
-        return {"data": list(self.traces), "layout": {**BASE, **self.layout, "height": self.height}}
+        layout = {**BASE, **self.layout, "height": self.height}
+        return {"data": [_escaped("", trace) for trace in self.traces], "layout": _escaped("", layout)}
+
+
+#: What plotly.js would read as markup or as an entity, by the entity that it shows as what was typed.
+_ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\n": "<br>"})
+_IN_TEMPLATE = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "%": "&#37;"})
+#: Texts that hold markup of our own.
+_TEMPLATES = frozenset({"hovertemplate", "texttemplate"})
+
+
+def in_template(text: str) -> str:
+    """Return a text from outside as a template (``hovertemplate``) shows it as it was typed."""
+    return text.translate(_IN_TEMPLATE)
+
+
+def _escaped(key: str, value: Any) -> Any:
+    """A part of a chart with every text as it was typed: names of campaigns and events are no markup. The end of a line
+    begins a new one; templates escape what they take from outside themselves (``in_template``)."""
+    if isinstance(value, Mapping):
+        return {name: _escaped(name, element) for name, element in value.items()}
+    if isinstance(value, list | tuple):
+        return [_escaped(key, element) for element in value]
+    if not isinstance(value, str) or key in _TEMPLATES or key.endswith(("color", "colorscale")):
+        return value
+    text = value.translate(_ENTITIES)
+    return f"&#64;{text[1:]}" if text.startswith("@") else text
 
 
 def axis(title: str, **more: Any) -> dict[str, Any]:

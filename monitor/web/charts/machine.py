@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.web.charts.chart import Trace
+from monitor.web.charts.chart import Trace, in_template
 
 if TYPE_CHECKING:
     from monitor.workflow.explain.residual_vectors import AxisPlace, ResidualsAnswer
@@ -119,7 +119,7 @@ def _ends(along: Array, span: float) -> tuple[float, float]:
 
 
 def _line(axis: AxisPlace, start: Array, end: Array) -> Trace:
-    what = f"{axis.name}, {axis.kind}, carries the {axis.carries}"
+    what = in_template(f"{axis.name}, {axis.kind}, carries the {axis.carries}")
     return {
         "type": "scatter3d", "mode": "lines+text", **_points([start, end]), "text": ["", axis.name],
         "meta": axis.name, "line": {"color": "@mid", "width": 7 if axis.kind == "linear" else 4},

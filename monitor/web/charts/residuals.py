@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from monitor.web.charts.chart import Chart, Trace, axis
+from monitor.web.charts.chart import Chart, Trace, axis, in_template
 from monitor.web.charts.machine import machine_traces, motion_of
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _means(
             "array": [2.0 * ((group.u_after_um if after else group.u_before_um) or 0.0) for group in groups],
         },
         "line": {"color": colour, "width": 1.5}, "marker": {"color": colour, "symbol": marker, "size": 7},
-        "hovertemplate": "%{x:.4g}: %{y:.2f} µm<extra>" + title + "</extra>",
+        "hovertemplate": "%{x:.4g}: %{y:.2f} µm<extra>" + in_template(title) + "</extra>",
     }  # fmt: skip
 
 
@@ -259,7 +259,7 @@ def _steps(names: list[str], values: Sequence[float | None], title: str, colour:
     return {
         "type": "scatter", "mode": "lines+markers", "name": title, "x": names, "y": list(values),
         "line": {"shape": "hv", "color": colour, "width": 2}, "marker": {"size": 9, "color": colour, "symbol": marker},
-        "hovertemplate": "%{x}: %{y:.2f} µm<extra>" + title + "</extra>",
+        "hovertemplate": "%{x}: %{y:.2f} µm<extra>" + in_template(title) + "</extra>",
     }  # fmt: skip
 
 

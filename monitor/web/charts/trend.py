@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from monitor.records import Array
-from monitor.web.charts.chart import DASHES, SERIES, Chart, Trace, axis, look
+from monitor.web.charts.chart import DASHES, SERIES, Chart, Trace, axis, in_template, look
 from monitor.web.charts.line_words import Line, Runs, words_at_lines
 from monitor.web.words import channel, number
 
@@ -90,7 +90,7 @@ def _runs(values: ValuesAnswer, parameter: str, grouping: str) -> list[Trace]:
                 },
                 "marker": {"color": colour, "symbol": marker, "size": 7},
                 "text": [f"{values.campaign[row]}, run {values.run[row]}" for row in rows],
-                "hovertemplate": "%{text}<br>%{x}<br>%{y:.4g} " + series.unit + "<extra></extra>",
+                "hovertemplate": "%{text}<br>%{x}<br>%{y:.4g} " + in_template(series.unit) + "<extra></extra>",
             }
         )  # fmt: skip
     return traces
@@ -193,7 +193,7 @@ def _conditions(values: ValuesAnswer) -> list[Trace]:
                     "type": "scatter", "mode": "lines+markers", "name": channel(name), "yaxis": "y2",
                     "x": x, "y": y,
                     "line": {"color": look(index + 2)[0], "dash": DASHES[index % len(DASHES)], "width": 1.2},
-                    "marker": {"size": 4}, "hovertemplate": channel(name) + " %{y:.4g}<extra></extra>",
+                    "marker": {"size": 4}, "hovertemplate": in_template(channel(name)) + " %{y:.4g}<extra></extra>",
                 }
             )  # fmt: skip
     return traces

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from monitor.reporting.svg.map_slices import Slice
-from monitor.web.charts.chart import Chart, axis
+from monitor.web.charts.chart import Chart, axis, in_template
 from monitor.web.words import number
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def slice_charts(answer: OverStrokeAnswer) -> list[Chart]:
 
 def _slice(part: Slice, longest: float) -> Chart:
     first, second = part.along
+    where = f"{in_template(first)} %{{x:.0f}} mm, {in_template(second)} %{{y:.0f}} mm"
     # Rows of the picture run along the second axis.
     lengths = np.array(part.lengths_um).T
     expanded = np.array(part.expanded_um).T
@@ -77,11 +78,11 @@ def _slice(part: Slice, longest: float) -> Chart:
                 "type": "heatmap", "x": part.first_mm, "y": part.second_mm, "z": lengths.tolist(), "zmin": 0,
                 "zmax": longest, "colorscale": CELLS, "showscale": False, "xgap": 1, "ygap": 1,
                 "text": [
-                    [f"{number(value)}<br>± {number(u, 2)}" for value, u in zip(*rows, strict=True)]
+                    [f"{number(value)}\n± {number(u, 2)}" for value, u in zip(*rows, strict=True)]
                     for rows in zip(lengths.tolist(), expanded.tolist(), strict=True)
                 ],
                 "texttemplate": "%{text}", "textfont": {"size": 10, "color": "@ink"},
-                "hovertemplate": f"{first} %{{x:.0f}} mm, {second} %{{y:.0f}} mm: %{{text}} µm<extra></extra>",
+                "hovertemplate": f"{where}: %{{text}} µm<extra></extra>",
             }
         ],
         layout={"xaxis": axis(f"{first} / mm", showgrid=False), "yaxis": axis(f"{second} / mm", showgrid=False)},

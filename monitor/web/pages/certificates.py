@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from monitor.workflow.certificate.answer import VerificationAnswer
 
 
+#: Letters of the name of a file that is checked: file systems take 255 bytes.
+NAME_LETTERS = 60
 #: Campaigns that the form offers to issue a certificate of: the latest.
 OFFERED = 200
 
@@ -107,10 +110,17 @@ def _verified(asker: Asker, user: User, form: Form, working_folder: Path) -> Ver
     if not form.files:
         raise InputError("choose the PDF of a certificate")
     with tempfile.TemporaryDirectory(dir=working_folder) as folder:
-        path = Path(folder, "certificate.pdf")
+        # Its own name stands in what the check says of it.
+        path = Path(folder, _file_name(form.files[0].name))
         path.write_bytes(form.files[0].content.read())
         try:
             answer: VerificationAnswer = asker(user, "verify certificate", {}, {"file": path})
         except MonitorError as error:
-            return refusal_of(error, {str(path): form.files[0].name})
+            return refusal_of(error, {f"{folder}/": ""})
         return answer
+
+
+def _file_name(sent: str) -> str:
+    """The name of a file that was sent, as a name within a folder of ours: of letters, digits, blanks and ``-._()``."""
+    name = re.sub(r"[^\w .()-]", "_", Path(sent).name).strip(". ")[-NAME_LETTERS:]
+    return name or "certificate"

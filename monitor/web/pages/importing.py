@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import InputError, MonitorError
+from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.readers import MAPPING as FILE
 from monitor.readers.archive import UploadedFile, unpack, unpack_files
 from monitor.web.asking import check_role
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 #: An upload is answered at once if its import takes no longer; else a page shows how far it is.
 PATIENCE_S = 1.0
+#: Imports that are over and still named.
+LATEST = 5
 
 
 def routes() -> APIRouter:
@@ -53,7 +56,10 @@ def routes() -> APIRouter:
     @router.get("/import/under-way")
     def under_way(request: Request, number: int) -> Response:
         """Show how far an import is, and what it led to once it is done; loaded again it shows the same."""
-        ticket = request.app.state.desk.begun(request.state.user, number)
+        try:
+            ticket = request.app.state.desk.begun(request.state.user, number)
+        except NotFoundError as error:
+            return _shown(request, refusal_of(error))
         return _shown(request, ticket.answer(), ticket)
 
     return router
@@ -65,10 +71,36 @@ def _shown(
     """The form, below what an import led to or how far it is."""
     refusal = outcome if isinstance(outcome, Refusal) else None
     waiting = ticket if outcome is None else None
+    stopped = None if waiting is None or not waiting.is_taken_back else _stopped(waiting)
+    others = [other for other in request.app.state.desk.begun_by(request.state.user) if other is not ticket]
     return page(
         request, "import.html", status=refusal.status if refusal else 200,
-        answer=None if refusal else outcome, refusal=refusal, waiting=waiting,
+        answer=stopped.answer if stopped else None if refusal else outcome, refusal=refusal,
+        waiting=None if stopped else waiting, stopped=stopped,
+        others=[*(other for other in others if not other.future.done()),
+                *[other for other in others if other.future.done()][:LATEST]],
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Stopped:
+    """An import that was taken back by somebody: the ``answer`` of the folders before, and those ``not_imported``."""
+
+    by: str
+    answer: ImportAnswer | None
+    not_imported: tuple[str, ...]
+
+
+def _stopped(ticket: Ticket) -> _Stopped:
+    """What an import did that was taken back; one that had not begun yet did nothing."""
+    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+    from monitor.workflow.intake.importing import StoppedImportError
+
+    error = None if ticket.future.cancelled() else ticket.future.exception()
+    if not isinstance(error, StoppedImportError):
+        return _Stopped(ticket.taken_back_by, None, tuple(ticket.document["folders"]))
+    names = tuple(Path(folder).name for folder in error.not_imported)
+    return _Stopped(ticket.taken_back_by, error.answer, names)
 
 
 def _begun(request: Request, form: Form) -> Ticket:

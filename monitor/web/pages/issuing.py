@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,18 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
-from monitor.reporting.certificate.completeness import IncompleteCertificateError
-from monitor.reporting.certificate.grounds import GroundKind
+from monitor.reporting.certificate.completeness import (
+    IncompleteCertificateError,
+    MissingItem,
+    RefusedGroundsError,
+)
+from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
+from monitor.reporting.texts import texts_of
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
 from monitor.web.laboratory_form import box_of, form_words, groups, laboratory_file, texts_of_file
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 from monitor.web.users import User
@@ -30,6 +36,7 @@ FILE_BYTES = 2**20
 FILE_NAME = "laboratory.toml"
 #: What stands in the place of the number on a preview.
 PREVIEW = "preview {}"
+NO_RUN = "choose the run that is certified"
 GONE = Refusal(
     404, "what was filled in here is not held any more; nothing of it was stored: fill it in again"
 )
@@ -45,7 +52,11 @@ class _Outcome:
     has_preview: bool = False
     refusal: Refusal | None = None
     faults: Mapping[str, str] = field(default_factory=dict)
-    grounds: bool = False
+
+    @property
+    def is_of_grounds(self) -> bool:
+        """Whether a box that accepts a ground has a fault."""
+        return any(box.startswith("accept.") for box in self.faults)
 
 
 def routes() -> APIRouter:
@@ -136,6 +147,7 @@ def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Res
     from monitor.workflow.certificate.request import METHODS, RULES
 
     campaign = texts.get("campaign", "")
+    named_campaign(request, campaign)
     runs = request.app.state.asker(request.state.user, "runs", {"campaign": campaign}).runs
     return page(
         request, "certificate_new.html", status=outcome.refusal.status if outcome.refusal else 200,
@@ -150,6 +162,9 @@ def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder:
     draft = texts.get("button") != "issue"
     question = "amend certificate" if texts.get("replaces") and not draft else "issue certificate"
     check_role(user, question)
+    campaign = {"campaign": texts.get("campaign", "")}
+    if not texts.get("run") and not texts.get("as_left") and len(asker(user, "runs", campaign).runs) > 1:
+        return _Outcome(refusal=Refusal(400, NO_RUN), faults={"run": NO_RUN})
     with tempfile.TemporaryDirectory(dir=working_folder) as folder:
         laboratory = Path(folder, FILE_NAME)
         try:
@@ -186,22 +201,51 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
 
 def _refused(error: MonitorError, folder: str) -> _Outcome:
     """The refusal in words, and at every box that it names what is missing there."""
+    if isinstance(error, RefusedGroundsError):
+        return _refused_by_grounds(error)
     refusal = refusal_of(error, {f"{folder}/": ""} if folder else {})
     lines = [line.strip() for line in refusal.error.splitlines()]
     faults: dict[str, str] = {}
     if isinstance(error, IncompleteCertificateError):
-        for gap in error.missing:
-            for box in box_of(gap.key):
-                faults.setdefault(box, f"{gap.item}{f', {gap.part}' if gap.part else ''} ({gap.clause})")
+        faults = _gaps_at_boxes(error.missing)
         lines = [lines[0], *map(str, error.missing)]
     else:
         for line in lines:
             for box in _boxes_named(line):
-                faults.setdefault(box, line)
+                faults.setdefault(box, line.removeprefix("--accept "))
+    return _Outcome(refusal=Refusal(refusal.status, lines[0], tuple(lines[1:])), faults=faults)
+
+
+def _refused_by_grounds(error: RefusedGroundsError) -> _Outcome:
+    """The grounds that speak against a certificate, each at the box that accepts it, and all else that it lacks."""
+    texts = texts_of()
+    faults = _gaps_at_boxes(error.missing)
+    said: dict[GroundKind, list[str]] = {}
+    for ground in error.grounds:
+        said.setdefault(ground.kind, []).append(ground_sentence(ground, texts))
+    for kind, sentences in said.items():
+        faults[f"accept.{kind}"] = "; ".join(sentences)
+    lines = [f"{kind}: {'; '.join(sentences)}" for kind, sentences in said.items()]
+    what = f" and {len(error.missing)} items are missing" if error.missing else ""
     return _Outcome(
-        refusal=Refusal(refusal.status, lines[0], tuple(lines[1:])), faults=faults,
-        grounds="--accept" in refusal.error,
-    )  # fmt: skip
+        refusal=Refusal(
+            422,
+            f"the certificate is refused: {', '.join(said)} {'speak' if len(said) > 1 else 'speaks'} against it{what}. "
+            "Correct what is wrong; or, where the laboratory can answer for it, say why in its box below, which is "
+            "printed on the certificate",
+            (*lines, *map(str, error.missing)),
+        ),
+        faults=faults,
+    )
+
+
+def _gaps_at_boxes(missing: Sequence[MissingItem]) -> dict[str, str]:
+    """What is missing, by the box that answers it."""
+    faults: dict[str, str] = {}
+    for gap in missing:
+        for box in box_of(gap.key):
+            faults.setdefault(box, f"{gap.item}{f', {gap.part}' if gap.part else ''} ({gap.clause})")
+    return faults
 
 
 def _boxes_named(line: str) -> list[str]:
@@ -209,5 +253,8 @@ def _boxes_named(line: str) -> list[str]:
     numbered = re.match(r"(\w+\.\d+\.\w+) ", line)
     if numbered:
         return [numbered[1]]
+    ground = re.match(r"--accept ([a-z-]+): ", line)
+    if ground:
+        return [f"accept.{ground[1]}"]
     named = re.match(r"(\w+)\.(\w+) ", line)
     return box_of(f"[{named[1]}] {named[2]}") if named else []

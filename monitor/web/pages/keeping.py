@@ -14,13 +14,15 @@ from monitor.web.access import address_of, offered, role_needed
 from monitor.web.desk import Desk
 from monitor.web.forms import own_address, read_form, whole_number
 from monitor.web.parcel import packed
-from monitor.web.rendering import page
+from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
-from monitor.web.words import so_far
+from monitor.web.words import importing, so_far
 from monitor.workflow.contract import QUESTIONS
 
 #: Entries of the audit on its page.
 ENTRIES = 200
+#: Digits of the number of what is being computed.
+DIGITS = 15
 #: So long the question whether work is still under way is held; then the page writes how long it took so far.
 HELD_S = 2.0
 
@@ -44,30 +46,23 @@ def routes() -> APIRouter:
         """List what is being computed."""
         return page(request, "work.html", tickets=request.app.state.desk.under_way())
 
-    @router.get("/work/state")
-    async def state(request: Request, number: int) -> Response:
-        """Say whether work is under way still (202) or not (200): a page that waits asks this and is not made anew."""
-        desk: Desk = request.app.state.desk
-        ticket = next((ticket for ticket in desk.under_way() if ticket.number == number), None)
-        if ticket is not None:
-            await ticket.settled(ticket.seconds + HELD_S)
-        if ticket is None or ticket.future.done():
-            return JSONResponse({}, 200)
-        return JSONResponse({"so_far": so_far(ticket)}, 202)
+    router.get("/work/state")(_state)
 
     @router.post("/work/cancel")
     async def cancel(request: Request) -> Response:
-        """Take back a question that waits or is being computed."""
+        """Take back a question that waits or is being computed; an import has a page that says where it stopped."""
         async with read_form(request) as form:
-            number = whole_number("number", form.text("number"))
-        request.app.state.desk.take_back(request.state.user, number)
-        return RedirectResponse("/work", status_code=303)
+            number = whole_number("number", form.text("number"), DIGITS)
+        ticket = request.app.state.desk.take_back(request.state.user, number)
+        address = "/work" if ticket.question != "import" else link("/import/under-way", number=number)
+        return RedirectResponse(address, status_code=303)
 
     @router.post("/work/again")
     async def again(request: Request) -> Response:
         """Let a question that was taken back be asked again, by the page that needs it."""
         async with read_form(request) as form:
-            number, page_of_it = whole_number("number", form.text("number")), form.text("then")
+            number = whole_number("number", form.text("number"), DIGITS)
+            page_of_it = form.text("then")
         request.app.state.desk.ask_again(number)
         return RedirectResponse(own_address(page_of_it), status_code=303)
 
@@ -99,6 +94,18 @@ def routes() -> APIRouter:
         return page(request, "interface.html", questions=questions)
 
     return router
+
+
+async def _state(request: Request, number: int) -> Response:
+    """Say whether work is under way still (202) or not (200): a page that waits asks this and is not made anew."""
+    desk: Desk = request.app.state.desk
+    ticket = next((ticket for ticket in desk.under_way() if ticket.number == number), None)
+    if ticket is not None:
+        await ticket.settled(ticket.seconds + HELD_S)
+    if ticket is None or ticket.future.done():
+        return JSONResponse({}, 200)
+    at_folder = {"at": importing(ticket), "done": len(ticket.said) - 1} if ticket.said else {}
+    return JSONResponse({"so_far": so_far(ticket), **at_folder}, 202)
 
 
 def _said(docstring: str) -> str:

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import JSONResponse, Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
-from monitor.web.days import as_iso, typed_day
+from monitor.web.days import as_iso, typed_moment
 from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
 from monitor.web.pages.fleet import ASKED as FLEET
-from monitor.web.pages.refused import RefusedForm, led_back_to_the_form, refused_form
-from monitor.web.rendering import link, page
+from monitor.web.pages.refused import RefusedForm, led_back, led_back_to_the_form, refused_form
+from monitor.web.rendering import page
 from monitor.web.sending import attachment
 
 if TYPE_CHECKING:
@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 WARMTHS = ("", "warm", "warming up")
 #: So long the script's question for the table of all parameters is held before it has to ask again.
 FETCH_S = 20.0
+#: The ends of two periods as their boxes call them.
+BOXES = {
+    "since_1": "Earlier: from",
+    "until_1": "Earlier: to, whole day",
+    "since_2": "Later: from",
+    "until_2": "Later: to, whole day",
+}
 #: Usual kinds of events; any word is one.
 KINDS = ("crash", "repair", "compensation", "probe", "note")
 
@@ -84,14 +91,7 @@ def routes() -> APIRouter:
             refused=form,
         )  # fmt: skip
 
-    @router.get("/machine/values.csv")
-    def values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
-        """Send the values of a machine, a row a run, units in the column names."""
-        values: ValuesAnswer = request.app.state.asker(
-            request.state.user, "values", _period(name, since, until)
-        )
-        return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
-
+    router.get("/machine/values.csv")(_values_csv)
     router.get("/machine/parameters")(_table_of_all)
     router.get("/machine/periods")(_two_periods)
 
@@ -100,18 +100,33 @@ def routes() -> APIRouter:
         """Record what happened to a machine."""
         async with read_form(request) as form:
             machine = form.text("machine")
-            document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
+            document = {"machine": machine, "text": form.text("text"), **form.filled("kind")}
         try:
-            await asked_once(request, form, "event", document)
+            at = await run_in_threadpool(_moment, request, machine, form.text("at"))
+            await asked_once(request, form, "event", {**document, "at": at.isoformat()})
         except NotFoundError:
             raise
         except InputError as error:
             # A time in the future, or of no calendar: what happened need not be written once more.
             refused = RefusedForm(refusal_of(error), form.texts)
             return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
-        return RedirectResponse(link("/machine", name=machine), status_code=303)
+        return led_back(request, "/machine", {"name": machine}, "events")
 
     return router
+
+
+def _moment(request: Request, machine: str, text: str) -> datetime:
+    """When something happened; without an offset by the clock of the shop, as the run nearest to it had it."""
+    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", {"machine": machine})
+    typed = typed_moment("when it happened", text, UTC)
+    nearest = min(values.started_at, key=lambda started: abs(started - typed), default=None)
+    return typed_moment("when it happened", text, None if nearest is None else nearest.tzinfo)
+
+
+def _values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
+    """Send the values of a machine, a row a run, units in the column names."""
+    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", _period(name, since, until))
+    return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
 
 
 async def _table_of_all(
@@ -190,12 +205,18 @@ def _two_periods(
     until_2: str = "",
 ) -> Response:
     """Show two periods of a machine side by side; dates belong to the period whole."""
-    ends = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+    typed = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+    ends, faults = _typed_ends(typed)
     answer, refusal, chart = None, "", None
     ask, user = request.app.state.asker, request.state.user
-    if all(ends.values()):
+    if faults and any(typed.values()):
+        refusal = "; ".join(faults)
+    elif not faults:
         try:
-            pair = {"earlier": _whole_days(since_1, until_1), "later": _whole_days(since_2, until_2)}
+            pair = {
+                of: _whole_days(of, ends[f"since_{number}"], ends[f"until_{number}"])
+                for number, of in ((1, "earlier"), (2, "later"))
+            }
             answer = ask(user, "periods", {"machine": name, **pair})
         except MonitorError as error:
             refusal = str(error)
@@ -203,8 +224,8 @@ def _two_periods(
     values: ValuesAnswer = ask(user, "values", {"machine": name})
     days = [f"{at:%Y-%m-%d}" for at in values.started_at]
     return page(
-        request, "periods.html",
-        name=name, topology=values.topology, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+        request, "periods.html", status=400 if refusal else 200,
+        name=name, topology=values.topology, boxes=BOXES, ends=ends, answer=answer, refusal=refusal, chart=chart,
         first=min(days, default=""), last=max(days, default=""),
     )  # fmt: skip
 
@@ -231,9 +252,27 @@ def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
     return document
 
 
-def _whole_days(since: str, until: str) -> dict[str, str]:
-    """The period from the beginning of one day to the end of another. Raises InputError for what is no date."""
-    first, last = typed_day("the first day", since), typed_day("the last day", until)
+def _typed_ends(typed: dict[str, str]) -> tuple[dict[str, str], list[str]]:
+    """The ends of two periods as ISO 8601 writes them, empty where none can be read; and what is wrong, by its box."""
+    ends, faults = dict.fromkeys(typed, ""), []
+    for field, text in typed.items():
+        label = BOXES[field].lower()
+        try:
+            ends[field] = as_iso(**{field: text})[field]
+            if not ends[field]:
+                faults.append(f"'{label}' is empty: two periods need a first and a last day each")
+        except InputError:
+            faults.append(f"'{label}' is a day, such as 2026-03-02 or 02.03.2026, not '{text[:40]}'")
+    return ends, faults
+
+
+def _whole_days(of: str, since: str, until: str) -> dict[str, str]:
+    """The period from the beginning of one day to the end of another. Raises InputError for one that ends before."""
+    first, last = date.fromisoformat(since), date.fromisoformat(until)
+    if last < first:
+        raise InputError(
+            f"the {of} period ends on {last}, before its first day {first}: change one of the two"
+        )
     try:
         end = last + timedelta(days=1)
     except OverflowError as error:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError
 from monitor.web.charts.residuals import (
     MAGNIFICATIONS,
     driver_chart,
@@ -23,6 +23,7 @@ from monitor.web.charts.residuals import (
 )
 from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import Form, asked_once, read_form, whole_number
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
 from monitor.web.words import listed
 
@@ -52,9 +53,7 @@ def routes() -> APIRouter:
         from monitor.workflow.explain.explain_answer import MachineExplanation
 
         ask, user = request.app.state.asker, request.state.user
-        row = next(iter(ask(user, "campaigns", {"campaign": campaign}).campaigns), None)
-        if row is None:
-            raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
+        row = named_campaign(request, campaign)
         answers = _Answers(request, campaign, model, effect, driver, in_machine=row.rows is None)
         compare, explanation = answers.compare, answers.explanation
         missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
@@ -77,8 +76,8 @@ def routes() -> APIRouter:
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if len(missing) > 1 else None,
             falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
-            versions=versions, current=current, latest=_latest(versions, label), pinned=pinned,
-            changes=changes,
+            versions=_of_method(versions, row.method, label), current=current, latest=_latest(versions, label),
+            pinned=pinned, changes=changes,
             waiting=answers.waiting,
         )  # fmt: skip
 
@@ -212,6 +211,21 @@ def _latest(versions: Any, label: str) -> Any:
     name = label.partition("@")[0]
     of_model = [version for version in versions if version.name == name]
     return max(of_model, key=lambda version: version.version, default=None)
+
+
+def _of_method(versions: Any, method: str, shown: str) -> list[Any]:
+    """The versions that descend from a method's own model, whose base effects alone fit its campaigns; and what is
+    shown, whatever it is."""
+    parents = {pinned(version.model): version.parent for version in versions}
+
+    def root(label: str) -> str:
+        while parents.get(label):
+            label = pinned(parents[label])
+        return label.partition("@")[0]
+
+    return [
+        version for version in versions if version.model == shown or root(pinned(version.model)) == method
+    ]
 
 
 def _version(versions: Any, name: str) -> Any:

@@ -59,11 +59,17 @@ def led_back_to_the_form(
 
     ``query`` is what the page needs at least.
     """
+    key = request.app.state.outcomes.hold(request.state.user.name, form)
+    return led_back(request, page, {**query, "refused": key}, fragment)
+
+
+def led_back(request: Request, page: str, query: Mapping[str, str], fragment: str = "") -> Response:
+    """Return the way back to a page as it was looked at when its form was sent, with ``query`` besides."""
     source = urlsplit(request.headers.get("referer", ""))
     looked_at = dict(parse_qsl(source.query)) if source.path == page else {}
-    key = request.app.state.outcomes.hold(request.state.user.name, form)
-    address = link(page, **{**looked_at, **query, "refused": key})
-    return RedirectResponse(f"{address}#{fragment}", status_code=303)
+    looked_at.pop("refused", None)
+    address = link(page, **{**looked_at, **query})
+    return RedirectResponse(f"{address}#{fragment}" if fragment else address, status_code=303)
 
 
 def refused_form(request: Request, key: str) -> RefusedForm | None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from monitor.exceptions import InputError, RefusedResultError
+from monitor.exceptions import InputError
 from monitor.records import Campaign
-from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind, ground_sentence
-from monitor.reporting.texts import texts_of
+from monitor.reporting.certificate.completeness import RefusedGroundsError
+from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind
 from monitor.store import StoredModel
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
@@ -39,12 +39,12 @@ def grounds_against(
     return tuple(sorted(grounds, key=lambda ground: ground.kind not in OF_ANY_RUN))
 
 
-def accepted_grounds(
+def judged_grounds(
     grounds: Sequence[Ground], reasons: Mapping[GroundKind, str]
-) -> tuple[AcceptedGround, ...]:
-    """The grounds with the reasons for which they are accepted.
+) -> tuple[tuple[AcceptedGround, ...], tuple[Ground, ...]]:
+    """The grounds that are accepted, with the reasons, and those that nobody accepts.
 
-    Raises RefusedResultError naming every ground that is not, InputError for one that is accepted and not there.
+    Raises InputError for one that is accepted and not there.
     """
     by_kind: dict[GroundKind, list[Ground]] = {}
     for ground in grounds:
@@ -54,19 +54,23 @@ def accepted_grounds(
         raise InputError(
             f"--accept {absent[0]}: there is nothing to accept, no such ground speaks against this certificate"
         )
-    refused = {kind: of_kind for kind, of_kind in by_kind.items() if kind not in reasons}
+    refused = [ground for kind, of_kind in by_kind.items() if kind not in reasons for ground in of_kind]
+    accepted = [
+        AcceptedGround(kind, tuple(of_kind), reasons[kind])
+        for kind, of_kind in by_kind.items()
+        if kind in reasons
+    ]
+    return tuple(accepted), tuple(refused)
+
+
+def accepted_grounds(
+    grounds: Sequence[Ground], reasons: Mapping[GroundKind, str]
+) -> tuple[AcceptedGround, ...]:
+    """The grounds with the reasons for which they are accepted.
+
+    Raises RefusedGroundsError naming every ground that is not, InputError for one that is accepted and not there.
+    """
+    accepted, refused = judged_grounds(grounds, reasons)
     if refused:
-        texts = texts_of()
-        lines = [
-            f"  {kind}: {ground_sentence(ground, texts)}"
-            for kind, of_kind in refused.items()
-            for ground in of_kind
-        ]
-        options = " ".join(f"--accept {kind}=REASON" for kind in refused)
-        raise RefusedResultError(
-            "the certificate is refused:\n"
-            + "\n".join(lines)
-            + "\nCorrect what is wrong; or, where the laboratory can "
-            f"answer for it, say why, which is printed on the certificate: {options}"
-        )
-    return tuple(AcceptedGround(kind, tuple(of_kind), reasons[kind]) for kind, of_kind in by_kind.items())
+        raise RefusedGroundsError(refused)
+    return accepted

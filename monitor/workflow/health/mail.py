@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import smtplib
 import ssl
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from email.message import EmailMessage
@@ -19,7 +18,7 @@ from typing import Any
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.health.letter import not_attached, report_lines, report_subject
-from monitor.toml_text import encoding_refusal, toml_refusal
+from monitor.toml_text import toml_file
 from monitor.workflow.health.request import ReportAnswer
 
 #: Port that goes with each kind of security (RFC 8314 section 3.3; RFC 6409; RFC 5321 section 4.5.4.2).
@@ -60,16 +59,7 @@ class MailSettings:
 
 def read_mail_settings(path: Path) -> MailSettings:
     """The section ``[mail]`` of a TOML file. Raises InputError naming every key that is wrong or missing."""
-    try:
-        text = read_bounded(path, LARGEST_SETTINGS).decode("utf-8-sig")
-        tables = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(encoding_refusal(path, error)) from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(toml_refusal(path, error, text)) from error
-    table = tables.get("mail")
+    table = toml_file(path).get("mail")
     if not isinstance(table, dict):
         raise InputError(f"{path} has no section [mail]")
     faults = _faults(table)

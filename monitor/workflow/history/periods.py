@@ -125,7 +125,7 @@ def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
         parameters=_with_discovery_rates(compared),
         conditions={
             name: ConditionOfPeriods(*(_mean(values[mask]) for mask in masks))
-            for name, values in history.conditions.items()
+            for name, values in history.true_conditions.items()
         },
     )
 

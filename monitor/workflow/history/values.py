@@ -106,7 +106,7 @@ def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
             )
             for column, name in enumerate(history.parameters)
         },
-        conditions={name: _numbers(values.tolist()) for name, values in history.conditions.items()},
+        conditions={name: _numbers(values.tolist()) for name, values in history.true_conditions.items()},
         newer_versions=tuple(f"{row.model}@{row.newest}" for row in older) or None,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
 from monitor.effects.shapes import REVERSAL_VALUE, has_reversal_value
-from monitor.methods.chain.identification import TakenUp
+from monitor.methods.chain.identification import AsStated, TakenUp
 from monitor.records import FrameOfReference
 from monitor.reporting.refused import RefusedParameters
 
@@ -107,7 +107,8 @@ class ResponseOverInputs:
 @dataclass(frozen=True, kw_only=True)
 class IdentifyAnswer:
     """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
-    no plan gives a number of their own, where the method names them.
+    no plan gives a number of their own, where the method names them, ``as_stated`` the stated tool points that numbers
+    count from.
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
     each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
@@ -125,6 +126,7 @@ class IdentifyAnswer:
     frames: Mapping[str, FrameOfReference] | None = field(default=None, metadata=OMITTED)
     reversal_values: Mapping[str, Estimate] | None = field(default=None, metadata=OMITTED)
     taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
+    as_stated: tuple[AsStated, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

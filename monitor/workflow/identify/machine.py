@@ -63,6 +63,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
         frames=frames_of((*identification.parameters, *identification.added), chain_of(machine)),
         reversal_values=values or None,
         taken_up=identification.taken_up or None,
+        as_stated=identification.as_stated or None,
     )
 
 

@@ -17,16 +17,28 @@ from monitor.store import (
     load_campaign,
 )
 
+#: Words that campaigns are searched by.
+MOST_WORDS = 20
+
 
 @dataclass(frozen=True)
 class CampaignsRequest:
-    """All campaigns, or those of a ``machine``, or the one of a name, or only the ``latest`` so many of import."""
+    """All campaigns, or those of a ``machine`` or a ``method``, or the one of a name, or only the ``latest`` so many of
+    import.
+
+    ``containing``, words parted by spaces: only campaigns that hold all of them in their name, machine or method,
+    capital letters like small ones.
+    """
 
     machine: str | None = None
     campaign: str | None = None
     latest: int | None = None
+    containing: str = ""
+    method: str | None = None
 
     def __post_init__(self) -> None:
+        if len(self.containing.split()) > MOST_WORDS:
+            raise InputError(f"containing: at most {MOST_WORDS} words")
         if self.latest is not None and not 1 <= self.latest <= 1_000_000:
             raise InputError(f"latest {self.latest}: the number of campaigns, from 1 to 1000000")
 
@@ -64,11 +76,15 @@ class RunsAnswer:
 
 def campaigns(db: Database, request: CampaignsRequest = _ALL) -> CampaignsAnswer:
     """List the campaigns in the database, and those that were withdrawn."""
-    rows = list_campaigns(db, request.machine, request.campaign, request.latest)
+    sought = request.containing.lower().split()
+    rows = list_campaigns(db, request.machine, request.campaign, request.latest, sought, request.method)
     withdrawn = [
         row
         for row in list_withdrawn(db)
-        if request.machine in (None, row.machine) and request.campaign in (None, row.campaign)
+        if request.machine in (None, row.machine)
+        and request.campaign in (None, row.campaign)
+        and request.method in (None, row.method)
+        and all(word in f"{row.campaign} {row.machine} {row.method}".lower() for word in sought)
     ]
     return CampaignsAnswer(rows, tuple(withdrawn))
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 
 from monitor.documents import OMITTED
 from monitor.exceptions import CampaignError, InputError, StoreError
@@ -22,6 +23,7 @@ from monitor.readers import (
 )
 from monitor.records import Campaign, CurveCampaign
 from monitor.reporting import messages
+from monitor.stopping import StoppedError, stoppable
 from monitor.store import (
     Database,
     Imported,
@@ -95,6 +97,18 @@ class ImportAnswer:
     passed_over: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
+class StoppedImportError(StoppedError):
+    """An import that was taken back between or within its folders.
+
+    ``answer`` says what became of the folders before, which are in the database; of those ``not_imported`` nothing is.
+    """
+
+    def __init__(self, answer: ImportAnswer, not_imported: Sequence[str]) -> None:
+        super().__init__("taken back")
+        self.answer = answer
+        self.not_imported = tuple(not_imported)
+
+
 @dataclass(frozen=True)
 class _Source:
     """What is imported at once: a folder, or the files of instruments that a mapping explains."""
@@ -121,15 +135,18 @@ def import_folders(
 
     The file of true values that a rehearsal wrote is passed over where it is named beside folders. Every refusal is
     recorded, but of a dry run. Raises CampaignError with all faults of a folder that was asked for alone, StoreError
-    where the database cannot be written.
+    where the database cannot be written, StoppedImportError where the import is taken back.
     """
     answers: list[ImportedFolder] = []
     refused: list[RefusedFolder] = []
     sources, passed_over = _sources(request)
-    for source in sources:
+    for number, source in enumerate(sources):
         progress(str(source.path))
         try:
             answers.append(_look(db, source) if request.dry_run else _import(db, source))
+        except StoppedError as error:
+            so_far = ImportAnswer(tuple(answers), tuple(refused), passed_over or None)
+            raise StoppedImportError(so_far, [str(rest.path) for rest in sources[number:]]) from error
         except StoreError as error:
             if not answers:
                 raise
@@ -213,8 +230,10 @@ def _import(db: Database, source: _Source) -> ImportedFolder:
         with suppress(StoreError):  # the faults of the folder are what the user has to hear
             record_refusal(db, path, faults, campaign=source.name or name, machine=machine)
         raise
-    clear_refusals(db, path, imported.campaign)
-    return _answer(db, source.path, imported, reading.understood)
+    # It is in the database: who takes the import back now hears so.
+    with stoppable(Event()):
+        clear_refusals(db, path, imported.campaign)
+        return _answer(db, source.path, imported, reading.understood)
 
 
 def _answer(

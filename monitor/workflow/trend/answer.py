@@ -170,18 +170,40 @@ class Cycle:
 
 @dataclass(frozen=True)
 class WarmUp:
-    """The warm-up of a campaign that was begun cold or hot: its time constant, and when the machine is stable."""
+    """The warm-up of the days that a campaign began cold or hot: its time constant, and when the machine is stable.
+
+    ``amplitude`` is by how much the first run of a day lies above what it comes to within the hours recorded;
+    ``q_value`` the false discovery rate over all parameters.
+    """
 
     campaign: str
     amplitude: float
     u: float
     unit: str
+    recorded_h: float
     tau_h: float
     tau_interval_h: tuple[float | None, float | None]
     stable_after_h: float | None
     stable_interval_h: tuple[float | None, float | None]
     stable_within: float
     p_value: float
+    q_value: float | None = None
+
+
+@dataclass(frozen=True)
+class ForecastStart:
+    """Where the line that is extrapolated stands at the last run: ``value``, at ``temperature`` in °C.
+
+    That is the mean of its runs, of the thermometer that is fitted beside it; ``by_temperature`` is what the latest
+    mean lies off the line because its runs had another. ``from_latest_at`` is when the limit is reached from the latest
+    mean on by the same slope: None where it lies beyond already, or the slope leads away from it.
+    """
+
+    value: float
+    from_latest_at: str | None
+    temperature: float | None = field(default=None, metadata=OMITTED)
+    latest_temperature: float | None = field(default=None, metadata=OMITTED)
+    by_temperature: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -190,6 +212,7 @@ class LimitForecast:
 
     ``beyond_since`` is the first of the runs without a break that are beyond the limit, where the last one is: then it
     is not reached any more, and ``crosses_limit_at`` is None.
+    ``start`` says from where, where a day is stated.
     """
 
     limit: float | None
@@ -201,6 +224,7 @@ class LimitForecast:
     recommended_by: str | None
     why_no_forecast: Lack | None = field(metadata=WORDED)
     beyond_since: str | None = field(default=None, metadata=OMITTED)
+    start: ForecastStart | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

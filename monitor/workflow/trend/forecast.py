@@ -9,13 +9,13 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.reporting.origins import ForecastMethod
-from monitor.statistics import backtest
+from monitor.statistics import Trend, backtest, predict
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, drift_forecast
 from monitor.workflow.history.series import Series
-from monitor.workflow.trend.answer import ForecastTest, LimitForecast
+from monitor.workflow.trend.answer import ForecastStart, ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
@@ -52,6 +52,25 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
         crosses_limit_at=at,
         crosses_limit_interval=interval,
         in_tolerance_at_next_check=float(ahead.probability[0]),
+        start=None if at is None else _start(drift, of_drift.line, ahead.crossing.limit),
+    )
+
+
+def _start(drift: PieceDrift, line: Trend, limit: float) -> ForecastStart:
+    """Where the line stands at the last run, and when the latest mean would reach the ``limit`` by its slope."""
+    whole, piece = drift.whole, drift.piece
+    origin = float(whole.t[-1])
+    last = whole.of_last_day
+    to_go = limit - float(whole.values[last].mean())
+    days = to_go / line.slope if to_go * line.slope > 0.0 and to_go * limit > 0.0 else np.inf
+    start = ForecastStart(
+        value=float(predict(line, origin)[0]), from_latest_at=date(origin + days, whole.offset)
+    )
+    if drift.thermometer is None or piece.temperature is None or whole.temperature is None:
+        return start
+    mean, latest = float(piece.temperature.mean()), float(whole.temperature[last].mean())
+    return replace(
+        start, temperature=mean, latest_temperature=latest, by_temperature=line.beside[0] * (latest - mean)
     )
 
 

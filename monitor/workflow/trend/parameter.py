@@ -1,4 +1,4 @@
-"""What the history of one parameter says: drift, latest mean, changes, dependence, cycles, warm-up.
+"""What the history of one parameter says: drift, latest mean, changes, dependence, cycles.
 
 Parts of `monitor trend`. Where the runs do not suffice for a part, a ``Lack`` says why.
 """
@@ -20,7 +20,6 @@ from monitor.statistics import (
     DependenceUnits,
     control_false_discoveries,
     dependence,
-    warm_up,
 )
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
@@ -33,7 +32,6 @@ from monitor.workflow.trend.answer import (
     DayResemblance,
     DriftStatement,
     LatestMean,
-    WarmUp,
 )
 
 #: A cycle is fitted where its phases are seen: runs over half a day, and over the better part of a year.
@@ -204,30 +202,3 @@ def cycles(piece: Series) -> tuple[tuple[Cycle, ...], Lack | None]:
         )
         for wave in fit.cycles
     ), None  # fmt: skip
-
-
-def warming(
-    series: Series, campaigns: npt.NDArray[np.str_], rng: np.random.Generator
-) -> tuple[WarmUp | None, Lack | None]:
-    """Warm-up of the latest campaign that was begun cold or hot: time constant and when the machine is stable.
-
-    ``campaigns`` (n,) are those of the runs of the series.
-    """
-    # A campaign with runs while warming up has seen the whole of it; its other runs say where it ends.
-    for name in dict.fromkeys(campaigns[series.warm_up][::-1].tolist()):
-        inside = campaigns == name
-        if inside.sum() >= FEWEST_RUNS:
-            part = series.part(inside)
-            hours = (part.t - part.t[0]) * 24.0
-            try:
-                fit = warm_up(part.values, hours, u=part.weights(), rng=rng)
-            except DataError as error:
-                return None, refused(Part.WARM_UP, error)
-            tau, stable = fit.tau_interval, fit.stable_interval
-            return WarmUp(
-                campaign=name, amplitude=fit.amplitude, u=fit.u_amplitude, unit=series.unit, tau_h=fit.tau,
-                tau_interval_h=(number(tau[0]), number(tau[1])), stable_after_h=number(fit.stable_after),
-                stable_interval_h=(number(stable[0]), number(stable[1])), stable_within=fit.tolerance,
-                p_value=fit.p_value,
-            ), None  # fmt: skip
-    return None, Lack(Part.WARM_UP, Cause.NO_WARM_UP_RUNS)

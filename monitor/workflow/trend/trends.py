@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
-from monitor.records import Array
+from monitor.records import VOLUMETRIC, Array
 from monitor.reporting import messages
 from monitor.statistics import control_false_discoveries
 from monitor.store import (
@@ -29,7 +29,6 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
-from monitor.units import CONDITION_SUFFIXES
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -54,10 +53,10 @@ from monitor.workflow.trend.parameter import (
     drift_statement,
     latest_mean,
     number,
-    warming,
 )
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
+from monitor.workflow.trend.warming import warming
 
 #: What the stored answer about a whole machine is called.
 METHOD = "all parameters"
@@ -165,7 +164,7 @@ def _answer(
             *_simulated(db, history),
             *_not_followed(history),
             *_of_older_version(db, request),
-            *_limits_of_type(db, history),
+            *_limits_of_type(db, history, past if request.parameter is None else None),
             *_refuted(refuted),
         ),
         false_alarm=FALSE_ALARM,
@@ -204,12 +203,19 @@ def _answer(
     )
 
 
-def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
-    """Where the limits come from, where they are not the campaign's own."""
+def _limits_of_type(db: Database, history: MachineHistory, past: Collection[str] | None) -> tuple[str, ...]:
+    """Where the limits come from, where they are not the campaign's own, or that none is of a parameter of ``past``.
+
+    ``past`` is None where not all parameters were asked for.
+    """
     name = tolerance_types(db).get(history.machine)
     if name is None:
         return ()
-    return (messages.limits_of_type(name),)
+    limits = db.type_tolerances[name]
+    if past is None or not {VOLUMETRIC, *past}.isdisjoint(limits):
+        return (messages.limits_of_type(name),)
+    hint = next(filter(None, (did_you_mean(limit, past) for limit in limits)), "")
+    return (messages.limits_of_others(name, tuple(limits), hint),)
 
 
 def _simulated(db: Database, history: MachineHistory) -> tuple[str, ...]:
@@ -282,7 +288,7 @@ class _Page:
         effects, why_no_effects = conditions(series, self._channels(past), drift.begins)
         waves, why_no_waves = cycles(drift.piece)
         rng = np.random.default_rng([SEED, len(series.t)])
-        warmth, why_no_warmth = warming(series, self.history.campaign[past.mask], rng)
+        warmth, why_no_warmth = warming(series, self.history.campaign[past.mask], search.changes, rng)
         test, why_no_test = backtested(drift)
         limit = self.history.tolerances.get(series.name)
         return ParameterTrend(
@@ -309,11 +315,7 @@ class _Page:
         """The recorded conditions of the runs, not what instruments read. The method, with its instruments where setups
         name them, is one too: 1 for the runs of each but the first."""
         mask = past.mask
-        channels = {
-            name: values[mask]
-            for name, values in self.history.conditions.items()
-            if name not in self.history.channels or name.rpartition("_")[2] in CONDITION_SUFFIXES
-        }
+        channels = {name: values[mask] for name, values in self.history.true_conditions.items()}
         if len(set(self.history.measured_by.tolist())) > 1:
             method = self.history.measured_by[mask]
             for name in list(dict.fromkeys(method.tolist()))[1:]:
@@ -343,10 +345,20 @@ def _with_event_steps(
 
 
 def _with_discovery_rates(parameters: Mapping[str, ParameterTrend]) -> dict[str, ParameterTrend]:
-    """The parameters with the false discovery rate over the drifts of all of them."""
-    p_values = [parameter.drift.p_value for parameter in parameters.values()]
-    q = control_false_discoveries([np.nan if p is None else p for p in p_values]).q_value
+    """The parameters with the false discovery rates over the drifts of all of them, and over their warm-ups."""
+
+    def rates(p_values: list[float | None]) -> Array:
+        return control_false_discoveries([np.nan if p is None else p for p in p_values]).q_value
+
+    drifts = rates([parameter.drift.p_value for parameter in parameters.values()])
+    warm_ups = rates(
+        [None if (warmth := each.warm_up) is None else warmth.p_value for each in parameters.values()]
+    )
     return {
-        name: replace(parameter, q_value=number(float(rate)))
-        for (name, parameter), rate in zip(parameters.items(), q, strict=True)
+        name: replace(
+            parameter,
+            q_value=number(float(drift)),
+            warm_up=parameter.warm_up and replace(parameter.warm_up, q_value=number(float(warmth))),
+        )
+        for (name, parameter), drift, warmth in zip(parameters.items(), drifts, warm_ups, strict=True)
     }

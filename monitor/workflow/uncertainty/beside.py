@@ -11,8 +11,9 @@ import numpy as np
 from monitor.discovery import Fit
 from monitor.effects import ChainEffect
 from monitor.records import Array, Campaign
-from monitor.reporting.budget import HoldsFor
+from monitor.reporting.budget import DayToDay, HoldsFor
 from monitor.reporting.covariance_source import CovarianceSource
+from monitor.statistics.nested import DayComponents
 from monitor.uncertainty import Inputs, OutputContribution
 from monitor.uncertainty.monte_carlo.sourced_trials import FurtherOutputs, Moves, output_moves
 from monitor.uncertainty.runs.measured_run import MeasuredRun
@@ -21,6 +22,7 @@ from monitor.uncertainty.type_b import SourceColumns
 from monitor.units import Unit
 from monitor.workflow.selections.readings import SelectedReadings
 from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
+from monitor.workflow.uncertainty.effect_scatter import scatter_of_effects
 from monitor.workflow.uncertainty.inputs import holding_for, readings_of_runs
 from monitor.workflow.uncertainty.request import Asked
 from monitor.workflow.uncertainty.result import Behind
@@ -33,7 +35,7 @@ from monitor.workflow.uncertainty.sources import (
     shown_part,
     stated,
 )
-from monitor.workflow.uncertainty.with_effects import EffectOutputs, scatter_of_effects, source_effect
+from monitor.workflow.uncertainty.with_effects import EffectOutputs, source_effect
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def beside_readings(
     holds = holding_for(source, len(runs_of_days))
     adds_days = asked.holds_for is HoldsFor.CAMPAIGN and holds is not HoldsFor.CAMPAIGN
     of_days = (between_days(components),) if adds_days else ()
+    holds = HoldsFor.CAMPAIGN if adds_days else holds
     shown = shown_part(source.kind, runs_of_days, adds_days)
     counted = counted_columns(run.run, run.sensitivity.unknowns, campaign, number, sources, shown)
     if run.effects is None:
@@ -115,7 +118,7 @@ def beside_readings(
         covariances = readings_of_runs(fit, campaign, run.effects.runs, run.index, readings, source.selection)
         of_others = run.effects.of_other_runs(readings, covariances)
         lines, sampled, moves = _with_effects(
-            campaign, fit, run, readings, of_others, counted, others, of_days
+            campaign, fit, run, readings, of_others, counted, others, of_days, holds
         )
     linear = {joint.name for joint in chain.of_kind("linear")}
     return Beside(
@@ -123,13 +126,22 @@ def beside_readings(
         sampled,
         moves,
         Behind(
-            holds_for=HoldsFor.CAMPAIGN if adds_days else holds,
-            day_to_day=day_to_day(components, run.names, run.units),
+            holds_for=holds,
+            day_to_day=_day_to_day(fit, campaign, run, components),
             sources=stated(sources, counted),
             length=length_reference(campaign, number, _gains(fit, run.names), sources),
         ),
         bool(linear) and linear <= axes_stated(sources, chain),
     )
+
+
+def _day_to_day(fit: Fit, campaign: Campaign, run: Linearised, components: DayComponents) -> DayToDay:
+    """The ``components`` of the run's parameters, and those of the effects that every run says by itself."""
+    if run.effects is None:
+        return day_to_day(components, run.names, run.units)
+    followed = run.effects.said_by_every_run
+    both = components_of(fit, campaign, run.run, run.own_rows, run.names, followed)
+    return day_to_day(both, (*run.names, *followed.names), (*run.units, *followed.units))
 
 
 def _alone(counted: Sequence[SourceColumns], rows: Array) -> tuple[OutputContribution, ...]:
@@ -155,6 +167,7 @@ def _with_effects(
     counted: tuple[SourceColumns, ...],
     others: tuple[tuple[SourceColumns, ...], ...],
     of_days: tuple[OutputContribution, ...],
+    holds: HoldsFor,
 ) -> tuple[tuple[OutputContribution, ...], tuple[OutputContribution, ...], Moves]:
     """Lines, what is sampled and moves of a run with effects; ``of_others`` is what the readings of the other runs
     add, ``others`` has what every source does to every run."""
@@ -169,7 +182,7 @@ def _with_effects(
     count = len(run.run.reading_names)
     rows = run.rows[:, :count]
     of_readings = rows @ readings.covariance[:count, :count] @ rows.T + of_others.covariance
-    scatter = scatter_of_effects(effects, fit, day, of_readings, of_others.dof)
+    scatter = scatter_of_effects(effects, fit, day, of_readings, of_others.dof, holds)
     of_model = (of_others if effects.others else None, effects.known_in_other_runs, scatter)
     on_outputs = (
         *(effects.contribution(part) for part in of_days),

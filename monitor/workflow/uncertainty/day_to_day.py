@@ -7,6 +7,7 @@ import numpy as np
 from monitor.discovery import Fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.exceptions import DataError
+from monitor.methods.chain.shared_effects import FollowedEffects
 from monitor.records import Array, Campaign
 from monitor.reporting.budget import DayToDay
 from monitor.statistics.nested import DayComponents, day_components
@@ -20,22 +21,34 @@ BETWEEN_DAYS = "between days"
 
 
 def components_of(
-    fit: Fit, campaign: Campaign, run: MeasuredRun, rows: Array, names: tuple[str, ...]
+    fit: Fit,
+    campaign: Campaign,
+    run: MeasuredRun,
+    rows: Array,
+    names: tuple[str, ...],
+    effects: FollowedEffects | None = None,
 ) -> DayComponents:
     """Components of the m outputs ``names`` over the runs that determine all of them; ``rows`` (m, N) as in the budget.
 
-    A run's own scatter is that of its residuals, taken as uncorrelated, through its sensitivity.
+    A run's own scatter is that of its residuals, taken as uncorrelated, through its sensitivity. Behind the outputs
+    stand the ``effects`` as every run says them by itself; all runs do.
     """
     count = len(run.reading_names)
     repeatability = lack_of_fit(fit)[1]
     if repeatability is None:
         repeatability = fit.sigma * (fit.scale if fit.degrees_of_freedom > 0 else 1.0)
-    within = np.sqrt(np.sum((rows[:, :count] * run.stated * (repeatability / fit.sigma)) ** 2, axis=1))
+    times = repeatability / fit.sigma
+    within = np.sqrt(np.sum((rows[:, :count] * run.stated * times) ** 2, axis=1))
     places = [fit.problem.base_names.index(name) for name in names]
     whole = fit.solution.local_free[:, places].all(axis=1)
     day = {each.run: each.day for each in campaign.runs}
     labels = np.array([day[int(number)] for number in fit.problem.runs])
-    return day_components(fit.solution.local[whole][:, places], labels[whole], within)
+    values = fit.solution.local[:, places]
+    if effects is not None:
+        values = np.concatenate([values, effects.estimate], axis=1)
+        variance = np.einsum("rii->ri", effects.covariance)[whole].mean(axis=0)
+        within = np.concatenate([within, times * np.sqrt(variance)])
+    return day_components(values[whole], labels[whole], within)
 
 
 def between_days(components: DayComponents) -> OutputContribution:

@@ -6,8 +6,7 @@ of them moves the run's own parameters, too. ``monitor.uncertainty.runs.shared_e
 
 from __future__ import annotations
 
-import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -15,14 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import Fit
-from monitor.methods.chain.poses import widening_of_common
-from monitor.methods.chain.shared_effects import followed_effects, shared_parameters
+from monitor.methods.chain.shared_effects import FollowedEffects, followed_effects, shared_parameters
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.sources import Sharing
-from monitor.statistics.tails import chi_square_quantile, f_quantile
 from monitor.uncertainty import Inputs, OutputContribution
-from monitor.uncertainty.parts import Estimated
 from monitor.uncertainty.runs.measured_run import MeasuredRun, same_plan
 from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.runs.shared_effects import shared_answer
@@ -38,12 +34,6 @@ class EffectLine(StrEnum):
     SCATTER = "scatter of the added effects"
 
 
-#: The added effects of a campaign scatter from a size on that chance makes of readings in this part of campaigns.
-_BY_CHANCE = 0.05
-#: Of so many runs or days a scatter is not taken: one degree of freedom.
-_FEWEST_SCATTERED = 2
-
-
 @dataclass(frozen=True)
 class EffectOutputs:
     """The a stated coefficients of added effects, after the m parameters of the run at ``index`` of ``runs``.
@@ -51,7 +41,8 @@ class EffectOutputs:
     ``estimate`` (a,) in internal units; ``columns`` (a,) where they stand among the c common unknowns, of
     which ``by_logarithm`` (c,) is the value of a time constant, that is searched by its logarithm, else 1; ``response``
     (m + a, a): all outputs by these coefficients; ``by_run``: what the inputs of every run do through the common
-    unknowns to all outputs, (m + a, N) each. ``unknowns`` (R, p).
+    unknowns to all outputs, (m + a, N) each. ``unknowns`` (R, p). ``followed`` has the effects as each run alone
+    determines them.
     """
 
     runs: tuple[MeasuredRun, ...]
@@ -64,11 +55,29 @@ class EffectOutputs:
     by_logarithm: Array
     response: Array
     by_run: tuple[Array, ...]
+    followed: FollowedEffects
 
     @property
     def others(self) -> tuple[int, ...]:
         """The runs but the evaluated one."""
         return tuple(run for run in range(len(self.runs)) if run != self.index)
+
+    @property
+    def said_by_every_run(self) -> FollowedEffects:
+        """The stated effects that every run determines by itself."""
+        followed = self.followed
+        every = [bool(np.isfinite(values).all()) for values in followed.estimate.T]
+        columns = [
+            column
+            for column, (name, by_every) in enumerate(zip(followed.names, every, strict=True))
+            if by_every and name in self.names
+        ]
+        return FollowedEffects(
+            tuple(followed.names[column] for column in columns),
+            tuple(followed.units[column] for column in columns),
+            followed.estimate[:, columns],
+            followed.covariance[np.ix_(range(len(self.runs)), columns, columns)],
+        )
 
     def padded(self, rows: Array) -> Array:
         """Rows (m, k) of the run's parameters, with zeros for the effects (m + a, k)."""
@@ -168,6 +177,7 @@ def effect_outputs(fit: Fit, index: int, places: Sequence[int]) -> EffectOutputs
         by_logarithm=by_logarithm,
         response=outputs[:, columns] / scale,
         by_run=tuple(outputs @ by_inputs for by_inputs in answer.by_run),
+        followed=followed_effects(problem, solution),
     )
 
 
@@ -229,104 +239,3 @@ def _value_names(effects: EffectOutputs, parts: Sequence[SourceColumns], run: in
     if of_run.values is None:
         return tuple((run, number) for number in range(count))
     return of_run.values
-
-
-@dataclass(frozen=True)
-class _Beyond:
-    """What a number of runs, or of the means of days, scatters in an effect beyond its readings.
-
-    ``variance`` of one of them, ``count`` of them, ``has_run``: whether the evaluated run is one, or of one.
-    """
-
-    variance: float
-    count: int
-    has_run: bool
-
-    def added(self, of_run: Array, of_effect: Array) -> Array:
-        """What it adds to all outputs (m + a, m + a), of which the parameters of the run answer the effect by
-        ``of_run`` and the effects by ``of_effect`` (m + a,).
-
-        The fit gives the run the mean of all, so that its own parameters take up what its own value is off that mean:
-        nearly all of what one scatters. The mean itself has the part of the number of them.
-        """
-        of_mean = self.variance / self.count
-        off_mean = self.variance - of_mean if self.has_run else self.variance + of_mean
-        added = off_mean * np.outer(of_run, of_run) + of_mean * np.outer(of_effect, of_effect)
-        if not self.has_run:
-            added += of_mean * (np.outer(of_run, of_effect) + np.outer(of_effect, of_run))
-        return np.asarray(added)
-
-
-def scatter_of_effects(
-    effects: EffectOutputs,
-    fit: Fit,
-    day_of: Mapping[int, int],
-    of_readings: Array,
-    dof: float = math.inf,
-) -> OutputContribution | None:
-    """What runs and days scatter in the effects beyond their readings, or poses that share what no model has.
-
-    ``of_readings`` (m + a, m + a) is what the readings of all runs give, estimated with ``dof`` degrees of freedom.
-    None where they scatter no more than chance makes of readings in ``_BY_CHANCE`` of campaigns.
-    """
-    problem, solution = fit.problem, fit.solution
-    followed = followed_effects(problem, solution)
-    first = len(of_readings) - len(effects.names)
-    widened = widening_of_common(problem, solution)[effects.columns]
-    days = np.array([day_of[int(number)] for number in problem.runs])
-    is_effect = np.arange(len(of_readings)) >= first
-    covariance, fewest = np.zeros_like(of_readings), math.inf
-    for column, name in enumerate(effects.names):
-        variance = float(of_readings[first + column, first + column])
-        response = effects.response[:, column]
-        of_run, of_effect = np.where(is_effect, 0.0, response), np.where(is_effect, response, 0.0)
-        beyond: list[_Beyond] = []
-        if name in followed.names:
-            values = followed.estimate[:, followed.names.index(name)]
-            tail = _BY_CHANCE / len(effects.names)
-            beyond = _beyond(values, days, effects.index, variance, dof, tail)
-        poses = (float(widened[column]) ** 2 - 1.0) * variance
-        larger = [each for each in beyond if each.variance / each.count > poses]
-        if larger:
-            # Of runs and of days the one that adds most: what days scatter is in what runs scatter, too.
-            added = [each.added(of_run, of_effect) for each in larger]
-            most = int(np.argmax([np.trace(each) for each in added]))
-            covariance = covariance + added[most]
-            fewest = min(fewest, larger[most].count - 1.0)
-        elif poses > 0.0:
-            covariance = covariance + poses * np.outer(response, response)
-    if not np.any(covariance):
-        return None
-    return OutputContribution(EffectLine.SCATTER.value, covariance, fewest, Estimated.SCALE)
-
-
-def _beyond(
-    values: Array, days: npt.NDArray[np.int64], index: int, variance: float, dof: float, tail: float
-) -> list[_Beyond]:
-    """What runs, and what the means of days, scatter beyond the ``variance`` of their mean by readings alone, estimated
-    with ``dof`` degrees of freedom; those of them that do so with a probability of ``tail`` at most by chance.
-
-    ``values`` (R,) of an effect, NaN where a run says nothing of it. Two runs or days, one degree of freedom, say
-    hardly anything of how much a third would differ, and are left out.
-    """
-    stated = np.isfinite(values)
-    has_run = bool(stated[index])
-    values, days = values[stated], days[stated]
-    means = np.array([values[days == day].mean() for day in np.unique(days)])
-    samples = [values] if len(means) == len(values) else [values, means]
-    samples = [sample for sample in samples if len(sample) > _FEWEST_SCATTERED]
-    beyond = []
-    for sample in samples:
-        freedom = len(sample) - 1
-        of_mean = float(sample.var(ddof=1)) / len(sample)
-        limit = _largest_ratio(tail / len(samples), freedom, dof)
-        if of_mean > limit * variance:
-            beyond.append(_Beyond(len(sample) * (of_mean - variance), len(sample), has_run))
-    return beyond
-
-
-def _largest_ratio(tail: float, freedom: float, dof: float) -> float:
-    """The ratio of two estimates of one variance that is exceeded with probability ``tail``."""
-    if math.isinf(dof):
-        return float(chi_square_quantile(tail, freedom)) / freedom
-    return float(f_quantile(tail, freedom, dof))

@@ -54,6 +54,13 @@ LASTING = (
 )
 #: Said by a standby until it is promoted, and for ever by a server that is only read.
 STANDBY = 'Failed to commit: Failed to execute query "INSERT": ERROR: cannot execute INSERT in a read-only transaction'
+#: What PostgreSQL 15 says with lc_messages = de_DE.UTF-8 to whom it does not let in, and while it starts (2026-11-26).
+GERMAN = (
+    'connection to server on socket "/s" failed: FATAL:  Passwort-Authentifizierung für Benutzer »pw« fehlgeschlagen',
+    'connection to server on socket "/s" failed: FATAL:  kein pg_hba.conf-Eintrag für Host »[local]«, Benutzer »x«',
+    'connection to server on socket "/s" failed: FATAL:  Datenbank »nolake« existiert nicht',
+    'connection to server on socket "/s" failed: FATAL:  das Datenbanksystem startet',
+)
 PASSING = (
     'connection to server at "h", port 5432 failed: Connection refused Is the server running on that host?',
     'connection to server on socket "/s/.s.PGSQL.5432" failed: No such file or directory Is the server running?',
@@ -67,7 +74,11 @@ PASSING = (
 
 @pytest.mark.parametrize(
     ("message", "tries"),
-    [*((message, 1) for message in LASTING), (STANDBY, 3), *((message, 4) for message in PASSING)],
+    [
+        *((message, 1) for message in LASTING),
+        *((message, 3) for message in (STANDBY, *GERMAN)),
+        *((message, 4) for message in PASSING),
+    ],
     ids=lambda value: re.sub(r"[^a-z]+", "-", value[-40:].lower()) if isinstance(value, str) else None,
 )
 def test_what_can_not_heal_is_said_at_once(
@@ -84,7 +95,7 @@ def test_what_can_not_heal_is_said_at_once(
 
     monkeypatch.setattr(publication, "attach", attach)
     monkeypatch.setattr(publication, "_TRIES", 4)
-    monkeypatch.setattr(publication, "_TRIES_OF_STANDBY", 3)
+    monkeypatch.setattr(publication, "_TRIES_OF_UNSURE", 3)
     monkeypatch.setattr(publication.time, "sleep", lambda seconds: None)
     with SharedDatabase(tmp_path / "Ulm.duckdb") as db, pytest.raises(StoreError, match="Unable to connect"):
         publish(db, f"ducklake:{tmp_path}/lake.ducklake", files=tmp_path / "files")

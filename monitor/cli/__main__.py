@@ -1,7 +1,0 @@
-"""``python -m monitor.cli``."""
-
-import sys
-
-from monitor.cli import main
-
-sys.exit(main())
