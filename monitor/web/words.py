@@ -202,7 +202,8 @@ def how_far(row: FleetTableRow) -> str:
 def _when_beyond(row: FleetTableRow) -> str:
     """Say how likely a parameter is beyond its limit, or when it will be."""
     ahead = ""
-    if row.attention is Attention.MAY_BE_OUT and row.probability_out is not None:
+    by_last_run = row.attention is Attention.OUT and abs(row.latest or 0.0) < (row.limit or 0.0)
+    if (by_last_run or row.attention is Attention.MAY_BE_OUT) and row.probability_out is not None:
         ahead = f"; the last run is beyond it with {percent(row.probability_out)}"
     elif row.years_to_limit is not None:
         ahead = f"; reached in {_span(row.years_to_limit)} at this rate"

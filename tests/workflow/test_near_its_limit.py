@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -135,6 +136,10 @@ def test_a_limit_that_is_near_goes_before_days_that_differ(rows: dict[str, Fleet
     }
     near = rows["a-near"]
     assert "the last run is beyond it with " in how_far(near)
+    # A last run beyond a limit within which the mean of its day lies.
+    by_last_run = replace(near, attention=Attention.OUT, probability_out=0.62)
+    assert how_far(by_last_run).endswith("% of its limit of 50; the last run is beyond it with 62 %")
+    assert "beyond it with" not in how_far(rows["c-out"])
     (row,) = machine_rows([near], {}, {}, {})
     assert (row.urgency.word, row.worst) == ("act now", near)
     assert "in tolerance at the next check (" in how_far(rows["d-scatters"])
