@@ -33,9 +33,16 @@ def resemblance(answer: TrendAnswer) -> Iterator[str]:
     name = max(allowed, key=lambda parameter: allowed[parameter].widening)
     widest = allowed[name]
     if widest.blocks <= _FEW_BLOCKS:
+        days = stated[name].days
+        groups = f" in {widest.blocks} groups" if days > widest.blocks else ""
+        wide = (
+            f"up to {widest.widening:.2g} times as wide as"
+            if widest.widening > _WIDER
+            else "no narrower than"
+        )
         yield (
-            f"{widest.blocks} days cannot tell how far days resemble each other, nor a drift from days that differ: "
-            f"the intervals of the slopes are up to {widest.widening:.2g} times as wide as with independent days"
+            f"{days} days{groups} cannot tell how far days resemble each other, nor a drift from days that differ: "
+            f"the intervals of the slopes are {wide} with independent days"
         )
     elif widest.widening > _WIDER:
         yield (

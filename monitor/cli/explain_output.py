@@ -148,20 +148,7 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
     if tie.broken_by is TieBreak.DRIVERS:
-        both = len(tie.drivers) == 2
-        if tie.within_runs:
-            runs = (
-                f"runs within which {drivers} change"
-                + ("" if both else "s")
-                + (", not together" if both else "")
-            )
-        else:
-            runs = (
-                f"runs in which {drivers} do not go together"
-                if both
-                else f"runs at several values of {drivers}"
-            )
-        return f"to tell {rivals} apart, measure {runs}, and record {'both' if both else 'it'}"
+        return f"to tell {rivals} apart, measure {tie.what_to_measure}"
     if tie.broken_by is TieBreak.INDEXATIONS:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
     if tie.broken_by is TieBreak.PLAN:

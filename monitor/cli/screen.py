@@ -34,6 +34,7 @@ IN_UNIT = frozenset(
         *("robust_slope_per_year", "robust_interval", "bias", "lower", "upper", "stable_within"),
         *("stepwise", "u_stepwise", "at_once", "u_at_once", "difference_by_method", "u_difference_by_noise"),
         *("earlier", "later", "parts", "known_beforehand", "expected_of_drift", "drift_in_30_days"),
+        "by_temperature",
         *("mean_forward", "mean_backward", "s_forward", "s_backward", "reversal"),
         *("first", "u_first", "second", "u_second", "difference"),
         *("rms", "rms_before", "rms_after", "largest", "repeatability", "expected_rms", "peak"),

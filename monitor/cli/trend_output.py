@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
+from monitor.cli.forecast_output import forecast_start
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -67,18 +68,30 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
         )
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
+    for name, parameter in parameters:
+        yield from forecast_start(name, parameter)
     yield from _charts(answer)
     latest = max((parameter.mean.latest_at or "" for _, parameter in parameters), default="")
     yield from _volumetric(answer.volumetric_error, latest)
     yield from _next_check(answer)
     yield from _backtest(answer)
     yield from resemblance(answer)
-    yield from dict.fromkeys(str(parameter.drift.why) for _, parameter in parameters if parameter.drift.why)
+    yield from _no_slopes(answer)
     if answer.weekly_looks is not None:
         yield from weekly_lines(answer.weekly_looks)
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
     yield from answer.figures or ()
+
+
+def _no_slopes(answer: TrendAnswer) -> Iterator[str]:
+    """Why parameters have no slope a year; which ones, where others have one or lack it for another reason."""
+    lacking: dict[str, list[str]] = {}
+    for name, parameter in answer.parameters.items():
+        if parameter.drift.why is not None:
+            lacking.setdefault(str(parameter.drift.why), []).append(name)
+    for why, names in lacking.items():
+        yield why if len(names) == len(answer.parameters) else f"{', '.join(names)}: {why}"
 
 
 def out_of_tolerance(name: str, parameter: ParameterTrend) -> Iterator[str]:
@@ -144,6 +157,8 @@ def _chart_words(parameter: ParameterTrend) -> str:
 
 def _crosses(parameter: ParameterTrend) -> str:
     """When the drift reaches the limit; since when it is beyond, where that day is past."""
+    if parameter.forecast.beyond_since is not None:
+        return f"since {parameter.forecast.beyond_since[:10]}"
     at = parameter.forecast.crosses_limit_at
     if at is None:
         return "-"

@@ -62,7 +62,8 @@ class Scattering:
 class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
-    more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how."""
+    more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how. ``unseen``:
+    the tests of all residuals together do not show what is missing."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -74,12 +75,23 @@ class MachineFinding:
     hopeless: bool
     mistakes: Sequence[MistakeFound]
     scattering: Sequence[Scattering] = ()
+    unseen: bool = False
 
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
 GROSS = (
     "More is left than the effects of a machine leave: look first for exchanged columns or targets, a wrong sign or "
     "unit, or the geometry in campaign.toml; of the simple mistakes that were tried none alone explains it. "
+)
+# What is said where a single effect is named, and the tests of all residuals together agree with noise.
+UNSEEN = (
+    "The test of all residuals together, which `monitor compare` judges by, agrees with noise: what is named here is "
+    "small beside their scatter, and stands out only where it is looked for by itself."
+)
+# What is said of a comparison that these tests alone judge.
+TOGETHER = (
+    "by all residuals together; `monitor explain {campaign}` also looks for single effects, which may be too small for "
+    "this test"
 )
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
@@ -156,6 +168,8 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         sentences.append("It varies from run to run and no recorded column follows it.")
     if first.others:
         sentences.append(f"These data cannot tell it apart from {', '.join(first.others)}.")
+    if finding.unseen:
+        sentences.append(UNSEEN)
     return sentences
 
 

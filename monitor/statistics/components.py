@@ -76,8 +76,9 @@ def variance_components(
     """Components of variance of ``values`` (n, p), any unit, between and within ``groups`` (n,).
 
     Equal group sizes: exact intervals within, modified large-sample intervals between and for the sum;
-    unequal sizes: the same on unweighted means. Raises ``DataError`` for fewer than two groups, nothing
-    repeated, non-finite values, or a level outside 0 to 1. Measured coverage of the nominal 95 %: 94 to 97 %
+    unequal sizes: the same on unweighted means. The upper end of a negative estimate is that of an estimate of zero.
+    Raises ``DataError`` for fewer than two groups, nothing
+    repeated, non-finite values, or a level outside 0 to 1. Measured coverage of the nominal 95 %: 94 to 98 %
     for 3 to 6 days of 4 runs (tests/statistics/test_components.py). Source: R. K. Burdick and F. A.
     Graybill, Confidence Intervals on Variance Components, 1992, 3.3 and 4.3.
     """
@@ -87,7 +88,9 @@ def variance_components(
     size, s1 = _harmonic(sums)
     s2 = sums.ms_within
     estimate = (s1 - s2) / size
-    low, high = _difference(s1, n1, s2, n2, tail)
+    # A mean square between days below that within them says nothing against days that differ by a little: the upper end
+    # is that of an estimate of zero, or it would fall to zero itself and call equal what nobody saw.
+    low, high = _difference(s1, n1, s2, n2, tail)[0], _difference(np.maximum(s1, s2), n1, s2, n2, tail)[1]
     within = np.column_stack(
         [n2 * s2 / chi_square_quantile(tail, n2), n2 * s2 / chi_square_quantile(1.0 - tail, n2)]
     )

@@ -140,7 +140,12 @@ def _one_run_a_day(plain: DayComponents, values: Array) -> DayComponents:
     total = values.var(axis=0, ddof=1)
     added = total - plain.within_run**2
     tail = (1.0 - plain.level) / 2.0
-    bounds = [dof * total / chi_square_quantile(side, dof) for side in (tail, 1.0 - tail)]
+    # The upper end of a negative estimate is that of an estimate of zero, as in ``variance_components``.
+    largest = np.maximum(total, plain.within_run**2)
+    bounds = [
+        dof * square / chi_square_quantile(side, dof)
+        for square, side in ((total, tail), (largest, 1.0 - tail))
+    ]
     interval = np.column_stack([np.sqrt(np.maximum(b - plain.within_run**2, 0.0)) for b in bounds])
     covariance = None
     if len(values) >= 3:

@@ -65,6 +65,7 @@ class Trend:
     how far days that resemble each other are allowed for. ``p_value`` says whether the values move, ``season_p``
     whether a season alone moves them; None where none is asked of the line, else ``u_slope`` holds what a season may be
     of it (``beside_season``), which is no part of the ``covariance``: ``season_ahead`` adds it to what is foretold.
+    ``beside`` are the coefficients of the columns beside the line, which is that of their means over the runs.
     """
 
     at: float
@@ -87,6 +88,7 @@ class Trend:
     resemblance: Resemblance = INDEPENDENT
     season_p: float | None = None
     season_ahead: SeasonAhead | None = None
+    beside: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -194,6 +196,7 @@ def _result(
             bool(np.isfinite(lines.seasonal.t[0])),
         ),
         season_p=None if np.isnan(season_p) else season_p,
+        beside=tuple(fit.coefficients[1 + 2 * int(lines.cyclic[0]) : -1].tolist()),
     )  # fmt: skip
 
 

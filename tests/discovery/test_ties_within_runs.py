@@ -36,6 +36,9 @@ def test_what_the_runs_take_up_has_to_change_within_them(virtual_campaigns) -> N
     )
     (tie,) = ties_of(found, ("EZC1:const@warmup",), is_touched=True)
     assert tie.within_runs
-    sentence = "measure runs within which x_axis_degC and warmup change, not together, and record both"
+    sentence = (
+        "measure runs within which x_axis_degC and the time since the day's first run change, not together, and record "
+        "x_axis_degC"
+    )
     assert _tie(found.effect, tie, "week") == f"to tell EZC1:const@warmup apart, {sentence}"
     assert what_breaks(tie) == sentence.replace("x_axis_degC", "x axis degC")

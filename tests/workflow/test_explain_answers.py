@@ -10,12 +10,14 @@ import pytest
 from monitor.discovery import Verdict
 from monitor.documents import from_document
 from monitor.exceptions import InputError
+from monitor.reporting.machine_finding import UNSEEN, MachineFinding, MissingEffect, machine_sentences
 from monitor.store import Database, load_analysis
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachineComparison
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import CurveMissing, ExplainAnswer, MachineMissing
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
+from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
@@ -50,6 +52,8 @@ def test_an_explanation_is_restored_from_what_was_stored(measured: Database, cam
     stored = load_analysis(measured, "explanation", campaign=campaign)
     assert from_document(ExplainAnswer, stored.document) == answer
     assert isinstance(answer.explanation.missing[0], KINDS[campaign][1])
+    # Its comparison says so as well.
+    assert UNSEEN not in answer.explanation.answer
 
 
 def test_the_coefficients_of_a_curve_are_restored_from_what_was_stored(measured: Database) -> None:
@@ -61,3 +65,26 @@ def test_the_coefficients_of_a_curve_are_restored_from_what_was_stored(measured:
 def test_a_rate_is_checked_with_the_request() -> None:
     with pytest.raises(InputError, match="the false discovery rate must lie between 0 and 1, not 1"):
         ExplainRequest("any", rate=1.0)
+
+
+@pytest.mark.parametrize("unseen", [True, False])
+def test_an_effect_that_all_residuals_together_do_not_show_is_said_to_be_small(unseen: bool) -> None:
+    """`compare` said "explained" of a campaign, and `explain` that something was missing, without a word on why."""
+    missing = MissingEffect("EXA:harmonic4", "axial displacement of the A axis", None, False, ())
+    finding = MachineFinding(False, [missing], 0, (), (), 8, (), False, (), unseen=unseen)
+    sentence = "The model lacks EXA:harmonic4: axial displacement of the A axis."
+    assert machine_sentences(finding) == (f"{sentence} {UNSEEN}" if unseen else sentence)
+
+
+@pytest.mark.parametrize("driver", ["warmup", "settling", "run_time", "sequence", "each_run"])
+@pytest.mark.parametrize("within_runs", [True, False])
+def test_nobody_is_asked_to_record_what_follows_from_the_times(driver: str, within_runs: bool) -> None:
+    alone = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, (driver,), within_runs=within_runs).what_to_measure
+    assert driver not in alone
+    assert "record" not in alone
+    beside = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, (driver, "ambient_degC"), within_runs=within_runs)
+    assert beside.what_to_measure.endswith(", and record ambient_degC")
+    recorded = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, ("ambient_degC",), within_runs=within_runs)
+    assert recorded.what_to_measure.endswith(
+        "ambient_degC" + (" changes, and record it" if within_runs else ", and record it")
+    )

@@ -9,6 +9,8 @@ from pathlib import Path
 from monitor.cli import output, residual_output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
+from monitor.records import Verdict
+from monitor.reporting.machine_finding import TOGETHER
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import (
     CompareAnswer,
@@ -48,6 +50,8 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     residual_output.summary(answer.comparison)
+    if isinstance(answer.comparison, MachineComparison) and answer.comparison.verdict is Verdict.EXPLAINED:
+        output.say(TOGETHER.format(campaign=answer.comparison.campaign))
     if answer.instruments_disagree is not None:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
     if answer.against_others is not None:

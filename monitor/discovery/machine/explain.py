@@ -56,7 +56,7 @@ class Explanation:
     looks wrong, ``mistakes`` says how, and nothing else is reported.
     ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
     leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
-    less.
+    less. ``together`` is the verdict of the tests of all residuals together, under the model as given.
     """
 
     comparison: ChainComparison
@@ -72,6 +72,7 @@ class Explanation:
     limits: tuple[Limit, ...] = ()
     taken_for_machine: tuple[TakenUp, ...] = ()
     scatter: tuple[Scatter, ...] = ()
+    together: Verdict | None = None
 
 
 def variants_of_campaign(
@@ -130,8 +131,10 @@ def explain(
     verdict = Verdict.SOMETHING_IS_MISSING
     if not missing:
         verdict = compare(latest.under, campaign.name, model).verdict
+    as_given = compare(first, campaign.name, model)
     return Explanation(
-        comparison=replace(compare(first, campaign.name, model), verdict=verdict),
+        comparison=replace(as_given, verdict=verdict),
+        together=as_given.verdict,
         missing=missing,
         suspect=tuple(sorted(suspects.bad.values(), key=lambda point: point.row)),
         moves=tuple(suspects.moves.values()),

@@ -37,6 +37,10 @@ FULL_MARGIN = 10.0
 #: Correlations at which the variances are computed; between them they are interpolated. Beyond the last one some
 #: dozens of blocks have no line.
 CORRELATIONS = np.linspace(0.0, 0.95, 20)
+#: Up to so many blocks nothing is known of how far they resemble each other: no slope is then better known than of
+#: blocks that do not. (Two campaigns a month apart: the last block of one and the first of the other are no neighbours,
+#: and what they would share makes no difference smaller.)
+FEW_BLOCKS = 5
 #: A cycle is fitted beside the line where the history covers this share of it (300 days of a year), where no block is
 #: longer than that share of it, and where the variance of the slope grows by no more than this factor for it.
 COVERED, LONGEST_BLOCK, WORST_INFLATION = 0.82, 0.4, 10.0
@@ -424,6 +428,9 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         covariance[:, 0, 1] = covariance[:, 1, 0] = inside[:, 0, -1] / (design.ones * spread)
         covariance *= variance[:, np.newaxis, np.newaxis]
         scatter = np.where(enough, (count - rank) / trace, np.nan)
+        widening = np.sqrt(inside[:, -1, -1] * scatter)
+        least = np.where((count <= FEW_BLOCKS) & (widening < 1.0) & (widening > 0.0), widening, 1.0)
+        covariance /= (least**2)[:, np.newaxis, np.newaxis]
     return BlockLines(
         at=at,
         slope=slope,
@@ -431,7 +438,7 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         dof=np.where(enough, np.maximum(dof, 1.0), np.nan),
         correlation=_correlation(seen_place, seen_share),
         allowed=_correlation(row, share),
-        widening=np.sqrt(inside[:, -1, -1] * scatter),
+        widening=widening / least,
         scatter=scatter,
         blocks=count,
         cyclic=cyclic,

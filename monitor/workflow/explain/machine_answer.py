@@ -300,6 +300,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 unfitted=explanation.unfitted,
                 hopeless=is_hopeless(explanation),
                 mistakes=mistakes_found(explanation.mistakes),
+                unseen=explanation.together is Verdict.EXPLAINED,
             )
         ),
         residual_map=residual_map,

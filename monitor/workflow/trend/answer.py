@@ -188,8 +188,29 @@ class WarmUp:
 
 
 @dataclass(frozen=True)
+class ForecastStart:
+    """Where the line that is extrapolated stands at the last run: ``value``, at ``temperature`` in °C.
+
+    That is the mean of its runs, of the thermometer that is fitted beside it; ``by_temperature`` is what the latest
+    mean lies off the line because its runs had another. ``from_latest_at`` is when the limit is reached from the latest
+    mean on by the same slope: None where it lies beyond already, or the slope leads away from it.
+    """
+
+    value: float
+    from_latest_at: str | None
+    temperature: float | None = field(default=None, metadata=OMITTED)
+    latest_temperature: float | None = field(default=None, metadata=OMITTED)
+    by_temperature: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
 class LimitForecast:
-    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check."""
+    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check.
+
+    ``beyond_since`` is the first of the runs without a break that are beyond the limit, where the last one is: then it
+    is not reached any more, and ``crosses_limit_at`` is None.
+    ``start`` says from where, where a day is stated.
+    """
 
     limit: float | None
     crosses_limit_at: str | None
@@ -199,6 +220,8 @@ class LimitForecast:
     recommended_interval_days: float | None
     recommended_by: str | None
     why_no_forecast: Lack | None = field(metadata=WORDED)
+    beyond_since: str | None = field(default=None, metadata=OMITTED)
+    start: ForecastStart | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

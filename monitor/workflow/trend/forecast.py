@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.reporting.origins import ForecastMethod
-from monitor.statistics import backtest
+from monitor.statistics import Trend, backtest, predict
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, drift_forecast
-from monitor.workflow.trend.answer import ForecastTest, LimitForecast
+from monitor.workflow.history.series import Series
+from monitor.workflow.trend.answer import ForecastStart, ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
@@ -28,6 +31,8 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     none = LimitForecast(limit, None, None, None, date(check, drift.whole.offset), None, None, None)
     if limit is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_TOLERANCE))
+    beyond = _beyond_since(drift.whole, limit)
+    none = replace(none, beyond_since=beyond)
     of_drift = drift_forecast(drift, limit, check, reliability)
     if of_drift is None or of_drift.ahead is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
@@ -39,13 +44,41 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     )
     if drift.stated is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
-    at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
+    at, interval = None, None
+    if beyond is None:
+        at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
     return replace(
         none,
         crosses_limit_at=at,
         crosses_limit_interval=interval,
         in_tolerance_at_next_check=float(ahead.probability[0]),
+        start=None if at is None else _start(drift, of_drift.line, ahead.crossing.limit),
     )
+
+
+def _start(drift: PieceDrift, line: Trend, limit: float) -> ForecastStart:
+    """Where the line stands at the last run, and when the latest mean would reach the ``limit`` by its slope."""
+    whole, piece = drift.whole, drift.piece
+    origin = float(whole.t[-1])
+    last = whole.of_last_day
+    to_go = limit - float(whole.values[last].mean())
+    days = to_go / line.slope if to_go * line.slope > 0.0 and to_go * limit > 0.0 else np.inf
+    start = ForecastStart(
+        value=float(predict(line, origin)[0]), from_latest_at=date(origin + days, whole.offset)
+    )
+    if drift.thermometer is None or piece.temperature is None or whole.temperature is None:
+        return start
+    mean, latest = float(piece.temperature.mean()), float(whole.temperature[last].mean())
+    return replace(
+        start, temperature=mean, latest_temperature=latest, by_temperature=line.beside[0] * (latest - mean)
+    )
+
+
+def _beyond_since(steady: Series, limit: float) -> str | None:
+    """Return when the last runs beyond ± ``limit`` without a break began; None where the last one is within."""
+    within = np.flatnonzero(np.abs(steady.values) <= limit)
+    first = int(within[-1]) + 1 if within.size else 0
+    return date(float(steady.t[first]), steady.offset) if first < len(steady.t) else None
 
 
 def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, Lack | None]:
