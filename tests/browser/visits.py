@@ -28,9 +28,8 @@ PICTURES = Path(os.environ.get("PAGES_OUTPUT", ROOT / "pages-output"))
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 #: Three dimensions without a graphics card; a browser in a container has no sandbox of its own.
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-#: What plotly.js does that the policy forbids and that nothing depends on: style attributes of its notifications, and
-#: the style sheet of its maps.
-HARMLESS = ("Applying inline style violates", "Canvas2D: Multiple readback")
+#: What Chromium says of plotly.js that is no fault.
+HARMLESS = ("Canvas2D: Multiple readback",)
 PATIENCE_S = 120.0
 #: Every page at its most: with an effect tried, two runs compared, a form with faults.
 PAGES = {

@@ -154,6 +154,7 @@ def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Res
         campaign=campaign, texts=texts, runs=runs, groups=groups(texts, outcome.faults), outcome=outcome,
         not_applicable=form_words(texts)("boxes.not_applicable"),
         methods=METHODS, rules=RULES, grounds=tuple(GroundKind),
+        accepts=outcome.is_of_grounds or any(texts.get(f"accept.{kind}") for kind in GroundKind),
     )  # fmt: skip
 
 
