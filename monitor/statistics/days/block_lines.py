@@ -429,8 +429,9 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         covariance *= variance[:, np.newaxis, np.newaxis]
         scatter = np.where(enough, (count - rank) / trace, np.nan)
         widening = np.sqrt(inside[:, -1, -1] * scatter)
-        least = np.where((count <= FEW_BLOCKS) & (widening < 1.0) & (widening > 0.0), widening, 1.0)
-        covariance /= (least**2)[:, np.newaxis, np.newaxis]
+        too_narrow = (count <= FEW_BLOCKS) & (widening < 1.0) & (widening > 0.0)
+        raised = 1.0 / np.where(too_narrow, widening, 1.0)
+        covariance *= (raised**2)[:, np.newaxis, np.newaxis]
     return BlockLines(
         at=at,
         slope=slope,
@@ -438,7 +439,7 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         dof=np.where(enough, np.maximum(dof, 1.0), np.nan),
         correlation=_correlation(seen_place, seen_share),
         allowed=_correlation(row, share),
-        widening=widening / least,
+        widening=widening * raised,
         scatter=scatter,
         blocks=count,
         cyclic=cyclic,
