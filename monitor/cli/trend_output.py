@@ -157,6 +157,8 @@ def _chart_words(parameter: ParameterTrend) -> str:
 
 def _crosses(parameter: ParameterTrend) -> str:
     """When the drift reaches the limit; since when it is beyond, where that day is past."""
+    if parameter.forecast.beyond_since is not None:
+        return f"since {parameter.forecast.beyond_since[:10]}"
     at = parameter.forecast.crosses_limit_at
     if at is None:
         return "-"

@@ -23,6 +23,8 @@ _NAME = re.compile(r"[A-Za-z]\w*")
 LONGEST_LINE = 65_536
 #: Most lines of one file: two years of touching without a pause, at one touch a minute.
 MOST_LINES = 1_000_000
+#: How many rows are held before their cells go into the columns.
+_ROWS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,7 @@ def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
 
 
 def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_workbook: bool) -> CsvTable:
+    columns: list[list[str]] = [[] for _ in header]
     rows: list[list[str]] = []
     at: list[int] = []
     damaged: list[tuple[str, ...]] = []
@@ -164,14 +167,23 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_
         elif is_whole:
             rows.append(row)
             at.append(number)
+            if len(rows) == _ROWS_AT_ONCE:
+                _move(rows, columns)
         else:
             hint = "; is a comma used as decimal point?" if len(row) > width and not of_workbook else ""
             faults.add(file, number, None, f"{len(row)} cells where the header has {width}{hint}")
             damaged.append(tuple(row[:width]))
-    if not rows and not damaged:
+    if not at and not damaged:
         faults.add(file, 1, None, "there is only a header; at least one row must follow")
-    columns = list(zip(*rows, strict=True)) if rows else [()] * width
+    _move(rows, columns)
     return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged), of_workbook)
+
+
+def _move(rows: list[list[str]], columns: list[list[str]]) -> None:
+    """Put rows at the end of the columns and empty their list: all at once they would be twice in memory."""
+    for column, cells in zip(columns, zip(*rows, strict=True), strict=False):
+        column.extend(cells)
+    rows.clear()
 
 
 def _why_no_row(number: int, row: list[str], width: int) -> str:
@@ -188,9 +200,12 @@ def _why_no_row(number: int, row: list[str], width: int) -> str:
 
 
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
-    """Yield every line after the header with its number. A quote has to close on its line."""
-    body = lines[1:]
-    if not any('"' in line or "\r" in line[:-1] for line in body):
+    """Yield every line after the header with its number, and take it out of the list. A quote has to close on its
+    line."""
+    is_plain = not any('"' in line or "\r" in line[:-1] for line in lines[1:])
+    body = _taken_out(lines)
+    next(body)
+    if is_plain:
         yield from enumerate(csv.reader(body), start=2)
         return
     for number, line in enumerate(body, start=2):
@@ -198,6 +213,13 @@ def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
             yield number, _cells(line)
         except csv.Error as error:
             yield number, error
+
+
+def _taken_out(lines: list[str]) -> Iterator[str]:
+    """Yield the lines in their order, each of which is then no longer in the list."""
+    lines.reverse()
+    while lines:
+        yield lines.pop()
 
 
 def _cells(line: str) -> list[str]:

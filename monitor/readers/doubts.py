@@ -33,6 +33,9 @@ LARGEST_BAR_DIFFERENCE = 0.5
 PROBE_RANGE = (1e-5, 1.0)
 #: °C of shops and measuring rooms; spindles and motors are hotter, and not asked. 20 °C in kelvin are 293.
 AIR_RANGE = (-40.0, 60.0)
+#: Air of shops: 500 hPa is at 5 500 m, above all towns; humidity that is less than 1 % is a share. What certificates
+#: print as conditions, with the unit in words. 760 mmHg under a header of hPa is the air of 2 400 m, and not seen.
+OTHER_CONDITIONS = {"pressure_hPa": (500.0, 1100.0, "hPa"), "humidity_percent": (1.0, 100.0, "percent")}
 #: Two days begin at least so far apart: two shifts of one date do not.
 APART = timedelta(hours=12)
 #: Clocks of machines and of this computer differ by less.
@@ -54,6 +57,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _units_of_runs,
             _statements,
             _temperatures,
+            _pressure_and_humidity,
             _days,
             _to_come,
         )
@@ -225,6 +229,23 @@ def _temperatures(campaign: Campaign) -> Iterator[str]:
             f"{name} is {value:g} in run {run_number} ({len(values)} of {len(campaign.runs)} runs lie outside "
             f"{AIR_RANGE[0]:g} to {AIR_RANGE[1]:g} °C): is the unit °C?"
         )
+
+
+def _pressure_and_humidity(campaign: Campaign) -> Iterator[str]:
+    """Conditions that no shop has: pascals, bars, a share in place of percent."""
+    for name, (least, most, unit) in OTHER_CONDITIONS.items():
+        odd = [
+            (run.run, value)
+            for run in campaign.runs
+            if (value := run.conditions.get(name)) is not None and not least <= value <= most
+        ]
+        # An empty cell is nan, and no doubt.
+        odd = [(number, value) for number, value in odd if np.isfinite(value)]
+        if odd:
+            yield (
+                f"{name} is {odd[0][1]:g} in run {odd[0][0]} ({len(odd)} of {len(campaign.runs)} runs lie outside "
+                f"{least:g} to {most:g}): is the unit {unit}?"
+            )
 
 
 def _days(campaign: Campaign) -> Iterator[str]:

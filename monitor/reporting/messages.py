@@ -104,10 +104,10 @@ def campaigns_of_same_hours(machine: str, campaigns: Sequence[str]) -> str:
 
 
 def numbers_of_older_version(machine: str, version: str, newest: str) -> str:
-    """Return which ``version`` of a model the numbers of a machine are of, while the ``newest`` has none."""
+    """Return which ``version`` of a model the numbers of a machine are of, while the ``newest`` lacks campaigns."""
     return (
-        f"the numbers of {machine} are of {version}, the newest version that it was identified by; {newest} is newer: "
-        "type `monitor identify`"
+        f"the numbers of {machine} are of {version}, the newest version that all its campaigns have; {newest} is "
+        "newer: type `monitor identify`"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.group_sums import GroupSums
 from monitor.records import Array
-from monitor.statistics.days.block_lines import DEPENDENT, Blocks, block_lines
+from monitor.statistics.days.block_lines import DEPENDENT, BlockLines, Blocks, block_lines
 from monitor.statistics.days.seasonal_slopes import beside_season
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
@@ -46,7 +46,8 @@ class CellDrift:
 
     ``widening`` (c,) is how much wider ``u`` is than with independent groups; NaN where they were taken as such.
     ``season_p`` is the p-value of a season being all of the slope, NaN where none is asked of it; ``steepness`` the
-    slope over its uncertainty without a season.
+    slope over its uncertainty without a season. ``lines`` are those of the blocks that allow for the resemblance, None
+    where the groups were taken as independent.
     """
 
     slope: Array
@@ -55,6 +56,7 @@ class CellDrift:
     widening: Array
     season_p: Array
     steepness: Array
+    lines: BlockLines | None = None
 
 
 def _quotient(numerator: Array, denominator: Array) -> Array:
@@ -164,4 +166,5 @@ def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = N
     # Days that differ by rounding alone have no slope.
     slope = np.where((lines.slope == 0.0) & (lines.u_slope == 0.0), 0.0, slope)
     u, p_value, season_p = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal)
-    return CellDrift(slope, u, p_value, lines.widening, season_p, np.abs(_quotient(slope, lines.u_slope)))
+    steepness = np.abs(_quotient(slope, lines.u_slope))
+    return CellDrift(slope, u, p_value, lines.widening, season_p, steepness, lines)

@@ -215,10 +215,13 @@ def stored_analyses(
 
 @dataclass(frozen=True)
 class MappedRun:
-    """A run of which a map is stored: when it began (UTC) and its ``worst_um`` volumetric error."""
+    """A run of which a map is stored: when it began (UTC), its ``worst_um`` volumetric error, that one's standard
+    uncertainty and its degrees of freedom (None: not stored, and infinitely many)."""
 
     started_at: datetime
     worst_um: float
+    u_um: float | None = None
+    degrees_of_freedom: float | None = None
 
 
 def latest_maps(db: Database, machine: str | None = None) -> dict[str, float]:
@@ -233,7 +236,8 @@ def mapped_runs(db: Database, machine: str | None = None) -> dict[str, list[Mapp
     Of several maps of a run the one stored last counts. Of one ``machine`` alone where it is named."""
     rows = db.rows(
         """
-        SELECT c.machine, r.started_at, CAST((a.document ->> '$.worst.error_um') AS DOUBLE)
+        SELECT c.machine, r.started_at, CAST((a.document ->> '$.worst.error_um') AS DOUBLE),
+               CAST((a.document ->> '$.worst.u_um') AS DOUBLE), CAST((a.document ->> '$.degrees_of_freedom') AS DOUBLE)
         FROM analysis AS a JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id, run)
         WHERE a.kind IN ('volumetric map', 'partial volumetric map') AND c.campaign IS NOT NULL
               AND ($machine IS NULL OR c.machine = $machine)
@@ -243,8 +247,9 @@ def mapped_runs(db: Database, machine: str | None = None) -> dict[str, list[Mapp
         {"machine": machine},
     )
     mapped: dict[str, list[MappedRun]] = {}
-    for name, started_at, worst in rows:
-        mapped.setdefault(name, []).append(MappedRun(started_at.replace(tzinfo=UTC), float(worst)))
+    for name, started_at, worst, u, freedom in rows:
+        run = MappedRun(started_at.replace(tzinfo=UTC), float(worst), u, freedom)
+        mapped.setdefault(name, []).append(run)
     return mapped
 
 

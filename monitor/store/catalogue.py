@@ -100,10 +100,10 @@ ORDER BY campaign_id
 
 def list_campaigns(
     db: Database, machine: str | None = None, campaign: str | None = None, latest: int | None = None,
-    words: Sequence[str] = (), method: str | None = None,
+    sought: Sequence[str] = (), method: str | None = None,
 ) -> tuple[CampaignRow, ...]:  # fmt: skip
     """Return the campaigns that count, in the order of import: all, of a machine or method, of a name, with all
-    ``words`` (small letters) in name, machine or method, the ``latest`` so many of them."""
+    ``sought`` words (small letters) in name, machine or method, the ``latest`` so many of them."""
     numbers: list[int] | None = None
     if machine is not None:
         numbers = [number for number, _, _ in imported_campaigns(db, machine)]
@@ -112,8 +112,8 @@ def list_campaigns(
             number for (number,) in db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [campaign])
         }
         numbers = sorted(named if numbers is None else named.intersection(numbers))
-    if words or method is not None:
-        searched = set(_searched(db, words, method))
+    if sought or method is not None:
+        searched = set(_searched(db, sought, method))
         numbers = sorted(searched if numbers is None else searched.intersection(numbers))
     if latest is not None:
         if numbers is None:
@@ -128,12 +128,12 @@ def list_campaigns(
     return db.records(CampaignRow, _NUMBERED.format(numbers=listed))
 
 
-def _searched(db: Database, words: Sequence[str], method: str | None) -> list[int]:
+def _searched(db: Database, sought: Sequence[str], method: str | None) -> list[int]:
     """The numbers of the campaigns of a method whose name, machine or method hold every word."""
-    conditions = ["contains(lower(concat_ws(' ', campaign, machine, method)), ?)"] * len(words)
+    conditions = ["contains(lower(concat_ws(' ', campaign, machine, method)), ?)"] * len(sought)
     conditions += ["method = ?"] if method is not None else []
     query = f"SELECT campaign_id FROM campaign WHERE {' AND '.join(conditions)}"
-    return [number for (number,) in db.rows(query, [*words, *([method] if method is not None else [])])]
+    return [number for (number,) in db.rows(query, [*sought, *([method] if method is not None else [])])]
 
 
 def list_withdrawn(db: Database) -> tuple[WithdrawnCampaign, ...]:

@@ -77,21 +77,29 @@ def followed_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
     return every | {choice.method: (choice.model, choice.version) for choice in machine_models(db, machine)}
 
 
-# Machines that nobody identified by the latest version of a method's own model, by the newest one that somebody did:
-# none while each method has one version. Of ``which`` machines stands where the identifications are looked through.
+# Machines whose numbers are of an older version of a method's own model: the newest by which all their campaigns are
+# identified that any version has, else the newest that somebody identified one by. A version that has a part of them
+# would drop the others from every history. None while each method has one version. Of ``which`` machines stands where
+# the identifications are looked through.
 _OLDER = """
-SELECT i.machine, i.method, i.method AS model, max(i.model_version) AS model_version, newest.version AS newest
+SELECT of.machine, of.method, of.method AS model,
+       coalesce(max(of.model_version) FILTER (of.campaigns = every.campaigns), max(of.model_version)) AS model_version,
+       newest.version AS newest
 FROM (
     SELECT model AS method, max(version) AS version FROM model
     WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL)
     GROUP BY model HAVING max(version) > 1
 ) AS newest
 JOIN (
-    SELECT c.machine, i.method, i.model_version
-    FROM identification AS i JOIN campaign AS c USING (campaign_id) WHERE i.model = i.method {which}
-) AS i USING (method)
-ANTI JOIN v_machine_models AS chosen ON chosen.machine = i.machine AND chosen.method = i.method
-GROUP BY i.machine, i.method, newest.version HAVING max(i.model_version) < newest.version
+    SELECT c.machine, i.method, i.model_version, count(DISTINCT campaign_id) AS campaigns
+    FROM identification AS i JOIN campaign AS c USING (campaign_id) WHERE i.model = i.method {which} GROUP BY ALL
+) AS of USING (method)
+JOIN (
+    SELECT c.machine, i.method, count(DISTINCT campaign_id) AS campaigns
+    FROM identification AS i JOIN campaign AS c USING (campaign_id) WHERE i.model = i.method GROUP BY ALL
+) AS every ON every.machine = of.machine AND every.method = of.method
+ANTI JOIN v_machine_models AS chosen ON chosen.machine = of.machine AND chosen.method = of.method
+GROUP BY of.machine, of.method, newest.version HAVING model_version < newest.version
 """
 
 _CHOSEN = "SELECT machine, method, model, model_version FROM v_machine_models"
@@ -105,8 +113,8 @@ UNION ALL SELECT machine, method, model, model_version FROM ({_OLDER.format(whic
 
 @dataclass(frozen=True)
 class OlderNumbers:
-    """A machine whose numbers are of an older ``version`` of a method's own ``model``, as nobody identified it by the
-    ``newest``."""
+    """A machine whose numbers are of an older ``version`` of a method's own ``model``, as not all of its campaigns that
+    have numbers were identified by the ``newest``."""
 
     machine: str
     model: str
@@ -127,8 +135,9 @@ def older_numbers(db: Database, machine: str | None = None) -> tuple[OlderNumber
 def numbered_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
     """Name and version of the model of each method that the numbers of a machine come from.
 
-    That which it is followed by; where nobody identified it by the latest version of a method's own model, the newest
-    version that somebody did. One version a method: the values of two are never mixed.
+    That which it is followed by; where its campaigns were not all identified by the latest version of a method's own
+    model, the newest version by which all were that any version has. One version a method: the values of two are never
+    mixed.
     """
     older = {row.model: (row.model, row.version) for row in older_numbers(db, machine)}
     return followed_by(db, machine) | older

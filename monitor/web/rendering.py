@@ -83,6 +83,7 @@ def _environment() -> Environment:
         "so_far": words.so_far,
         "importing": words.importing,
         "asked_for": words.asked_for,
+        "earliest_and_latest": words.earliest_and_latest,
         "listed": words.listed,
         "what_breaks": words.what_breaks,
         "embedded": _embedded,

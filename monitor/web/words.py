@@ -24,12 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Urgency:
-    """How urgent a class of the fleet is: a colour (class of the style sheet), a shape, a word, and the next step."""
+    """How urgent a class of the fleet is: a colour (class of the style sheet), a shape, a word, and the next step,
+    which ``adjusts`` the machine by the values or not."""
 
     colour: str
     shape: str
     word: str
     next_step: str
+    adjusts: bool = False
 
 
 #: The colour of what cannot wait.
@@ -49,8 +51,23 @@ URGENCIES = dict(
                 _STOP.shape,
                 _STOP.word,
                 "stop precision work; adjust or compensate, then measure again",
+                adjusts=True,
             ),
-            Urgency(_SOON.colour, _SOON.shape, _SOON.word, "plan an adjustment before the limit is reached"),
+            Urgency(
+                _STOP.colour,
+                _STOP.shape,
+                _STOP.word,
+                "measure again now, before precision work; if it stays, adjust or compensate",
+                adjusts=True,
+            ),
+            Urgency(_SOON.colour, _SOON.shape, _SOON.word, "measure again before the next check is due"),
+            Urgency(
+                _SOON.colour,
+                _SOON.shape,
+                _SOON.word,
+                "plan an adjustment before the limit is reached",
+                adjusts=True,
+            ),
             Urgency(
                 _LOOK.colour,
                 _LOOK.shape,
@@ -124,6 +141,11 @@ def probability(p: float | None) -> str:
     return "< 0.0001" if p < 1e-4 else f"{p:.4f}"
 
 
+def percent(p: float) -> str:
+    """Return a probability in percent, without the digits that nobody reads."""
+    return "less than 0.01 %" if p < 1e-4 else f"{number(100.0 * p)} %"
+
+
 def day(moment: str | datetime | None) -> str:
     """Return the date of a moment, a dash where there is none."""
     if moment is None:
@@ -132,16 +154,23 @@ def day(moment: str | datetime | None) -> str:
     return text[:10]
 
 
+def earliest_and_latest(interval: tuple[str | None, str | None] | None) -> str:
+    """Say within which days something lies, in brackets; an end that is open is named as such."""
+    if interval is None or interval == (None, None):
+        return ""
+    first, last = interval
+    if last is None:
+        return f" ({day(first)} at the earliest, perhaps never)"
+    return f" ({day(last)} at the latest)" if first is None else f" (between {day(first)} and {day(last)})"
+
+
 def how_far(row: FleetTableRow) -> str:
     """Say how far a parameter is, in words that its class asks for."""
     unit = "" if row.unit == "1" else f" {row.unit}"
     latest = f"{number(row.latest)}{unit}"
     if row.limit is not None and row.latest is not None and row.limit > 0.0:
         share = abs(row.latest) / row.limit
-        reach = f"{latest}, {100.0 * share:.0f} % of its limit of {number(row.limit)}{unit}"
-        if row.years_to_limit is not None:
-            return f"{reach}; reached in {_span(row.years_to_limit)} at this rate"
-        return reach
+        return f"{latest}, {100.0 * share:.0f} % of its limit of {number(row.limit)}{unit}{_when_beyond(row)}"
     if row.attention is Attention.STANDS_OUT and row.mean is not None and row.latest is not None:
         return f"{latest}, where the days are at {number(row.mean)}{unit} on average"
     if row.attention is Attention.DRIFTS and row.slope_per_year is not None:
@@ -150,6 +179,19 @@ def how_far(row: FleetTableRow) -> str:
         days, runs = number(row.between_days, 2), number(row.sd_pooled, 2)
         return f"{latest}; days scatter by {days}{unit}, runs by {runs}{unit}"
     return latest
+
+
+def _when_beyond(row: FleetTableRow) -> str:
+    """Say how likely a parameter is beyond its limit, or when it will be."""
+    ahead = ""
+    if row.attention is Attention.MAY_BE_OUT and row.probability_out is not None:
+        ahead = f"; the last run is beyond it with {percent(row.probability_out)}"
+    elif row.years_to_limit is not None:
+        ahead = f"; reached in {_span(row.years_to_limit)} at this rate"
+    if row.attention is Attention.DUE and row.in_tolerance_at_next_check is not None:
+        at_check = f"in tolerance at the next check ({day(row.next_check)})"
+        ahead += f"; {at_check} with {percent(row.in_tolerance_at_next_check)}"
+    return ahead
 
 
 def since(row: FleetTableRow) -> str:

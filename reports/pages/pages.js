@@ -24,6 +24,13 @@ function plain(text) {
   return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("%", "&#37;");
 }
 
+// plotly.js empties the style attributes of a scale of colours, which our policy refuses as it refuses any that is set;
+// to remove one does the same.
+const setAttribute = Element.prototype.setAttribute;
+Element.prototype.setAttribute = function (name, value) {
+  return name === "style" && value === "" ? this.removeAttribute(name) : setAttribute.call(this, name, value);
+};
+
 function read(id) {
   const element = document.getElementById(id);
   return element === null ? null : JSON.parse(element.textContent);

@@ -8,6 +8,8 @@ hour, ``--stated``: and the R-test states that it drifts by so much; ``--pitch``
 model lacks; ``--bar``: the ball bar alone, in three planes.
 ``--told``: how often `explain` finds something, `compare` says that something is missing or that instruments disagree,
 and `contributions` has an E_n above 1; ``--first``: the first seed.
+``--certified``: what a certificate states (intervals by k_q, ellipsoid by k_p) in place of what `identify` does, with
+noise that follows the reading before, of the same instrument, by ``--follows``.
 ``--session``: three runs of a day with one bar, the first with a laser too; ``--days``: the same on three days;
 ``--apart``: the same with a length for every run. The mean of the runs with the bar alone is looked at as well, with
 the uncertainty by which `trend` compares campaigns.
@@ -27,18 +29,23 @@ import scipy
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from monitor.discovery import fit
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.records import Verdict
 from monitor.statistics.normalised_error import result_of_runs
 from monitor.store import Database, import_campaign
+from monitor.store.models import StoredModel
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.instruments.instruments import instruments
 from monitor.workflow.instruments.request import InstrumentsRequest
+from monitor.workflow.models import as_model
+from monitor.workflow.uncertainty.evaluation import evaluate_fit
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 from tests.simulator import four_instruments as shop
 
 #: The parameters that these three instruments separate, from the errors that were put in.
@@ -51,6 +58,21 @@ class Heavy(np.random.Generator):
     def normal(self, loc: float = 0.0, scale: float = 1.0, size: object = None) -> object:  # type: ignore[override]
         """Draw."""
         return loc + scale * self.standard_t(3.0, size) / np.sqrt(3.0)  # type: ignore[call-overload]
+
+
+class Following(np.random.Generator):
+    """Normal numbers of which each follows the one of its size and scale before by ``memory``: each instrument's."""
+
+    memory = 0.0
+
+    def normal(self, loc: float = 0.0, scale: float = 1.0, size: object = None) -> object:  # type: ignore[override]
+        """Draw."""
+        before: dict[object, object] = self.__dict__.setdefault("before", {})
+        value = self.standard_normal(size)  # type: ignore[call-overload]
+        if (scale, size) in before:
+            value = self.memory * before[scale, size] + np.sqrt(1.0 - self.memory**2) * value
+        before[scale, size] = value
+        return loc + scale * value
 
 
 def truth_of(rng: np.random.Generator) -> dict[str, float]:
@@ -70,6 +92,9 @@ def campaign_of(folder: Path, seed: int, options: argparse.Namespace, cycles: in
     truth = truth_of(rng)
     chain = shop.machine(shop.PITCH if options.pitch else 0.0, truth)
     noise = Heavy(np.random.PCG64([seed, 1])) if options.heavy else rng
+    if options.certified:
+        noise = Following(np.random.PCG64([seed, 2]))
+        noise.memory = options.follows
     bar = shop.ball_bar(chain, noise, step)
     parts = [bar] if options.bar else [shop.laser(chain, noise, cycles), bar, shop.r_test(chain, noise)]
     rows = [row for _, of in parts for row in of]
@@ -157,6 +182,31 @@ def told(options: argparse.Namespace) -> None:
         print(f"{what}: {count} of {options.seeds} (95 % interval {100 * low:.1f} to {100 * high:.1f} %)")
 
 
+def certified(options: argparse.Namespace) -> None:
+    """Print how often both regions of a certificate hold the truth, and how often it says that readings resemble."""
+    intervals, ellipsoids, noticed, distance = 0, 0, 0, 0.0
+    for seed in range(options.first, options.first + options.seeds):
+        with tempfile.TemporaryDirectory() as folder:
+            campaign, true = campaign_of(Path(folder) / "shop", seed, options, 1, 10.0)
+        model = StoredModel("own", 1, None, (), (), (), "", None)
+        fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
+        result = evaluate_fit(campaign, model, fitted, UncertaintyRequest(campaign.name, method="guf"))
+        stated, truth = result.framework, dict(zip(PARAMETERS, true, strict=True))
+        off = stated.estimate - np.array([truth[name] for name in stated.names])
+        square = float(off @ np.linalg.solve(stated.covariance, off))
+        intervals += bool(np.all(np.abs(off) <= stated.expanded))
+        ellipsoids += square <= stated.k_p**2
+        distance += square / len(off) / options.seeds
+        noticed += result.covariance_source.neighbours is not None
+    for what, count in (
+        ("intervals hold all", intervals), ("ellipsoid holds all", ellipsoids), ("neighbours told", noticed),
+    ):  # fmt: skip
+        low, high = scipy.stats.binomtest(count, options.seeds).proportion_ci(method="exact")
+        share = 100 * count / options.seeds
+        print(f"{what}: {count} of {options.seeds}, {share:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)")
+    print(f"mean square distance over its dimensions {distance:.2f}")
+
+
 def main() -> None:
     """Print the rates."""
     parser = argparse.ArgumentParser()
@@ -172,9 +222,14 @@ def main() -> None:
         "--days",
         "--apart",
         "--told",
+        "--certified",
     ):
         parser.add_argument(name, action="store_true")
+    parser.add_argument("--follows", type=float, default=0.0)
     options = parser.parse_args()
+    if options.certified:
+        certified(options)
+        return
     if options.session:
         sessions(options.seeds, options.apart, options.days)
         return

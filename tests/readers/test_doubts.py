@@ -302,3 +302,27 @@ def test_a_sign_is_no_mistake_where_the_machine_file_states_it(
     shutil.copy(EXAMPLES / "five-days" / "probings.csv", folder / "probings.csv")
     (doubt,) = of(folder)
     assert f"only with the other sign of {axis.lower()}_mm" in doubt
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        (
+            "pressure_hPa",
+            101325.0,
+            "pressure_hPa is 101325 in run 1 .* outside 500 to 1100\\): is the unit hPa?",
+        ),
+        ("pressure_hPa", 1.013, "pressure_hPa is 1.013 .* is the unit hPa?"),
+        ("humidity_percent", 0.45, "humidity_percent is 0.45 .* outside 1 to 100\\): is the unit percent?"),
+        ("humidity_percent", 450.0, "humidity_percent is 450 .* is the unit percent?"),
+        ("pressure_hPa", 620.0, None),
+        ("pressure_hPa", math.nan, None),
+    ],
+)
+def test_air_of_no_shop_is_told(name: str, value: float, said: str | None) -> None:
+    campaign = read_campaign(EXAMPLES / "laser")
+    assert isinstance(campaign, Campaign)
+    runs = tuple(replace(run, conditions={**run.conditions, name: value}) for run in campaign.runs)
+    told = [text for text in doubts(replace(campaign, runs=runs)) if text.startswith(name)]
+    assert len(told) == (said is not None)
+    assert said is None or re.search(said, told[0])

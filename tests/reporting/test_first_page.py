@@ -384,3 +384,27 @@ def test_a_stated_u_wider_than_the_scatter_of_its_run_is_drawn_with_ends() -> No
     drawn = trend_picture("M", wide)
     assert "bars: scatter; with ends: U" in drawn
     assert drawn.count("h18") == 2
+
+
+@pytest.mark.parametrize("missing", [True, False])
+@pytest.mark.parametrize(
+    ("verdict", "refuted_p"), [("something is missing", None), ("the model explains it", 1e-6)]
+)
+def test_nothing_is_adjusted_by_values_of_a_model_that_does_not_explain_its_readings(
+    verdict: str, refuted_p: float | None, missing: bool
+) -> None:
+    effect = MissingEffect("EXX:reversal", "a jump", "backlash", "Check the nut of X.", 6.0, None, None, ())
+    model = ModelHealth(
+        "C-1", "runs", "samba", verdict, "", 2.5, 1.0, 28.0, 1e-5, (effect,) if missing else (), 1.0, None, None, (),
+        refuted_p=refuted_p,
+    )  # fmt: skip
+    week, _ = fleet(replace(DRIFTED, model=model))
+    do = {answer.kind: answer.sentence for answer in answers(week)}["do"]
+    assert do == (
+        "Check the nut of X; then measure again now."
+        if missing
+        else "Adjust nothing by these values yet: see first what the model lacks (monitor explain C-1)."
+    )
+    explained = replace(model, verdict="the model explains it", refuted_p=None, missing=())
+    week, _ = fleet(replace(DRIFTED, model=explained))
+    assert {answer.kind: answer.sentence for answer in answers(week)}["do"].startswith("Adjust or compensate")

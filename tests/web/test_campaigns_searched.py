@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -35,3 +36,23 @@ def test_campaigns_are_searched_by_words_machine_and_method(
     assert (status, [row["campaign"] for row in answer["campaigns"]]) == (200, listed)
     refused = local.client.get("/campaigns?containing=" + "+".join("a" * 21))
     assert (refused.status_code, "containing: at most 20 words" in refused.text) == (400, True)
+
+
+def test_a_link_to_a_withdrawn_campaign_says_when_and_why(imported: Path, serve: Any, tmp_path: Path) -> None:
+    """Two of the pages said that there is no such campaign, as if there had never been one."""
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    own = serve(copy, False)
+    document = {"campaign": "hidden-spindle-growth", "reason": "wrong piece"}
+    assert own.ask("withdraw campaign", document)[0] == 200
+    for path in (
+        "campaign?name",
+        "model?campaign",
+        "map?campaign",
+        "plan?campaign",
+        "certificate/new?campaign",
+    ):
+        page = own.client.get(f"/{path}=hidden-spindle-growth")
+        assert page.status_code == 404
+        assert re.search(r"any more: it was withdrawn on 20\d\d-\d\d-\d\d \(wrong piece\)", page.text), path
+    assert "there is no campaign &#39;none&#39;; the page" in own.client.get("/campaign?name=none").text

@@ -13,7 +13,7 @@ from monitor.workflow.identify.request import IdentifyRequest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGN, EFFECT = "hidden-spindle-growth", "EZC1:const@warmup"
-SAID = "are of samba@1, the newest version that it was identified by. samba@2 is newer"
+SAID = "are of samba@1, the newest version that all its campaigns have. samba@2 is newer"
 
 
 def _complete(served: Any, address: str) -> str:

@@ -25,6 +25,7 @@ from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
+from tests.store.test_fleet import keep
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 #: Two campaigns of one method on two machines.
@@ -107,7 +108,7 @@ def test_a_trend_that_may_not_identify_has_the_same_numbers_and_says_so(shop: Pa
         values = values_of_machine(db, ValuesRequest("HU40-T"))
         ranked = _numbers(fleet(db, FleetRequest(top=0)))
     said = (
-        "the numbers of HU40-T are of samba@1, the newest version that it was identified by; samba@2 is newer: "
+        "the numbers of HU40-T are of samba@1, the newest version that all its campaigns have; samba@2 is newer: "
         "type `monitor identify`"
     )
     assert said in answer.notes
@@ -127,3 +128,32 @@ def test_the_command_line_says_it(shop: Path, capsys: pytest.CaptureFixture[str]
     said = " ".join(capsys.readouterr().out.split())
     assert "the numbers of HU40-T are of samba@1" in said
     assert "left out" not in said
+
+
+def test_one_campaign_of_two_by_the_newest_moves_nothing_and_drops_none(tmp_path: Path) -> None:
+    """Looking at one campaign identifies it by the newest version; the history of the machine stays whole."""
+    with Database(tmp_path / "monitor.duckdb", threads=1) as db:
+        save_model(db, "samba", ())
+        for campaign in ("a-1", "a-2"):
+            keep(db, "A", [[1.0, 1.1, 0.9]], campaign)
+        before = fleet(db, FleetRequest(top=0))
+        save_model(db, "samba", (EFFECT,), parent=("samba", 1))
+        _keep_by(db, "a-2", 2)
+        after = fleet(db, FleetRequest(top=0))
+        assert numbered_by(db, "A")["samba"] == ("samba", 1)
+        assert (after.table, after.left_out) == (before.table, None)
+        assert after.older_versions == {"A": (OlderVersion("samba@1", "samba@2"),)}
+        # No version has all: the newest one then, and what it lacks is named with its machine.
+        _keep_by(db, "a-3", 2)
+        part = fleet(db, FleetRequest(top=0))
+        assert (part.left_out, part.older_versions) == ({"A": ("a-1",)}, None)
+        _keep_by(db, "a-1", 2)
+        whole = fleet(db, FleetRequest(top=0))
+        assert (numbered_by(db, "A")["samba"], whole.left_out) == (("samba", 2), None)
+        assert _numbers(whole) == {("A", "EXX"): pytest.approx(5.0)}
+
+
+def _keep_by(db: Database, campaign: str, version: int) -> None:
+    """Keep an identification by another version, with values of its own."""
+    number = keep(db, "A", [[5.0, 5.1, 4.9]], campaign)
+    db.execute("UPDATE identification SET model_version = ? WHERE identification_id = ?", [version, number])

@@ -22,6 +22,7 @@ from monitor.reporting.messages import (
     numbers_of_older_version,
 )
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.attention import Attention
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
 
@@ -129,6 +130,10 @@ def _say_of_machines(answer: FleetAnswer) -> None:
 
 def _cells(row: FleetTableRow, same_hours: Container[str]) -> list[str]:
     attention = attention_words(row.attention, row.season_not_told)
+    if row.attention is Attention.MAY_BE_OUT and row.probability_out is not None:
+        attention += f", P(out) {100.0 * row.probability_out:.2g} %"
+    if row.attention is Attention.DUE and row.in_tolerance_at_next_check is not None:
+        attention += f", P(in) {100.0 * row.in_tolerance_at_next_check:.2g} %"
     return [
         str(row.rank), row.machine, row.parameter,
         f"{attention}; {SAME_HOURS}" if row.machine in same_hours else attention,

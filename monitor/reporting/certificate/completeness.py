@@ -7,10 +7,12 @@ said with a reason (``NotApplicable``).
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, RefusedResultError
+from monitor.reporting.certificate.grounds import Ground, ground_sentence
 from monitor.reporting.certificate.laboratory_keys import key_of
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord, Standard
 from monitor.reporting.certificate.results import ResultSet
@@ -60,6 +62,25 @@ class IncompleteCertificateError(InputError):
                 "the keys are those of the laboratory's file where no other is named; "
                 "`monitor certificate template` writes one with all of them"
             )
+        super().__init__("\n".join(lines))
+
+
+class RefusedGroundsError(RefusedResultError):
+    """A certificate against which ``grounds`` speak that nobody accepts; ``missing`` is what else it lacks."""
+
+    def __init__(self, grounds: Sequence[Ground], missing: Sequence[MissingItem] = ()) -> None:
+        self.grounds, self.missing = tuple(grounds), tuple(missing)
+        texts = texts_of()
+        kinds = dict.fromkeys(ground.kind for ground in grounds)
+        options = " ".join(f"--accept {kind}=REASON" for kind in kinds)
+        lines = [
+            "the certificate is refused:",
+            *(f"  {ground.kind}: {ground_sentence(ground, texts)}" for ground in grounds),
+            "Correct what is wrong; or, where the laboratory can answer for it, say why, which is printed on the "
+            f"certificate: {options}",
+        ]
+        if missing:
+            lines += ["and besides it lacks:", *(f"  {gap}" for gap in missing)]
         super().__init__("\n".join(lines))
 
 

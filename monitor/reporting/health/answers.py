@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from monitor.reporting.adjusting import SEE_FIRST, adjusting
 from monitor.reporting.health.comparison import MissingEffect
 from monitor.reporting.health.concern import DRIFT_P, binding_shares, concern, likeliest_out, volumetric_binds
 from monitor.reporting.health.news import CheckKind, NextCheck
@@ -117,7 +118,7 @@ def _out(health: MachineHealth) -> str:
         if (moves := _moves(parameter, parameter.drift))
     ]
     missing = _first_missing(health)
-    if missing is not None and health.state is State.MAY_BE_OUT_OF_TOLERANCE:
+    if missing is not None and health.state in (State.OUT_OF_TOLERANCE, State.MAY_BE_OUT_OF_TOLERANCE):
         sentences.append(
             f"the model lacks {missing.meaning} ({missing.effect}), and its lack of fit is part of what is uncertain"
         )
@@ -248,9 +249,11 @@ def to_do(health: MachineHealth) -> str:
             _shares(health, shares) if shares else "what makes the volumetric error (monitor map names it)"
         )
     action = {
-        State.OUT_OF_TOLERANCE: f"adjust or compensate {wrong} and measure again",
+        State.OUT_OF_TOLERANCE: _adjusting(health, f"adjust or compensate {wrong} and measure again"),
         State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {judged} is too near its limit to be judged",
-        State.DRIFTS: f"state a tolerance for {name}, or compensate it; measure again as planned",
+        State.DRIFTS: _adjusting(
+            health, f"state a tolerance for {name}, or compensate it; measure again as planned"
+        ),
         State.NOT_EVALUATED: "mend what its page names and measure again",
         State.CHANGED: "find out what was done or happened then, record it as an event, and measure again",
         State.SUSPECT_DATA: "look at the points that its page names and measure again",
@@ -262,6 +265,8 @@ def to_do(health: MachineHealth) -> str:
         action = f"{missing.remedy.rstrip('.')}; then measure again"
     elif health.state is State.MODEL_FAILS and health.model is not None:
         action = "look at its page for where the model fails, and measure again"
+    elif SEE_FIRST in action:
+        return _sentence(action)
     elif is_due(health):
         return _sentence(f"measure it again {_after_colon(str(health.next_check))}")
     when = (
@@ -270,6 +275,16 @@ def to_do(health: MachineHealth) -> str:
         else f"(next check: {_after_colon(str(health.next_check))})"
     )
     return _sentence(f"{action} {when}")
+
+
+def _adjusting(health: MachineHealth, action: str) -> str:
+    """What adjusts by the values of a machine, or what comes before it; with the command that says what is missing."""
+    model = health.model
+    if model is None:
+        return action
+    missing = _first_missing(health)
+    action = adjusting(action, is_doubted=model.is_doubted, remedy="" if missing is None else missing.remedy)
+    return f"{action} (monitor explain {model.campaign})" if action == SEE_FIRST else action
 
 
 def _after_colon(check: str) -> str:

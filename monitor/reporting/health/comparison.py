@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED, Said
+from monitor.records import Verdict
 
 
 @dataclass(frozen=True)
@@ -103,3 +104,8 @@ class ModelHealth:
     steps: tuple[ErrorStep, ...]
     unchanged: tuple[str, ...] = field(default=(), metadata=OMITTED)
     refuted_p: float | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether the values of the model may hold a part of what it lacks."""
+        return self.refuted_p is not None or self.verdict == Verdict.SOMETHING_IS_MISSING.value

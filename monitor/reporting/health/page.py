@@ -298,6 +298,8 @@ def _drift(parameter: ParameterHealth) -> str:
     sentence = f"{slope} ({low} to {high}) {parameter.unit}/year"
     if parameter.drift.season_not_told and parameter.drift.p_value < _DRIFT_P:
         sentence += f"; {DRIFT_OR_SEASON}"
+    if parameter.out_since is not None:
+        return f"{sentence}; beyond its tolerance since {parameter.out_since:%Y-%m-%d}"
     if parameter.drift.crosses_at is not None:
         first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""

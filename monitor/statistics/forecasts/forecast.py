@@ -68,10 +68,13 @@ def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
     return line.level_at + line.slope * t, of_line, np.hypot(of_line, line.run_sd)
 
 
-def _crossing(line: Trend, limit: float, origin: float, horizon: float) -> Crossing:
-    """Return the first time from ``origin`` on at which the line, and each side of its band, reaches the limit."""
+def _crossing(line: Trend, limit: float, side: float, origin: float, horizon: float) -> Crossing:
+    """Return the first time from ``origin`` on at which the line, and each side of its band, reaches the limit.
+
+    ``side`` is 1.0 for an upper and -1.0 for a lower limit: a line that lies beyond it has reached it, at
+    ``origin``, and does not reach it when it comes back.
+    """
     factor = float(-scipy.special.stdtrit(line.dof, (1.0 - line.confidence) / 2.0))
-    side = 1.0 if limit > float(predict(line, origin)[0]) else -1.0
     grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)]) * (horizon - origin)
 
     def first(multiple: float) -> float:
@@ -127,7 +130,11 @@ def forecast(
     end = origin + 20.0 * max(origin - line.at, 1e-9) if horizon is None else float(horizon)
     if not end > origin:
         raise DataError(f"horizon is {end}; it must lie after now, {origin}.")
-    sides = [_crossing(line, limit, origin, end) for limit in (lower, upper) if np.isfinite(limit)]
+    sides = [
+        _crossing(line, limit, side, origin, end)
+        for limit, side in ((lower, -1.0), (upper, 1.0))
+        if np.isfinite(limit)
+    ]
     sides.sort(key=lambda c: (np.inf if c.at is None else c.at, c.interval[0]))
     grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 2000)]) * (end - origin)
     out = np.flatnonzero(_probability(line, grid, lower, upper) < reliability)

@@ -105,7 +105,8 @@ class FleetSums(GroupSums):
     some overlap. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it
     are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
     without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
-    it).
+    it). ``last_value`` and ``last_u`` are of the last run of the machine (NaN where the parameter was refused there),
+    ``check_d`` is when it is measured next, as far after its last run as its campaigns lie apart (days since 1970).
     """
 
     machine: npt.NDArray[np.str_]
@@ -127,6 +128,9 @@ class FleetSums(GroupSums):
     since_d: Array
     first_d: Array
     beyond_d: Array
+    last_value: Array
+    last_u: Array
+    check_d: Array
     repeated_sums: RepeatedSums
     temperatures: TemperatureSums
     blocks: FleetBlocks
@@ -140,6 +144,7 @@ def fleet_sums(
     *,
     cut: BlockCut,
     limits: Mapping[tuple[str, str], float] = MappingProxyType({}),
+    apart_d: float = 30.0,
 ) -> FleetSums:
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
@@ -148,15 +153,20 @@ def fleet_sums(
     a machine refused both in its first campaign and on its last day has zero for its origin and loses
     2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
     ``cut`` says how the history of a machine is cut into blocks, ``limits`` of the absolute value by machine and
-    parameter are in display units. Raises NotFoundError where nothing was identified.
+    parameter are in display units, ``apart_d`` is when a machine of one campaign is measured next. Raises
+    NotFoundError where nothing was identified.
     """
     with db.reading():
-        epoch_d, columns, of_blocks, same_hours = _summed(db, (model, version), cut, limits)
+        epoch_d, columns, of_blocks, same_hours = _summed(db, (model, version), cut, limits, apart_d)
     return _sums(columns, _blocks(of_blocks, columns), epoch_d, same_hours)
 
 
 def _summed(
-    db: Database, of: tuple[str | None, int | None], cut: BlockCut, limits: Mapping[tuple[str, str], float]
+    db: Database,
+    of: tuple[str | None, int | None],
+    cut: BlockCut,
+    limits: Mapping[tuple[str, str], float],
+    apart_d: float,
 ) -> tuple[float, dict[str, Any], dict[str, Any], tuple[GroupHours, ...]]:
     """Return first day, columns of all cells and of their blocks, and the groups of machines of which some overlap.
 
@@ -183,7 +193,8 @@ def _summed(
         db.execute(statement)
     for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
         db.execute(statement)
-    for statement in (queries.SHOWN, queries.LIMITS):
+    db.set_variables({"apart": apart_d})
+    for statement in (queries.LAST_RUN, queries.CHECKS, queries.SHOWN, queries.LIMITS):
         db.execute(statement)
     if limits:
         names = {"machines": [machine for machine, _ in limits], "parameters": [name for _, name in limits]}
@@ -259,6 +270,9 @@ def _sums(
         since_d=number["since_d"],
         first_d=epoch_d + number["t_first"],
         beyond_d=number["beyond_d"],
+        last_value=number["last_value"] / f,
+        last_u=number["last_u"] / f,
+        check_d=number["check_d"],
         repeated_sums=RepeatedSums(
             runs=number["runs_rep"],
             offset=number["offset_rep"] / f,

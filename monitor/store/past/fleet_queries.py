@@ -243,6 +243,39 @@ SELECT cell, max(began_d) AS began_d, flatten(list(x)) AS x,
 FROM ({LISTS.format(groups="last")}) GROUP BY cell
 """
 
+# Of every parameter the value and the standard uncertainty of the last run of its machine, whatever happened since.
+LAST_RUN = f"""
+CREATE OR REPLACE TEMP TABLE fleet_last_run AS
+WITH last AS (
+    SELECT machine_no, arg_max(identification_id, ended_d) AS identification_id, arg_max(heading, ended_d) AS heading,
+           arg_max(campaign_id, ended_d) AS campaign_id
+    FROM fleet_chosen GROUP BY machine_no
+), ends AS (
+    SELECT campaign_id, arg_max(run, started_at) AS run FROM run SEMI JOIN last USING (campaign_id) GROUP BY campaign_id
+)
+SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, x AS last_value, u AS last_u
+FROM (
+    SELECT machine_no, unnest(h.numbers) AS k, unnest(list_transform(v.value, lambda xs: xs[place])) AS x,
+           unnest(list_transform(v.u, lambda us: us[place])) AS u
+    FROM (
+        SELECT last.*, list_position(v.runs, run) AS place, v.value, v.u
+        FROM last JOIN ends USING (campaign_id) JOIN identified_values AS v USING (identification_id)
+    ) AS v JOIN fleet_heading AS h USING (heading)
+)
+"""
+
+# When each machine is measured next: as far after its last run as the beginnings of its campaigns lie apart, as in
+# `monitor trend`.
+CHECKS = """
+CREATE OR REPLACE TEMP TABLE fleet_check AS
+WITH apart AS (
+    SELECT machine_no, ended_d, began_d - lag(began_d) OVER (PARTITION BY machine_no ORDER BY began_d) AS apart_d
+    FROM fleet_chosen
+)
+SELECT machine_no, max(ended_d) + coalesce(median(apart_d), getvariable('apart')) AS check_d
+FROM apart GROUP BY machine_no
+"""
+
 # Limits of the absolute values, in display units.
 LIMITS = "CREATE OR REPLACE TEMP TABLE fleet_limit (machine VARCHAR, parameter VARCHAR, most DOUBLE)"
 LIMITED = "INSERT INTO fleet_limit SELECT unnest($machines), unnest($parameters), unnest($limits)"
@@ -351,6 +384,7 @@ SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        coalesce(l.latest_n, 0) AS latest_n, coalesce(l.latest_k, 0) AS latest_k, coalesce(l.latest_m, 0.0) AS latest_m,
        coalesce(l.latest_mm, 0.0) AS latest_mm, coalesce(e.since_d, 'nan') AS since_d,
        coalesce(b.beyond_d, 'nan') AS beyond_d,
+       coalesce(r.last_value, 'nan') AS last_value, coalesce(r.last_u, 'nan') AS last_u, c.check_d,
        coalesce(h.channel, '') AS thermometer
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}
@@ -358,6 +392,8 @@ JOIN fleet_origin AS o USING (cell)
 LEFT JOIN latest AS l USING (cell)
 LEFT JOIN fleet_since AS e ON e.machine_no = m.machine_no
 LEFT JOIN fleet_beyond AS b USING (cell)
+LEFT JOIN fleet_last_run AS r USING (cell)
+JOIN fleet_check AS c ON c.machine_no = m.machine_no
 LEFT JOIN fleet_thermometer AS h ON h.machine_no = m.machine_no
 JOIN fleet_shown AS s ON s.k = p.cell & ((1 << {PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
@@ -385,6 +421,8 @@ TABLES = (
     "blocked",
     "since",
     "latest",
+    "last_run",
+    "check",
     "shown",
     "limit",
     "beyond",

@@ -14,7 +14,8 @@ from monitor.web.forms import whole_number
 from monitor.web.rendering import page
 
 if TYPE_CHECKING:
-    from monitor.workflow.intake.campaigns import RunsAnswer
+    from monitor.store import CampaignRow
+    from monitor.workflow.intake.campaigns import CampaignsAnswer, RunsAnswer
     from monitor.workflow.run_statistics.answer import StatisticsAnswer
     from monitor.workflow.uncertainty.answer import UncertaintyAnswer
     from monitor.workflow.uncertainty.cloud import CloudAnswer
@@ -49,9 +50,7 @@ def routes() -> APIRouter:
     ) -> Response:
         """Show a campaign; two of its parameters with the regions that hold all of them."""
         ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
-        row = next(iter(ask(user, "campaigns", {"campaign": name}).campaigns), None)
-        if row is None:
-            raise NotFoundError(f"there is no campaign '{name}'; the page Campaigns lists them")
+        row = named_campaign(request, name)
         if row.rows is not None:
             return page(request, "curve.html", row=row)
         runs: RunsAnswer = ask(user, "runs", {"campaign": name})
@@ -78,6 +77,20 @@ def routes() -> APIRouter:
         )  # fmt: skip
 
     return router
+
+
+def named_campaign(request: Request, name: str) -> CampaignRow:
+    """Return the campaign of a name. Raises NotFoundError, which says when and why it was withdrawn if it was."""
+    answer: CampaignsAnswer = request.app.state.asker(request.state.user, "campaigns", {"campaign": name})
+    if answer.campaigns:
+        return answer.campaigns[0]
+    withdrawn = "".join(
+        f" any more: it was withdrawn on {row.withdrawn_at:%Y-%m-%d} ({row.reason})"
+        for row in answer.withdrawn[-1:]
+    )
+    raise NotFoundError(
+        f"there is no campaign '{name}'{withdrawn}; the page Campaigns lists those that count"
+    )
 
 
 def _regions_asked(

@@ -6,12 +6,14 @@ import base64
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
+from monitor.reporting.adjusting import adjusting
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
@@ -60,7 +62,8 @@ class MachineRow:
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
     numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it: numbers that
     ask for nothing do not make such a machine usual. ``same_hours`` are campaigns that it cannot all have made, of
-    which its numbers are mixed. ``topology`` and ``parameters`` name the parameters."""
+    which its numbers are mixed, ``left_out`` those without a part in them. ``topology`` and ``parameters`` name the
+    parameters."""
 
     machine: str
     plant: str
@@ -74,13 +77,17 @@ class MachineRow:
     latest: str
     unexplained: str = ""
     same_hours: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
     topology: str = ""
     parameters: frozenset[str] = frozenset()
 
     @property
     def next_step(self) -> str:
         """What its class asks for; where its numbers are mixed only what cannot wait until the campaign is chosen."""
-        return "" if self.same_hours and self.urgency.colour != STOP else self.urgency.next_step
+        if self.same_hours and self.urgency.colour != STOP:
+            return ""
+        is_doubted = self.urgency.adjusts and bool(self.unexplained)
+        return adjusting(self.urgency.next_step, is_doubted=is_doubted)
 
 
 def machine_rows(
@@ -88,6 +95,7 @@ def machine_rows(
     described: Mapping[str, Mapping[str, Any]],
     unexplained: Mapping[str, str],
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]],
+    left_out: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> list[MachineRow]:
     """Return a row a machine, in the order of the table, which has the most urgent first."""
     rows: dict[str, list[FleetTableRow]] = {}
@@ -113,6 +121,7 @@ def machine_rows(
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
             unexplained=unexplained.get(machine, ""),
             same_hours=tuple(name for group in same_hours.get(machine, ()) for name in group),
+            left_out=left_out.get(machine, ()),
             topology=str(described.get(machine, {}).get("topology") or ""),
             parameters=frozenset(row.parameter for row in of_machine),
         )
@@ -184,7 +193,9 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
         refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
         unexplained = {**(answer.models_lacking or {}), **refuted}
         by_name = {str(row["machine"]): row for row in _described(machines)}
-        rows = machine_rows(answer.table, by_name, unexplained, answer.same_hours or {})
+        rows = machine_rows(
+            answer.table, by_name, unexplained, answer.same_hours or {}, answer.left_out or {}
+        )
     rows += unnumbered_rows(machines, {row.machine for row in rows})
     ranks = {label: rank for rank, label in enumerate(CLASSES)}
     return sorted(rows, key=lambda row: ranks[row.attention])

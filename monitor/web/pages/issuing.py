@@ -7,26 +7,28 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
-from monitor.reporting.certificate.completeness import IncompleteCertificateError, MissingItem
+from monitor.reporting.certificate.completeness import (
+    IncompleteCertificateError,
+    MissingItem,
+    RefusedGroundsError,
+)
 from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
 from monitor.web.laboratory_form import box_of, form_words, groups, laboratory_file, texts_of_file
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
 from monitor.web.users import User
-
-if TYPE_CHECKING:
-    from monitor.workflow.certificate.grounds import RefusedGroundsError
 
 #: The largest laboratory's file that fills the form.
 FILE_BYTES = 2**20
@@ -145,6 +147,7 @@ def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Res
     from monitor.workflow.certificate.request import METHODS, RULES
 
     campaign = texts.get("campaign", "")
+    named_campaign(request, campaign)
     runs = request.app.state.asker(request.state.user, "runs", {"campaign": campaign}).runs
     return page(
         request, "certificate_new.html", status=outcome.refusal.status if outcome.refusal else 200,
@@ -198,9 +201,6 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
 
 def _refused(error: MonitorError, folder: str) -> _Outcome:
     """The refusal in words, and at every box that it names what is missing there."""
-    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
-    from monitor.workflow.certificate.grounds import RefusedGroundsError
-
     if isinstance(error, RefusedGroundsError):
         return _refused_by_grounds(error)
     refusal = refusal_of(error, {f"{folder}/": ""} if folder else {})

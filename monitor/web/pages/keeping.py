@@ -46,17 +46,7 @@ def routes() -> APIRouter:
         """List what is being computed."""
         return page(request, "work.html", tickets=request.app.state.desk.under_way())
 
-    @router.get("/work/state")
-    async def state(request: Request, number: int) -> Response:
-        """Say whether work is under way still (202) or not (200): a page that waits asks this and is not made anew."""
-        desk: Desk = request.app.state.desk
-        ticket = next((ticket for ticket in desk.under_way() if ticket.number == number), None)
-        if ticket is not None:
-            await ticket.settled(ticket.seconds + HELD_S)
-        if ticket is None or ticket.future.done():
-            return JSONResponse({}, 200)
-        told = {"at": importing(ticket), "done": len(ticket.said) - 1} if ticket.said else {}
-        return JSONResponse({"so_far": so_far(ticket), **told}, 202)
+    router.get("/work/state")(_state)
 
     @router.post("/work/cancel")
     async def cancel(request: Request) -> Response:
@@ -104,6 +94,18 @@ def routes() -> APIRouter:
         return page(request, "interface.html", questions=questions)
 
     return router
+
+
+async def _state(request: Request, number: int) -> Response:
+    """Say whether work is under way still (202) or not (200): a page that waits asks this and is not made anew."""
+    desk: Desk = request.app.state.desk
+    ticket = next((ticket for ticket in desk.under_way() if ticket.number == number), None)
+    if ticket is not None:
+        await ticket.settled(ticket.seconds + HELD_S)
+    if ticket is None or ticket.future.done():
+        return JSONResponse({}, 200)
+    at_folder = {"at": importing(ticket), "done": len(ticket.said) - 1} if ticket.said else {}
+    return JSONResponse({"so_far": so_far(ticket), **at_folder}, 202)
 
 
 def _said(docstring: str) -> str:

@@ -91,14 +91,7 @@ def routes() -> APIRouter:
             refused=form,
         )  # fmt: skip
 
-    @router.get("/machine/values.csv")
-    def values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
-        """Send the values of a machine, a row a run, units in the column names."""
-        values: ValuesAnswer = request.app.state.asker(
-            request.state.user, "values", _period(name, since, until)
-        )
-        return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
-
+    router.get("/machine/values.csv")(_values_csv)
     router.get("/machine/parameters")(_table_of_all)
     router.get("/machine/periods")(_two_periods)
 
@@ -128,6 +121,12 @@ def _moment(request: Request, machine: str, text: str) -> datetime:
     typed = typed_moment("when it happened", text, UTC)
     nearest = min(values.started_at, key=lambda started: abs(started - typed), default=None)
     return typed_moment("when it happened", text, None if nearest is None else nearest.tzinfo)
+
+
+def _values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
+    """Send the values of a machine, a row a run, units in the column names."""
+    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", _period(name, since, until))
+    return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
 
 
 async def _table_of_all(

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError
 from monitor.web.charts.residuals import (
     MAGNIFICATIONS,
     driver_chart,
@@ -23,6 +23,7 @@ from monitor.web.charts.residuals import (
 )
 from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import Form, asked_once, read_form, whole_number
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
 from monitor.web.words import listed
 
@@ -52,9 +53,7 @@ def routes() -> APIRouter:
         from monitor.workflow.explain.explain_answer import MachineExplanation
 
         ask, user = request.app.state.asker, request.state.user
-        row = next(iter(ask(user, "campaigns", {"campaign": campaign}).campaigns), None)
-        if row is None:
-            raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
+        row = named_campaign(request, campaign)
         answers = _Answers(request, campaign, model, effect, driver, in_machine=row.rows is None)
         compare, explanation = answers.compare, answers.explanation
         missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()

@@ -13,6 +13,7 @@ from starlette.responses import Response
 from monitor.exceptions import InputError
 from monitor.web.charts.plan import plan_chart
 from monitor.web.forms import whole_number
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import page
 
 #: A field of the form that asks for the standard uncertainty of a parameter begins so.
@@ -29,6 +30,7 @@ def routes() -> APIRouter:
         # Loaded where it is met: whoever opens the first page waits for what is loaded before.
         from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, InstrumentPlanAnswer
 
+        named_campaign(request, campaign)
         query, user, desk = request.query_params, request.state.user, request.app.state.desk
         present: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
         document, wrong = present, ""

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from monitor.web.charts.volumetric import slice_charts, vectors_chart
 from monitor.web.forms import whole_number
+from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import page
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def routes() -> APIRouter:
         numbers = {"run": run, "minus": minus, "pose": pose, "points": points}
         asked = {name: whole_number(name, text) for name, text in numbers.items() if text}
         document = {"campaign": campaign, **asked, **({"absolute": True} if absolute else {})}
+        named_campaign(request, campaign)
         runs: RunsAnswer = request.app.state.asker(user, "runs", {"campaign": campaign})
         ticket = desk.ask(user, "map over the stroke", document)
         answer, refusal, waiting = ticket.outcome()

@@ -4,35 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from monitor.exceptions import InputError, RefusedResultError
+from monitor.exceptions import InputError
 from monitor.records import Campaign
-from monitor.reporting.certificate.completeness import MissingItem
-from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind, ground_sentence
-from monitor.reporting.texts import texts_of
+from monitor.reporting.certificate.completeness import RefusedGroundsError
+from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind
 from monitor.store import StoredModel
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 #: Grounds of one run that speak against the others too, whose covariance is pooled with it.
 OF_ANY_RUN = (GroundKind.UNITS, GroundKind.GROSS_READINGS)
-
-
-class RefusedGroundsError(RefusedResultError):
-    """A certificate against which ``grounds`` speak that nobody accepts; ``missing`` is what else it lacks."""
-
-    def __init__(self, grounds: Sequence[Ground], missing: Sequence[MissingItem] = ()) -> None:
-        self.grounds, self.missing = tuple(grounds), tuple(missing)
-        texts = texts_of()
-        kinds = dict.fromkeys(ground.kind for ground in grounds)
-        options = " ".join(f"--accept {kind}=REASON" for kind in kinds)
-        lines = [
-            "the certificate is refused:",
-            *(f"  {ground.kind}: {ground_sentence(ground, texts)}" for ground in grounds),
-            "Correct what is wrong; or, where the laboratory can answer for it, say why, which is printed on the "
-            f"certificate: {options}",
-        ]
-        if missing:
-            lines += ["and besides it lacks:", *(f"  {gap}" for gap in missing)]
-        super().__init__("\n".join(lines))
 
 
 def grounds_against(
@@ -59,12 +39,12 @@ def grounds_against(
     return tuple(sorted(grounds, key=lambda ground: ground.kind not in OF_ANY_RUN))
 
 
-def accepted_grounds(
+def judged_grounds(
     grounds: Sequence[Ground], reasons: Mapping[GroundKind, str]
-) -> tuple[AcceptedGround, ...]:
-    """The grounds with the reasons for which they are accepted.
+) -> tuple[tuple[AcceptedGround, ...], tuple[Ground, ...]]:
+    """The grounds that are accepted, with the reasons, and those that nobody accepts.
 
-    Raises RefusedGroundsError naming every ground that is not, InputError for one that is accepted and not there.
+    Raises InputError for one that is accepted and not there.
     """
     by_kind: dict[GroundKind, list[Ground]] = {}
     for ground in grounds:
@@ -75,6 +55,22 @@ def accepted_grounds(
             f"--accept {absent[0]}: there is nothing to accept, no such ground speaks against this certificate"
         )
     refused = [ground for kind, of_kind in by_kind.items() if kind not in reasons for ground in of_kind]
+    accepted = [
+        AcceptedGround(kind, tuple(of_kind), reasons[kind])
+        for kind, of_kind in by_kind.items()
+        if kind in reasons
+    ]
+    return tuple(accepted), tuple(refused)
+
+
+def accepted_grounds(
+    grounds: Sequence[Ground], reasons: Mapping[GroundKind, str]
+) -> tuple[AcceptedGround, ...]:
+    """The grounds with the reasons for which they are accepted.
+
+    Raises RefusedGroundsError naming every ground that is not, InputError for one that is accepted and not there.
+    """
+    accepted, refused = judged_grounds(grounds, reasons)
     if refused:
         raise RefusedGroundsError(refused)
-    return tuple(AcceptedGround(kind, tuple(of_kind), reasons[kind]) for kind, of_kind in by_kind.items())
+    return accepted

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import date
 from typing import Literal
 
@@ -12,9 +12,8 @@ from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
-from monitor.reporting.certificate.completeness import missing_items
+from monitor.reporting.certificate.completeness import RefusedGroundsError, missing_items
 from monitor.reporting.certificate.dcc_elements import NEWEST
-from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord
@@ -35,7 +34,7 @@ from monitor.workflow.certificate.certified import CertifiedRun, certified_run, 
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.effects import effects_of
 from monitor.workflow.certificate.files import finish_left, keep_issued, path_of, prepared, publish
-from monitor.workflow.certificate.grounds import RefusedGroundsError, accepted_grounds, grounds_against
+from monitor.workflow.certificate.grounds import grounds_against, judged_grounds
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
     check_adjustment,
@@ -80,13 +79,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     grounds = grounds_against(campaign, model, stored)
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
-    accepted: tuple[AcceptedGround, ...] = ()
-    refused = None
-    try:
-        accepted = accepted_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
-    except RefusedGroundsError as refusal:
-        # Who has to answer for it hears at once what else is missing.
-        refused = refusal
+    accepted, refused = judged_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
     inputs = inputs_of(runs, request.asked, request.fonts)
     effects = [effects_of(db, run.evaluated) for run in runs]
 
@@ -107,13 +100,23 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
             dcc_version=_dcc_version(request, stated),
         )
 
-    if refused is not None:
-        missing = missing_items(recorded(request.number or next_number(db, day.year)))
-        raise RefusedGroundsError(refused.grounds, missing) from refused
+    if refused:
+        # Who has to answer for it hears at once what else is missing.
+        raise RefusedGroundsError(
+            refused, missing_items(recorded(request.number or next_number(db, day.year)))
+        )
+    return _numbered(db, request, recorded, inputs, day.year)
+
+
+def _numbered(
+    db: Database, request: CertificateRequest, recorded: Callable[[str], CertificateRecord],
+    inputs: CertificateInputs, year: int,
+) -> CertificateFileAnswer:  # fmt: skip
+    """Issue the record of the wanted number, or of the next one of the year that is free when it is stored."""
     for _ in range(_NUMBERS):
         # Nobody waits while a page is rendered; whoever was quicker has the number, and this one takes the next.
         with contextlib.suppress(TakenNumberError):
-            return _issued(db, request, recorded(request.number or next_number(db, day.year)), inputs)
+            return _issued(db, request, recorded(request.number or next_number(db, year)), inputs)
     raise InputError(
         f"{_NUMBERS} free numbers in turn were given to other certificates; type the command again"
     )

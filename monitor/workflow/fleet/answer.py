@@ -18,7 +18,9 @@ class FleetTableRow:
     ``temperature`` is the recorded one that is fitted beside the slope; left out where none is. ``season_not_told``: a
     yearly season can be all of the slope, the history is too short to tell. ``refers_to`` says in words what the
     parameter is stated relative to, where it is an error of the chain. ``since`` is the last event: what is judged
-    begins with it. ``onset`` is the moment since which the row holds, by ``onset_is``.
+    begins with it. ``onset`` is the moment since which the row holds, by ``onset_is``. ``probability_out`` is that of
+    the last run to lie beyond the limit, ``in_tolerance_at_next_check`` that of a run at the ``next_check`` not to;
+    left out where there is no limit, the second where the history is too short to foretell anything.
     """
 
     rank: int
@@ -53,13 +55,16 @@ class FleetTableRow:
     refers_to: str | None = field(default=None, metadata=OMITTED)
     onset: str | None = field(default=None, metadata=OMITTED)
     onset_is: Onset | None = field(default=None, metadata=OMITTED)
+    probability_out: float | None = field(default=None, metadata=OMITTED)
+    in_tolerance_at_next_check: float | None = field(default=None, metadata=OMITTED)
+    next_check: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class OlderVersion:
     """The version of a model (``NAME@VERSION``) that the numbers of a machine come from, and the ``newest``.
 
-    Nobody identified the machine by that yet.
+    Not all of its campaigns were identified by that yet.
     """
 
     model: str
@@ -72,8 +77,9 @@ class FleetAnswer:
 
     ``not_identified`` are campaigns without numbers under the model that the numbers of their machine come from: they
     have no part in it. ``older_versions`` by machine say where these are of an older version than the newest of the
-    method's own model, as nobody identified the machine by that yet. ``tolerances_of_type`` names
-    the machine type by machine, where its campaign states no tolerances.
+    method's own model, as not all of its campaigns were identified by that yet. ``left_out`` names by machine with
+    numbers the campaigns that have no part in them. ``tolerances_of_type`` names the machine
+    type by machine, where its campaign states no tolerances.
     ``without_numbers`` are machines of which no run has numbers, which no row stands for; not said of a model that was
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
@@ -95,5 +101,6 @@ class FleetAnswer:
     models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     older_versions: Mapping[str, tuple[OlderVersion, ...]] | None = field(default=None, metadata=OMITTED)
+    left_out: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     simulated: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]] | None = field(default=None, metadata=OMITTED)

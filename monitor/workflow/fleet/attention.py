@@ -9,6 +9,8 @@ class Attention(StrEnum):
     """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
 
     OUT = "out of tolerance"
+    MAY_BE_OUT = "may be out of tolerance"
+    DUE = "may be out of tolerance at the next check"
     DRIFTS_OUT = "drifts out of tolerance within a year"
     STANDS_OUT = "the latest day stands out"
     DRIFTS = "drifts"

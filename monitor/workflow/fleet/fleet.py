@@ -19,6 +19,7 @@ from monitor.store import (
     Database,
     FleetSums,
     GroupHours,
+    campaign_machines,
     fleet_sums,
     latest_frames,
     latest_tolerances,
@@ -40,11 +41,12 @@ from monitor.workflow.fleet.ranking import (
     cell_tests,
     means_p,
     ranked,
-    split_times,
     warmth_beside,
 )
 from monitor.workflow.fleet.request import FleetRequest
+from monitor.workflow.fleet.steps import split_times
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
+from monitor.workflow.history.forecast import NEXT_CHECK_D
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
 from monitor.workflow.history.runs import overlapping
 from monitor.workflow.models import label_of, resolve
@@ -82,7 +84,7 @@ class _Cells:
         sums, attention = self.sums, ATTENTION[int(self.ranking.kind[index])]
         if attention is Attention.OUT and np.isfinite(sums.beyond_d[index]):
             return float(sums.beyond_d[index]), Onset.BEYOND
-        if attention in (Attention.OUT, Attention.STANDS_OUT):
+        if attention in (Attention.OUT, Attention.MAY_BE_OUT, Attention.STANDS_OUT):
             return float(sums.last_d[index]), Onset.LATEST
         if attention is Attention.DAYS_DIFFER:
             return float(self.differs_d[index]), Onset.DIFFERS
@@ -120,7 +122,10 @@ class _Cells:
             latest_at=_date(float(self.sums.last_d[index])),
             since=_date(float(self.sums.since_d[index])),
             limit=_number(self.limit[index]),
-            years_to_limit=_number(self.ranking.years[index]) if self.ranking.kind[index] == 1 else None,
+            years_to_limit=_number(self.ranking.years[index]),
+            probability_out=_number(self.ranking.near.out[index]),
+            in_tolerance_at_next_check=_number(self.ranking.near.inside[index]),
+            next_check=_date(self.sums.check_d[index]) if np.isfinite(self.limit[index]) else None,
             temperature=str(self.sums.temperatures.thermometer[index]) if self.warmth[index] else None,
             season_not_told=True if self.drift.season_p[index] >= REFUTED else None,
             onset=_date(onset),
@@ -176,8 +181,15 @@ def _by_their_own_models(db: Database, model: str | None, numbered: Container[st
     """
     if model is not None:
         return {"not_identified": ()}
+    without = without_part(db)
+    machine_of = campaign_machines(db) if without else {}
+    left_out: dict[str, tuple[str, ...]] = {}
+    for campaign in without:
+        if (machine := machine_of[campaign]) in numbered:
+            left_out[machine] = (*left_out.get(machine, ()), campaign)
     return {
-        "not_identified": without_part(db),
+        "not_identified": without,
+        "left_out": left_out or None,
         "models_lacking": unexplained_machines(db) or None,
         "without_numbers": _without_numbers(db, numbered) or None,
         "older_versions": _older_versions(db) or None,
@@ -231,7 +243,7 @@ def _cells_of(db: Database, model: str | None) -> _Cells:
     stored = None if model is None else resolve(db, model)
     name, version = (None, None) if stored is None else (stored.name, stored.version)
     limits = latest_tolerances(db)
-    sums = fleet_sums(db, name, version, cut=CUT, limits=limits)
+    sums = fleet_sums(db, name, version, cut=CUT, limits=limits, apart_d=NEXT_CHECK_D)
     cells, drift = cell_tests(sums)
     keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
     limit = np.array([limits.get(key, np.nan) for key in keys])

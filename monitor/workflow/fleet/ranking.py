@@ -22,6 +22,8 @@ from monitor.statistics.sufficient import (
 )
 from monitor.store import BlockCut, FleetSums
 from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.fleet.attention import ATTENTION, Attention
+from monitor.workflow.fleet.nearness import Nearness, nearness
 from monitor.workflow.history.drift import DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE, SHORTEST_DAYS
 
 #: How histories are cut into blocks: as those of `monitor trend`.
@@ -37,7 +39,7 @@ FEWEST_DAYS = 5
 #: The latest day stands out where it lies so many standard deviations of the days from their mean, with so many days.
 STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 #: Where a latest day comes in the order of the classes that chance lets stand out among so many rows.
-BEHIND_DRIFTS = 3.5
+BEHIND_DRIFTS = ATTENTION.index(Attention.DRIFTS) + 0.5
 
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
@@ -80,36 +82,14 @@ def means_p(sums: FleetSums) -> Array:
     return brown_forsythe_from_moments(moments)[3]
 
 
-def split_times(sums: FleetSums) -> Array:
-    """Return when the days after differ most from those before (c,), in days since 1970, NaN of a single block.
-
-    Between two blocks the one split whose means explain most of the squares; the time is that of the block after it,
-    its mean where it holds several days. A description: whether anything happened there, `trend` tests.
-    """
-    blocks = sums.blocks
-    groups, total = blocks.groups, blocks.groups.sum(axis=1, keepdims=True)
-    weighted = np.where(groups > 0.0, groups * blocks.m, 0.0)
-    before, sum_before = groups.cumsum(axis=1)[:, :-1], weighted.cumsum(axis=1)[:, :-1]
-    after, sum_after = total - before, weighted.sum(axis=1, keepdims=True) - sum_before
-    with np.errstate(divide="ignore", invalid="ignore"):
-        between = before * after / total * (sum_after / after - sum_before / before) ** 2
-    # A split before an empty block is that before the next one which has days.
-    explained = np.where((before > 0.0) & (groups[:, 1:] > 0.0), np.nan_to_num(between, nan=-1.0), -1.0)
-    if explained.shape[1] == 0:
-        return np.full(len(groups), np.nan)
-    best = explained.argmax(axis=1)
-    rows = np.arange(len(groups))
-    return np.where(explained[rows, best] >= 0.0, sums.epoch_d + blocks.t[rows, best + 1], np.nan)
-
-
 def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
     """No slope a year from less than ``SHORTEST_DAYS``: evenly spread days have a standard deviation of their span
     over the root of 12."""
     mean = sums.sum_t / sums.groups
     spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
     short = spread < SHORTEST_DAYS / np.sqrt(12.0)
-    columns = (drift.slope, drift.u, drift.p_value, drift.widening, drift.season_p, drift.steepness)
-    return CellDrift(*(np.where(short, np.nan, values) for values in columns))
+    columns = ("slope", "u", "p_value", "widening", "season_p", "steepness")
+    return replace(drift, **{name: np.where(short, np.nan, getattr(drift, name)) for name in columns})
 
 
 def _level(sums: FleetSums, drift: CellDrift) -> Array:
@@ -124,12 +104,14 @@ def _level(sums: FleetSums, drift: CellDrift) -> Array:
 @dataclass(frozen=True, eq=False)
 class Ranking:
     """How urgent each cell is: its class ``kind`` (c,), 0 the most urgent; ``urgency`` (c,) by which classes are
-    sorted, smaller first; its ``measure`` within that (c,), larger first; ``years`` to the limit (c,)."""
+    sorted, smaller first; its ``measure`` within that (c,), larger first; ``years`` to the limit (c,), NaN where no
+    sure drift reaches it within a year; how near the limit is (``near``)."""
 
     kind: npt.NDArray[np.int64]
     urgency: Array
     measure: Array
     years: Array
+    near: Nearness
 
 
 def _latest_day(sums: FleetSums, cells: CellTests) -> tuple[Array, Array]:
@@ -155,21 +137,28 @@ def ranked(sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, 
     ``RATE``) comes behind the drifts, which chance does not make."""
     share = np.abs(sums.origin + sums.latest) / limit
     per_year = drift.slope * DAYS_PER_YEAR
+    level = _level(sums, drift)
+    near = nearness(sums, cells, drift, level, limit)
     with np.errstate(divide="ignore", invalid="ignore"):
-        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
+        years = (np.where(per_year >= 0.0, limit, -limit) - level) / per_year
         ratio = cells.between / cells.sd_pooled
     z, p_value = _latest_day(sums, cells)
     by_chance = ~(control_false_discoveries(p_value, rate=RATE).q_value < RATE)
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
-    kind = np.where(sums.groups < 2.0, 6, 5)
+    soon = drifting & (years >= 0.0) & (years < SOON_YEARS)
+    number = {label: index for index, label in enumerate(ATTENTION)}
+    kind = np.where(sums.groups < 2.0, number[Attention.ONE_DAY], number[Attention.AS_USUAL])
     measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
-    for number, holds, size in (
-        (4, ratio > DAYS_OVER_RUNS, ratio),
-        (3, drifting, drift.steepness),
-        (2, (z > STANDS_OUT) & ~(drifting & by_chance), z),
-        (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
-        (0, share >= 1.0, share),
+    for label, holds, size in (
+        (Attention.DAYS_DIFFER, ratio > DAYS_OVER_RUNS, ratio),
+        (Attention.DRIFTS, drifting, drift.steepness),
+        (Attention.STANDS_OUT, (z > STANDS_OUT) & ~(drifting & by_chance), z),
+        (Attention.DRIFTS_OUT, soon, -years),
+        (Attention.DUE, near.may_be_out_at_check, -near.inside),
+        (Attention.MAY_BE_OUT, near.may_be_out, near.out),
+        (Attention.OUT, (share >= 1.0) | (near.out > 0.5), share),
     ):
         mask = np.asarray(holds, dtype=np.bool_)
-        kind[mask], measure[mask] = number, np.nan_to_num(size)[mask]
-    return Ranking(kind, np.where((kind == 2) & by_chance, BEHIND_DRIFTS, kind), measure, years)
+        kind[mask], measure[mask] = number[label], np.nan_to_num(size)[mask]
+    chance = (kind == number[Attention.STANDS_OUT]) & by_chance
+    return Ranking(kind, np.where(chance, BEHIND_DRIFTS, kind), measure, np.where(soon, years, np.nan), near)

@@ -10,6 +10,8 @@ from monitor.store import Database, MappedRun, latest_tolerances, mapped_runs
 from monitor.units import MICROMETRE
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.attention import Attention, Onset
+from monitor.workflow.health.map import longest_beyond
+from monitor.workflow.health.request import RISK
 
 
 def share_of_limit(row: FleetTableRow) -> float:
@@ -21,8 +23,8 @@ def volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
     """A row for every machine with a limit of the volumetric error: the worst error of its last map against it.
 
     The map is that of the latest run of which one was stored, by ``map`` or by a weekly report; without one the limit
-    is not judged. An error beyond its limit holds since the first of the mapped runs that are beyond it without a
-    break, any other since its last map.
+    is not judged. An error within its limit may be beyond it by the uncertainty of that map. An error beyond its limit
+    holds since the first of the mapped runs that are beyond it without a break, any other since its last map.
     """
     limits = {
         machine: limit
@@ -34,9 +36,8 @@ def volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
     for machine, limit in limits.items():
         runs = mapped.get(machine, [])
         latest = runs[-1].worst_um if runs else None
-        attention = Attention.OUT if latest is not None and latest >= limit else Attention.AS_USUAL
-        if latest is None:
-            attention = Attention.UNJUDGED
+        out = _probability_out(runs[-1], limit) if runs else None
+        attention = _attention(latest, limit, out)
         rows.append(
             FleetTableRow(
                 rank=0, machine=machine, parameter="volumetric error", attention=attention, unit=MICROMETRE.name,
@@ -44,10 +45,24 @@ def volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
                 between_days=None, bartlett=None, bartlett_p=None, bartlett_q=None, anova_f=None, anova_p=None,
                 anova_q=None, slope_per_year=None, u_slope=None, drift_p=None, drift_q=None, latest=latest,
                 slope_widening=None, latest_at=runs[-1].started_at.isoformat() if runs else None, since=None,
-                limit=limit, years_to_limit=None, **_onset(runs, limit),
+                limit=limit, years_to_limit=None, probability_out=out, **_onset(runs, limit),
             )
         )  # fmt: skip
     return rows
+
+
+def _attention(latest: float | None, limit: float, out: float | None) -> Attention:
+    """Return the class of a worst error by its limit and the probability that it is ``out``."""
+    if latest is None or out is None:
+        return Attention.UNJUDGED
+    if latest >= limit:
+        return Attention.OUT
+    return Attention.MAY_BE_OUT if out > RISK else Attention.AS_USUAL
+
+
+def _probability_out(run: MappedRun, limit: float) -> float:
+    """Return the probability that the worst error of a map is beyond its limit, as the weekly report does."""
+    return longest_beyond(run.worst_um - limit, run.u_um or 0.0, run.degrees_of_freedom)
 
 
 def _onset(runs: list[MappedRun], limit: float) -> dict[str, Any]:

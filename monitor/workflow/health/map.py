@@ -15,11 +15,15 @@ def probability_beyond(answer: VolumetricAnswer, limit_um: float) -> float:
 
     That of the point that is worst by the estimates: the length of a vector with its own uncertainty.
     """
-    beyond = answer.worst.error_um - limit_um
-    if answer.worst.u_um <= 0.0:
-        return float(beyond > 0.0)
-    freedom = answer.degrees_of_freedom
-    z = beyond / answer.worst.u_um
+    worst = answer.worst
+    return longest_beyond(worst.error_um - limit_um, worst.u_um, answer.degrees_of_freedom)
+
+
+def longest_beyond(beyond_um: float, u_um: float, freedom: float | None) -> float:
+    """The probability that a length, ``beyond_um`` above its limit, is above it; ``freedom`` None: infinite."""
+    if u_um <= 0.0:
+        return float(beyond_um > 0.0)
+    z = beyond_um / u_um
     return float(scipy.special.ndtr(z) if freedom is None else scipy.special.stdtr(freedom, z))
 
 

@@ -12,6 +12,9 @@ from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.engines import check_workers
 
+#: A machine may be out of tolerance where the probability of that is above this one.
+RISK = 0.05
+
 
 @dataclass(frozen=True)
 class ReportOptions:
@@ -19,7 +22,7 @@ class ReportOptions:
 
     model: str | None = None
     campaigns: tuple[str, ...] = ()
-    risk: float = 0.05
+    risk: float = RISK
 
     def __post_init__(self) -> None:
         if not 0.0 < self.risk < 1.0:

@@ -21,6 +21,8 @@ from monitor.workflow.history.drift import PieceDrift
 HORIZON_YEARS = 20.0
 #: Wanted probability of a run in tolerance until the next check.
 RELIABILITY = 0.95
+#: The next check of a machine of one campaign, in days after its last run.
+NEXT_CHECK_D = 30.0
 
 
 @dataclass(frozen=True)

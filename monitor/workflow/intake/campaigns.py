@@ -76,15 +76,15 @@ class RunsAnswer:
 
 def campaigns(db: Database, request: CampaignsRequest = _ALL) -> CampaignsAnswer:
     """List the campaigns in the database, and those that were withdrawn."""
-    words = request.containing.lower().split()
-    rows = list_campaigns(db, request.machine, request.campaign, request.latest, words, request.method)
+    sought = request.containing.lower().split()
+    rows = list_campaigns(db, request.machine, request.campaign, request.latest, sought, request.method)
     withdrawn = [
         row
         for row in list_withdrawn(db)
         if request.machine in (None, row.machine)
         and request.campaign in (None, row.campaign)
         and request.method in (None, row.method)
-        and all(word in f"{row.campaign} {row.machine} {row.method}".lower() for word in words)
+        and all(word in f"{row.campaign} {row.machine} {row.method}".lower() for word in sought)
     ]
     return CampaignsAnswer(rows, tuple(withdrawn))
 

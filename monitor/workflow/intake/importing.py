@@ -104,7 +104,7 @@ class StoppedImportError(StoppedError):
     """
 
     def __init__(self, answer: ImportAnswer, not_imported: Sequence[str]) -> None:
-        super().__init__("the import was taken back")
+        super().__init__("taken back")
         self.answer = answer
         self.not_imported = tuple(not_imported)
 

@@ -207,6 +207,8 @@ class ForecastStart:
 class LimitForecast:
     """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check.
 
+    ``beyond_since`` is the first of the runs without a break that are beyond the limit, where the last one is: then it
+    is not reached any more, and ``crosses_limit_at`` is None.
     ``start`` says from where, where a day is stated.
     """
 
@@ -218,6 +220,7 @@ class LimitForecast:
     recommended_interval_days: float | None
     recommended_by: str | None
     why_no_forecast: Lack | None = field(metadata=WORDED)
+    beyond_since: str | None = field(default=None, metadata=OMITTED)
     start: ForecastStart | None = field(default=None, metadata=OMITTED)
 
 

@@ -14,6 +14,7 @@ from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, drift_forecast
+from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import ForecastStart, ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
@@ -30,6 +31,8 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     none = LimitForecast(limit, None, None, None, date(check, drift.whole.offset), None, None, None)
     if limit is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_TOLERANCE))
+    beyond = _beyond_since(drift.whole, limit)
+    none = replace(none, beyond_since=beyond)
     of_drift = drift_forecast(drift, limit, check, reliability)
     if of_drift is None or of_drift.ahead is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
@@ -41,7 +44,9 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     )
     if drift.stated is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
-    at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
+    at, interval = None, None
+    if beyond is None:
+        at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
     return replace(
         none,
         crosses_limit_at=at,
@@ -67,6 +72,13 @@ def _start(drift: PieceDrift, line: Trend, limit: float) -> ForecastStart:
     return replace(
         start, temperature=mean, latest_temperature=latest, by_temperature=line.beside[0] * (latest - mean)
     )
+
+
+def _beyond_since(steady: Series, limit: float) -> str | None:
+    """Return when the last runs beyond ± ``limit`` without a break began; None where the last one is within."""
+    within = np.flatnonzero(np.abs(steady.values) <= limit)
+    first = int(within[-1]) + 1 if within.size else 0
+    return date(float(steady.t[first]), steady.offset) if first < len(steady.t) else None
 
 
 def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, Lack | None]:

@@ -33,6 +33,7 @@ from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
+from monitor.workflow.history.forecast import NEXT_CHECK_D
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
@@ -57,8 +58,6 @@ from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
 from monitor.workflow.trend.warming import warming
 
-#: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
-NEXT_CHECK_D = 30.0
 #: What the stored answer about a whole machine is called.
 METHOD = "all parameters"
 

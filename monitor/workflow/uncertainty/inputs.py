@@ -97,7 +97,7 @@ def _stated_inputs(
     several = bool(campaign.artefact.setups)
     stated = fit.sigma if several else campaign.probe.standard_uncertainty
     u = max(stated, lack_of_fit(fit)[1] or 0.0)
-    alike = None if selection is not None or several else resemblance_of(fit, run)
+    alike = None if selection is not None else resemblance_of(fit, run)
     if alike is not None:
         u = max(u, stated * alike.scale)
     names = run.reading_names

@@ -1,6 +1,7 @@
 """The covariance of readings of one run that resemble their neighbours, where no repeated runs show it.
 
-Of campaigns with several instruments it is not done: what a setup repeats is a lack of fit rather than noise.
+Of several instruments each resembles itself alone, all by one correlation. What a model lacks makes neighbours alike as
+well: then u is too large rather than too small.
 
 A slow drift, a warm spindle, a probe that forgets slowly: such noise moves parameters by more than independent noise of
 the same size, and the residuals show less of it. What the search for missing effects takes out before it looks
