@@ -37,8 +37,8 @@ FULL_MARGIN = 10.0
 #: Correlations at which the variances are computed; between them they are interpolated. Beyond the last one some
 #: dozens of blocks have no line.
 CORRELATIONS = np.linspace(0.0, 0.95, 20)
-#: Up to so many blocks nothing is known of how far they resemble each other, and no slope is better known than of blocks
-#: that do not: those of two campaigns a month apart are no neighbours.
+#: Up to so many blocks nothing is known of how far they resemble each other: no slope is better known than of blocks
+#: that do not (those of two campaigns a month apart are no neighbours).
 FEW_BLOCKS = 5
 #: A cycle is fitted beside the line where the history covers this share of it (300 days of a year), where no block is
 #: longer than that share of it, and where the variance of the slope grows by no more than this factor for it.
