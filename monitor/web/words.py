@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
+from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.attention import ATTENTION, Attention
@@ -287,7 +288,7 @@ def what_breaks(tie: Tie) -> str:
     drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: f"measure {tie.what_to_measure.replace('_', ' ')}",
+        TieBreak.DRIVERS: f"measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs).replace('_', ' ')}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
         TieBreak.MORE_POSES: (

@@ -65,7 +65,8 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
 def warmth_beside(sums: FleetSums) -> npt.NDArray[np.bool_]:
     """Whether the temperature is fitted beside the line of each cell (c,), as for one machine (``PieceDrift``)."""
     warmth = sums.temperatures
-    enough = (sums.groups >= DAYS_FOR_TEMPERATURE) & (warmth.span >= LEAST_TEMPERATURE_RANGE)
+    blocks = (sums.blocks.groups > 0.0).sum(axis=1)
+    enough = (blocks >= DAYS_FOR_TEMPERATURE) & (warmth.span >= LEAST_TEMPERATURE_RANGE)
     return np.asarray((warmth.groups == sums.groups) & enough)
 
 
