@@ -6,6 +6,7 @@ from monitor.cli import output, residual_output
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.cli.verbs.plan_instruments import where
+from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
     BadRow,
@@ -148,7 +149,7 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
     if tie.broken_by is TieBreak.DRIVERS:
-        return f"to tell {rivals} apart, measure {tie.what_to_measure}"
+        return f"to tell {rivals} apart, measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs)}"
     if tie.broken_by is TieBreak.INDEXATIONS:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
     if tie.broken_by is TieBreak.PLAN:

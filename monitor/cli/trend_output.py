@@ -192,10 +192,16 @@ def _with_u(value: float, u: float, unit: str) -> str:
     return f"{output.rounded(value, u)} {unit} (u = {output.two_digits(u)} {unit})"
 
 
+def _p_value(change: DatedChange) -> str:
+    """The p-value of a change; where no simulated history was like it, that of one in all of them, as a bound."""
+    stated = output.stated("p", change.p_value)
+    return stated.replace(" = ", " at most ") if change.p_at_most else stated
+
+
 def _change(name: str, change: DatedChange) -> str:
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, {output.stated('p', change.p_value)})"
+        f"({_interval(change.interval)}, {_p_value(change)})"
     )
 
 
@@ -207,7 +213,7 @@ def _settled(name: str, parameter: ParameterTrend) -> Iterator[str]:
             from monitor.reporting.health.settling import ParameterSettled
 
             what = ParameterSettled(name, change.size, change.u, change.unit, change.time_constant_days)
-            yield f"from {_minute(change.at)} on: {what}; {output.stated('p', change.p_value)}"
+            yield f"from {_minute(change.at)} on: {what}; {_p_value(change)}"
 
 
 def _event_step(name: str, step: StepAtEvent) -> str:

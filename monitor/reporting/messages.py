@@ -17,7 +17,7 @@ _MOVES = {
 #: What is said of slopes over too short a history to show a season.
 SEASON_NOT_TOLD = (
     "the history is too short to tell a drift from a part of a yearly season: slopes hold it, their intervals and the "
-    "forecasts allow for a season as large as what was seen (record the temperature, or wait for 300 days)"
+    "forecasts allow for a season as large as what was seen (the temperature of six groups of days tells, or 300 days)"
 )
 
 

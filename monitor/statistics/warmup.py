@@ -76,8 +76,8 @@ class _Profile:
 
 def _basis(columns: Array) -> Array:
     """Orthonormal basis (n, k) of what columns (n, e) span; those that the others explain add nothing."""
-    left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(left[:, sizes > DEPENDENT * sizes[0]])
+    vectors, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(vectors[:, sizes > DEPENDENT * sizes[0]])
 
 
 def _profile(y: Array, t: Array, weight: Array, beside: Array) -> _Profile:

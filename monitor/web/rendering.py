@@ -81,6 +81,8 @@ def _environment() -> Environment:
         "day": words.day,
         "counted": words.counted,
         "so_far": words.so_far,
+        "aligned": words.aligned,
+        "as_fine_as": words.as_fine_as,
         "importing": words.importing,
         "asked_for": words.asked_for,
         "earliest_and_latest": words.earliest_and_latest,

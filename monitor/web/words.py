@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
+from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.attention import ATTENTION, Attention
@@ -92,6 +93,7 @@ NOT_IDENTIFIED = Urgency(
     _OPEN.word,
     "identify: its readings are here, its errors are not computed from them by this version of its model yet",
 )
+BEING_COMPUTED = Urgency(_OPEN.colour, _OPEN.shape, _OPEN.word, "its numbers are being computed")
 #: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
 UNEXPLAINED = "the model does not explain the latest readings"
 DOES_NOT_FIT = Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "")
@@ -110,6 +112,24 @@ def number(value: float | None, digits: int = 3) -> str:
     if "e" in text and 1e-4 <= abs(value) < 1e7:
         text = f"{value:.0f}"
     return text.replace("-", "−")
+
+
+def aligned(value: float | None, digits: int = 3) -> str:
+    """Return a number of a column with all its digits, zeros at the end too: 41.0 beside 22.3."""
+    text = number(value, digits)
+    if value is None or not math.isfinite(value) or "e" in text:
+        return text
+    lacking = digits - len(text.lstrip("−0.").replace(".", ""))
+    if lacking <= 0 or value == 0.0:
+        return text
+    return f"{text}{'' if '.' in text else '.'}{'0' * lacking}"
+
+
+def as_fine_as(value: float | None, u: float | None) -> str:
+    """Return a value with as many decimals as its uncertainty has of two digits (JCGM 100, 7.2.6)."""
+    if value is None or u is None or not math.isfinite(value) or not math.isfinite(u) or u <= 0.0:
+        return number(value)
+    return written(round_result(value, u).estimate).replace("-", "−")
 
 
 def channel(name: str) -> str:
@@ -183,7 +203,8 @@ def how_far(row: FleetTableRow) -> str:
 def _when_beyond(row: FleetTableRow) -> str:
     """Say how likely a parameter is beyond its limit, or when it will be."""
     ahead = ""
-    if row.attention is Attention.MAY_BE_OUT and row.probability_out is not None:
+    by_last_run = row.attention is Attention.OUT and abs(row.latest or 0.0) < (row.limit or 0.0)
+    if (by_last_run or row.attention is Attention.MAY_BE_OUT) and row.probability_out is not None:
         ahead = f"; the last run is beyond it with {percent(row.probability_out)}"
     elif row.years_to_limit is not None:
         ahead = f"; reached in {_span(row.years_to_limit)} at this rate"
@@ -267,7 +288,7 @@ def what_breaks(tie: Tie) -> str:
     drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: f"measure {tie.what_to_measure.replace('_', ' ')}",
+        TieBreak.DRIVERS: f"measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs).replace('_', ' ')}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
         TieBreak.MORE_POSES: (

@@ -128,3 +128,20 @@ def test_a_tool_point_that_the_readings_contradict_is_named_with_the_one_they_fi
     assert "the readings of setup r-test-A fit tool_point_mm = [0.00, 0.00, -150.00], with 0.0" in said
     right = horizontal(tmp_path / "right", lambda setup: setup)
     assert campaign_method(right).problem_of(right).unsettled == ""
+
+
+def test_a_bar_whose_plane_is_a_hundredth_off_is_where_it_is_stated(tmp_path: Path) -> None:
+    """At b04ae590 `bar-yz` came out centimetres across its plane, and the certificate was refused (`work-point`)."""
+    rng = np.random.default_rng(14600)
+    campaign = read_campaign(centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng)))
+    assert isinstance(campaign, Campaign)
+
+    def change(setup: Setup) -> Setup:
+        if setup.reading != "distance":
+            return setup
+        return replace(setup, tool_point=tuple(np.subtract(setup.tool_point, (0.01, 0.0, 0.0)).tolist()))
+
+    wrong = with_setups(campaign, change)
+    problem = campaign_method(wrong).problem_of(wrong)
+    assert wrong.artefact.setups != campaign.artefact.setups
+    assert problem.displaced(solve_problem(problem).local[0]) == ()

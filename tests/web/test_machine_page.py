@@ -15,7 +15,7 @@ import pytest
 
 from monitor.documents import from_document, to_document
 from monitor.store import Database, list_runs
-from monitor.web.charts.trend import trend_chart
+from monitor.web.charts.trend import groups_without_legend, trend_chart
 from monitor.web.pages.machine import _ends, _within
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.history.values import ValuesAnswer
@@ -145,6 +145,8 @@ def test_colours_that_come_twice_have_no_legend(local: Any) -> None:
     values = from_document(ValuesAnswer, whole)
     days = trend_chart(values, "EXX", None, "day")
     assert {trace["showlegend"] for trace in days.traces if "error_y" in trace} == {True}
+    assert groups_without_legend(values, "EXX", "day") == 0
     many = replace(values, campaign=tuple(f"campaign {row}" for row in range(len(values.run))))
     shown = trend_chart(many, "EXX", None, "campaign")
     assert {trace["showlegend"] for trace in shown.traces if "error_y" in trace} == {False}
+    assert groups_without_legend(many, "EXX", "campaign") == len(values.run)

@@ -11,13 +11,13 @@ from monitor.discovery import Verdict
 from monitor.documents import from_document
 from monitor.exceptions import InputError
 from monitor.reporting.machine_finding import UNSEEN, MachineFinding, MissingEffect, machine_sentences
+from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.store import Database, load_analysis
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachineComparison
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import CurveMissing, ExplainAnswer, MachineMissing
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
-from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
@@ -79,12 +79,12 @@ def test_an_effect_that_all_residuals_together_do_not_show_is_said_to_be_small(u
 @pytest.mark.parametrize("driver", ["warmup", "settling", "run_time", "sequence", "each_run"])
 @pytest.mark.parametrize("within_runs", [True, False])
 def test_nobody_is_asked_to_record_what_follows_from_the_times(driver: str, within_runs: bool) -> None:
-    alone = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, (driver,), within_runs=within_runs).what_to_measure
+    alone = runs_that_tell((driver,), within_runs=within_runs)
     assert driver not in alone
     assert "record" not in alone
-    beside = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, (driver, "ambient_degC"), within_runs=within_runs)
-    assert beside.what_to_measure.endswith(", and record ambient_degC")
-    recorded = Tie(("EXA:harmonic4",), TieBreak.DRIVERS, ("ambient_degC",), within_runs=within_runs)
-    assert recorded.what_to_measure.endswith(
-        "ambient_degC" + (" changes, and record it" if within_runs else ", and record it")
+    beside = runs_that_tell((driver, "ambient_degC"), within_runs=within_runs)
+    assert beside.endswith(", and record ambient_degC")
+    recorded = runs_that_tell(("ambient_degC",), within_runs=within_runs)
+    assert recorded.endswith(
+        "ambient_degC changes, and record it" if within_runs else "ambient_degC, and record it"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from monitor.cli.trend_output import _crosses
+from monitor.cli.trend_output import _change, _crosses
 from monitor.records import VOLUMETRIC
 from monitor.reporting.adjusting import SEE_FIRST
 from monitor.reporting.health.records import State
@@ -135,6 +136,10 @@ def test_a_limit_that_is_near_goes_before_days_that_differ(rows: dict[str, Fleet
     }
     near = rows["a-near"]
     assert "the last run is beyond it with " in how_far(near)
+    # A last run beyond a limit within which the mean of its day lies.
+    by_last_run = replace(near, attention=Attention.OUT, probability_out=0.62)
+    assert how_far(by_last_run).endswith("% of its limit of 50; the last run is beyond it with 62 %")
+    assert "beyond it with" not in how_far(rows["c-out"])
     (row,) = machine_rows([near], {}, {}, {})
     assert (row.urgency.word, row.worst) == ("act now", near)
     assert "in tolerance at the next check (" in how_far(rows["d-scatters"])
@@ -191,3 +196,14 @@ def test_the_fleet_page_adjusts_nothing_by_a_model_that_does_not_explain(
         assert "adjust" in explained.next_step
         assert doubted.next_step == SEE_FIRST
         assert (doubted.attention, doubted.urgency) == (explained.attention, explained.urgency)
+
+
+def test_one_step_asked_for_alone_and_with_others_has_a_bound_and_not_two_p_values(tmp_path: Path) -> None:
+    with Database(tmp_path / "monitor.duckdb", threads=1) as db:
+        levels = np.where(np.arange(DAYS) < 15, 40.0, 10.0)
+        rng = np.random.default_rng(3)
+        keep(db, "M", [(level + rng.normal(size=3)).tolist() for level in levels], "M")
+        (change,) = trend(db, TrendRequest("M")).parameters["EXX"].changes
+    assert change.p_value == pytest.approx(1.0 / 2000.0)
+    assert change.p_at_most
+    assert "p at most 0.0005" in _change("EXX", change)

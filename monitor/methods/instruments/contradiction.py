@@ -251,8 +251,10 @@ def _travel_in_words(travel: Array, read: Array) -> str | None:
 def displaced_work_points(parts: Iterable[Part], unknowns: Iterable[Array]) -> Iterator[Displaced]:
     """Stated work points that the unknowns (q,) of a run, in the order of ``parts``, put elsewhere."""
     for part, values in zip(parts, unknowns, strict=True):
-        if isinstance(part.reading, AtWorkPoint) and _is_sought(part.reading):
-            distance = float(np.linalg.norm(values[:3] - part.reading.setup.work_point))
+        if isinstance(part.reading, AtWorkPoint) and _is_sought(part.reading) and len(part.rows):
+            # Across the plane of a bar's swing the unknown goes where it likes, and the point stays.
+            work, _ = part.ends(np.tile(values, (len(part.rows), 1)))
+            distance = float(np.linalg.norm(work[0] - part.reading.setup.work_point))
             if distance > STATED_WITHIN:
                 yield Displaced(part.id, distance)
 

@@ -37,9 +37,8 @@ FULL_MARGIN = 10.0
 #: Correlations at which the variances are computed; between them they are interpolated. Beyond the last one some
 #: dozens of blocks have no line.
 CORRELATIONS = np.linspace(0.0, 0.95, 20)
-#: Up to so many blocks nothing is known of how far they resemble each other: no slope is then better known than of
-#: blocks that do not. (Two campaigns a month apart: the last block of one and the first of the other are no neighbours,
-#: and what they would share makes no difference smaller.)
+#: Up to so many blocks nothing is known of how far they resemble each other: no slope is better known than of blocks
+#: that do not (those of two campaigns a month apart are no neighbours).
 FEW_BLOCKS = 5
 #: A cycle is fitted beside the line where the history covers this share of it (300 days of a year), where no block is
 #: longer than that share of it, and where the variance of the slope grows by no more than this factor for it.
@@ -429,8 +428,9 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         covariance *= variance[:, np.newaxis, np.newaxis]
         scatter = np.where(enough, (count - rank) / trace, np.nan)
         widening = np.sqrt(inside[:, -1, -1] * scatter)
-        least = np.where((count <= FEW_BLOCKS) & (widening < 1.0) & (widening > 0.0), widening, 1.0)
-        covariance /= (least**2)[:, np.newaxis, np.newaxis]
+        too_narrow = (count <= FEW_BLOCKS) & (widening < 1.0) & (widening > 0.0)
+        raised = 1.0 / np.where(too_narrow, widening, 1.0)
+        covariance *= (raised**2)[:, np.newaxis, np.newaxis]
     return BlockLines(
         at=at,
         slope=slope,
@@ -438,7 +438,7 @@ def _lines(blocks: Blocks, design: _Design, at: Array, cyclic: npt.NDArray[np.bo
         dof=np.where(enough, np.maximum(dof, 1.0), np.nan),
         correlation=_correlation(seen_place, seen_share),
         allowed=_correlation(row, share),
-        widening=widening / least,
+        widening=widening * raised,
         scatter=scatter,
         blocks=count,
         cyclic=cyclic,

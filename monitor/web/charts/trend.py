@@ -67,6 +67,16 @@ def _shop_time(values: ValuesAnswer, at: str) -> str:
     return moment.astimezone(nearest.tzinfo).isoformat()
 
 
+def groups_without_legend(values: ValuesAnswer, parameter: str, grouping: str) -> int:
+    """Return how many groups the runs of a parameter have, where that is more than there are colours; else 0."""
+    series = values.parameters.get(parameter)
+    if series is None:
+        return 0
+    labels = _labels(values, grouping)
+    count = len({labels[index] for index, value in enumerate(series.values) if value is not None})
+    return count if count > len(SERIES) else 0
+
+
 def _runs(values: ValuesAnswer, parameter: str, grouping: str) -> list[Trace]:
     series = values.parameters[parameter]
     groups: dict[str, list[int]] = {}

@@ -5,14 +5,14 @@ from __future__ import annotations
 import base64
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.adjusting import adjusting
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
@@ -22,6 +22,7 @@ from monitor.web.desk import Desk, Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import (
+    BEING_COMPUTED,
     DOES_NOT_FIT,
     NOT_IDENTIFIED,
     NOT_MEASURED,
@@ -184,10 +185,13 @@ def _summed(request: Request, machines: TableAnswer) -> _Sums:
 def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
     """Return the machines by their class, the most urgent first, each class in the order of the fleet.
 
-    While the first sums are made, nothing is known of any.
+    While the first sums are made, nothing is known of any but that it was measured.
     """
     if sums.answer is None and sums.waiting is not None:
-        return []
+        return [
+            replace(row, urgency=BEING_COMPUTED) if row.urgency is NOT_IDENTIFIED else row
+            for row in unnumbered_rows(machines, ())
+        ]
     rows: list[MachineRow] = []
     if (answer := sums.answer) is not None:
         refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
@@ -233,7 +237,12 @@ def routes() -> APIRouter:
         request: Request, state: str = "", plant: str = "", since: str = "", until: str = "", first: int = 0
     ) -> Response:
         """Show the machines; of one state, of one plant, measured last in a period."""
-        period = as_iso(since=since, until=until)
+        period, refusal = {"since": "", "until": ""}, ""
+        try:
+            period = as_iso(since=since, until=until)
+        except InputError as error:
+            # A day that is none takes away the period and not the fleet.
+            refusal = str(error)
         machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
         sums = _summed(request, machines)
         answer, waiting = sums.answer, sums.waiting
@@ -252,7 +261,7 @@ def routes() -> APIRouter:
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
             states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
-            state=state, plant=plant, since=period["since"], until=period["until"],
+            refusal=refusal, state=state, plant=plant, since=period["since"], until=period["until"],
             plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,

@@ -15,7 +15,7 @@ from starlette.responses import JSONResponse, Response
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
-from monitor.web.charts.trend import GROUPINGS, trend_chart
+from monitor.web.charts.trend import GROUPINGS, groups_without_legend, trend_chart
 from monitor.web.days import as_iso, typed_moment
 from monitor.web.desk import Desk, Ticket
 from monitor.web.faults import refusal_of
@@ -86,7 +86,8 @@ def routes() -> APIRouter:
             every=all_trends if shown else None, waiting=trends.waiting,
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
-            groupings=GROUPINGS, colour=colour, since=period["since"], until=period["until"], campaign=campaign,
+            unlisted=groups_without_legend(values, shown, colour), groupings=GROUPINGS,
+            colour=colour, since=period["since"], until=period["until"], campaign=campaign,
             campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
             refused=form,
         )  # fmt: skip

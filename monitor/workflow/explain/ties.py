@@ -19,29 +19,6 @@ if TYPE_CHECKING:
 OF_POSES = ("", "gravity", "link_weights")
 
 
-#: Drivers that nobody records, as they follow from the times of the readings: their names in words, and which runs give
-#: them other values.
-OF_TIMES = {
-    "warmup": (
-        "the time since the day's first run",
-        "runs from a cold start until the machine is warm, and as many of a machine that is warm from the first on",
-    ),
-    "settling": ("the time since a run began", "runs after pauses of different length"),
-    "run_time": (
-        "the time within a run",
-        "some runs in another order, so that place and time within a run do not go together",
-    ),
-    "sequence": (
-        "the order within a run",
-        "some runs in another order, so that place and order within a run do not go together",
-    ),
-    "each_run": (
-        "the run",
-        "more runs on other days: what differs from run to run shows over many of them only",
-    ),
-}
-
-
 class TieBreak(Enum):
     """What tells an effect from its rivals."""
 
@@ -73,26 +50,6 @@ class Tie:
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
     within_runs: bool = field(default=False, metadata=OMITTED)
     measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
-
-    @property
-    def what_to_measure(self) -> str:
-        """Which runs give the ``drivers`` other values, and what has to be recorded of them."""
-        if len(self.drivers) == 1 and self.drivers[0] in OF_TIMES:
-            return OF_TIMES[self.drivers[0]][1]
-        recorded = [driver for driver in self.drivers if driver not in OF_TIMES]
-        names = " and ".join(OF_TIMES[driver][0] if driver in OF_TIMES else driver for driver in self.drivers)
-        if len(self.drivers) == 2:
-            runs = (
-                f"runs within which {names} change, not together"
-                if self.within_runs
-                else f"runs in which {names} do not go together"
-            )
-            record = {0: "", 1: f", and record {recorded[0] if recorded else ''}", 2: ", and record both"}
-            return runs + record[len(recorded)]
-        runs = (
-            f"runs within which {names} changes" if self.within_runs else f"runs at several values of {names}"
-        )
-        return f"{runs}, and record it"
 
 
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) -> tuple[Tie, ...]:

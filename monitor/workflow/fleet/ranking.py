@@ -65,7 +65,8 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
 def warmth_beside(sums: FleetSums) -> npt.NDArray[np.bool_]:
     """Whether the temperature is fitted beside the line of each cell (c,), as for one machine (``PieceDrift``)."""
     warmth = sums.temperatures
-    enough = (sums.groups >= DAYS_FOR_TEMPERATURE) & (warmth.span >= LEAST_TEMPERATURE_RANGE)
+    blocks = (sums.blocks.groups > 0.0).sum(axis=1)
+    enough = (blocks >= DAYS_FOR_TEMPERATURE) & (warmth.span >= LEAST_TEMPERATURE_RANGE)
     return np.asarray((warmth.groups == sums.groups) & enough)
 
 
@@ -87,8 +88,9 @@ def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
     mean = sums.sum_t / sums.groups
     spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
     short = spread < SHORTEST_DAYS / np.sqrt(12.0)
-    columns = ("slope", "u", "p_value", "widening", "season_p", "steepness")
-    return replace(drift, **{name: np.where(short, np.nan, getattr(drift, name)) for name in columns})
+    columns = (drift.slope, drift.u, drift.p_value, drift.widening, drift.season_p, drift.steepness)
+    slope, u, p_value, widening, season_p, steepness = (np.where(short, np.nan, values) for values in columns)
+    return CellDrift(slope, u, p_value, widening, season_p, steepness, drift.lines)
 
 
 def _level(sums: FleetSums, drift: CellDrift) -> Array:

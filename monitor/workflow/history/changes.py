@@ -37,11 +37,16 @@ TRIALS = 1999
 
 @dataclass(frozen=True)
 class ChangeSearch:
-    """Changes and drifts that a search of one parameter found, in the order of time; or why none were sought."""
+    """Changes and drifts that a search of one parameter found, in the order of time; or why none were sought.
+
+    ``least_p`` is the smallest p-value that its simulated histories can say, which are more where more parameters are
+    searched: a change with that one may be less probable still.
+    """
 
     changes: tuple[Change, ...] = ()
     drifts: tuple[Change, ...] = ()
     why_none: Lack | None = None
+    least_p: float = 0.0
 
 
 def day_means(series: Series) -> tuple[Array, Array, Array | None, Array]:
@@ -143,4 +148,4 @@ def _of_parameter(history: History, name: str, begins: Array) -> ChangeSearch:
         tuple(replace(change, at=float(begins[change.index])) for change in part if change.parameter == name)
         for part in (history.changes, history.trends)
     )
-    return ChangeSearch(changes, drifts)
+    return ChangeSearch(changes, drifts, least_p=1.0 / (history.trials + 1))

@@ -11,6 +11,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Trend
+from monitor.statistics.days.block_lines import block_count, block_of
 from monitor.statistics.days.seasonal_slopes import REFUTED
 from monitor.statistics.trend import trend
 from monitor.units import DAYS_PER_YEAR
@@ -22,8 +23,9 @@ from monitor.workflow.history.series import Series
 #: rests on the hours within the days, which a machine that warms up every morning fills with something else.
 SHORTEST_DAYS = 30.0
 
-#: The temperature of the days is fitted beside the line from so many days on, where it runs over so many kelvin. Where
-#: it rises or falls with time, the interval of the slope grows: nothing tells the two apart.
+#: The temperature of the days is fitted beside the line from so many blocks of days on, where it runs over so many
+#: kelvin. Where it rises or falls with time, the interval of the slope grows: nothing tells the two apart. Of two
+#: campaigns of five days, four blocks, one degree of freedom would be left, of what days of one campaign differ by.
 DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE = 6, 0.2
 
 
@@ -69,7 +71,12 @@ class PieceDrift:
         if degrees is None or piece.day_count < DAYS_FOR_TEMPERATURE or not np.isfinite(degrees).all():
             return None
         index = np.unique(piece.days, return_inverse=True)[1]
-        means = np.bincount(index, degrees) / np.bincount(index)
+        time, means = (np.bincount(index, column) / np.bincount(index) for column in (piece.t, degrees))
+        if (
+            len(np.unique(block_of(time, block_count(len(time)), time.min(), time.max())))
+            < DAYS_FOR_TEMPERATURE
+        ):
+            return None
         return degrees[:, np.newaxis] if np.ptp(means) >= LEAST_TEMPERATURE_RANGE else None
 
     @property

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.progress import told, within
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, list_campaigns
 from monitor.uncertainty.workers.engine import in_order
@@ -61,7 +62,11 @@ def identify_all(
     answers: list[IdentifyAnswer] = []
     refused: list[RefusedCampaign] = []
     with engine_of(request.workers, request.cluster) as engine:
-        for result in in_order(engine, _attempted, tasks()):
+        results = in_order(engine, _attempted, tasks())
+        for index in range(len(names)):
+            with within(index / len(names), (index + 1) / len(names)):
+                result = next(results)
+                told(1.0)
             name, task = in_hand.popleft()
             progress(name)
             if isinstance(task, str) or isinstance(result, str):

@@ -96,6 +96,8 @@ class DatedChange:
 
     ``days`` is the number of days that were searched. ``kind`` is ``step`` or ``slope``; of drifts ``trend``, or
     ``transient``: off by ``size`` at the first run, it settles with ``time_constant_days``.
+    ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say;
+    they are fewer where one parameter is asked for.
     """
 
     at: str | None
@@ -107,6 +109,7 @@ class DatedChange:
     p_value: float
     days: int
     time_constant_days: float | None = field(default=None, metadata=OMITTED)
+    p_at_most: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

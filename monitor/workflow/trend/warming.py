@@ -72,8 +72,8 @@ def _change_columns(t: Array, changes: Sequence[Change]) -> Array:
     columns = [
         np.where(t >= change.at, 1.0 if change.kind == "step" else t - change.at, 0.0) for change in inside
     ]
-    kept = [column for column in columns if np.ptp(column) > 0.0]
-    return np.column_stack(kept) if kept else np.empty((len(t), 0))
+    varying = [column for column in columns if np.ptp(column) > 0.0]
+    return np.column_stack(varying) if varying else np.empty((len(t), 0))
 
 
 def _beside_drifts(

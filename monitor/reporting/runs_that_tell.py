@@ -1,0 +1,47 @@
+"""Words for the runs that tell effects apart which go with time, the order of readings, or a recorded column."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+#: Drivers that nobody records, as they follow from the times of the readings: their names in words, and which runs give
+#: them other values.
+OF_TIMES = {
+    "warmup": (
+        "the time since the day's first run",
+        "runs from a cold start until the machine is warm, and as many of a machine that is warm from the first on",
+    ),
+    "settling": ("the time since a run began", "runs after pauses of different length"),
+    "run_time": (
+        "the time within a run",
+        "some runs in another order, so that place and time within a run do not go together",
+    ),
+    "sequence": (
+        "the order within a run",
+        "some runs in another order, so that place and order within a run do not go together",
+    ),
+    "each_run": (
+        "the run",
+        "more runs on other days: what differs from run to run shows over many of them only",
+    ),
+}
+
+
+def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
+    """Return which runs give one or two ``drivers`` other values, and what has to be recorded of them.
+
+    What stays the same through a run shows nothing where they have to vary ``within_runs``.
+    """
+    if len(drivers) == 1 and drivers[0] in OF_TIMES:
+        return OF_TIMES[drivers[0]][1]
+    recorded = [driver for driver in drivers if driver not in OF_TIMES]
+    names = " and ".join(OF_TIMES[driver][0] if driver in OF_TIMES else driver for driver in drivers)
+    if len(drivers) == 1:
+        runs = f"runs within which {names} changes" if within_runs else f"runs at several values of {names}"
+        return f"{runs}, and record it"
+    runs = f"runs within which {names} change, not together"
+    if not within_runs:
+        runs = f"runs in which {names} do not go together"
+    if not recorded:
+        return runs
+    return f"{runs}, and record {recorded[0] if len(recorded) == 1 else 'both'}"
