@@ -63,6 +63,7 @@ OTHER = frozenset(
             "lack_of_fit_p",
             "in_tolerance_at_next_check",
             "probability",
+            "probability_out",
             "slope_widening",
             "scatter_over_stated",
         ),
