@@ -21,7 +21,6 @@ ARCSEC = 1e-6 * 1_296_000 / (2 * math.pi)
 OTHER = frozenset(
     {
         *(
-            "probability_out",
             "autocorrelation",
             "neighbours",
             "time_constant_days",
