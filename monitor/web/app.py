@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import StaleFormError
 from monitor.web.gate import Gate
 from monitor.web.interface import interface
-from monitor.web.opening import host_user_name
+from monitor.web.opening import Copies, host_user_name
 from monitor.web.outcomes import Outcomes
 from monitor.web.pages import (
     campaign as campaign_page,
@@ -66,16 +65,16 @@ _PAGES = (
 
 def application(
     db: Database, settings: ServerSettings, working_folder: Path,
-    newer: Callable[[], Database | None] | None = None,
+    copies: Copies | None = None,
 ) -> Gate:  # fmt: skip
-    """Return the server of an open database; ``newer`` as in ``Served``. Raises InputError for a file of users that is
+    """Return the server of an open database; ``copies`` as in ``Served``. Raises InputError for a file of users that is
     wrong."""
     role = Role.VIEWER if settings.reading_only else Role.APPROVER
     users = None if settings.users is None else UserFile(settings.users, looking_only=settings.reading_only)
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     db.type_tolerances = settings.tolerances
-    asker = Asker(db, settings.trusted_signers, newer)
+    asker = Asker(db, settings.trusted_signers, copies)
     app.state.settings = settings
     app.state.sessions = Sessions(users, User(host_user_name(), role))
     app.state.asker = asker

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from monitor.exceptions import InputError, MonitorError
 from monitor.store import Database, last_identification, list_campaigns
 from monitor.web.access import NOT_OFFERED, offered, role_needed, taken_fields, writes
 from monitor.web.freshness import IDENTIFYING, REMEMBERED, Freshness
+from monitor.web.opening import Copies
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
 
@@ -41,18 +42,18 @@ class _AnsweredError(Exception):
 class Asker:
     """Asks questions of the served database; ``freshness`` says which answers still hold.
 
-    ``trusted_signers`` is the server's own file of them, for whoever sends none. ``newer`` returns the database that is
-    served from now on, None as long as it is the same; without it the file must stay the one that it was.
+    ``trusted_signers`` is the server's own file of them, for whoever sends none. ``copies`` are asked instead of
+    ``db``, the first of them; without them the file must stay the one that it was.
     """
 
     def __init__(
         self,
         db: Database,
         trusted_signers: Path | None = None,
-        newer: Callable[[], Database | None] | None = None,
+        copies: Copies | None = None,
     ) -> None:
         self._db = db
-        self._newer = newer
+        self._copies = copies
         self.freshness = Freshness()
         self._path = os.path.abspath(db.path)
         self._file = _identity(self._path)
@@ -72,9 +73,8 @@ class Asker:
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
-        if self._newer is not None:
-            self._follow(self._newer)
-        elif _identity(self._path) != self._file:
+        self.follow()
+        if self._copies is None and _identity(self._path) != self._file:
             # What is written from now on would go with the old file.
             raise ReplacedError(
                 f"{Path(self._path).name} was replaced or removed while it is served: nothing is shown or stored "
@@ -84,24 +84,29 @@ class Asker:
             return self._tried(user, question, document or {}, files or {})
         if question not in REMEMBERED or files or tolerances is not None:
             return self._asked(user, question, document or {}, files or {}, tolerances, progress)
+        # The key before the copy that is asked: an older copy's answer would be remembered as that of a newer.
         key, answer = self.freshness.recall(question, document or {})
         if answer is None:
             answer = self._asked(user, question, document or {}, {}, None)
             self.freshness.remember(key, answer)
         return answer
 
-    def _follow(self, newer: Callable[[], Database | None]) -> None:
-        """Ask the newer database from now on, where there is one; no answer of before holds."""
-        db = newer()
-        if db is not None:
-            db.type_tolerances = self._db.type_tolerances
-            self._db = db
-            self.freshness.wrote(None)
+    def follow(self) -> None:
+        """Answer from now on from the file as it is, where copies of it are asked; no answer of before holds then."""
+        if self._copies is not None:
+            self._copies.follow(lambda: self.freshness.wrote(None))
+
+    @contextmanager
+    def _session(self, user: User) -> Iterator[Database]:
+        """Yield a session of the database that is served now, which stays open for the block."""
+        with ExitStack() as asked:
+            db = self._db if self._copies is None else asked.enter_context(self._copies.asked())
+            yield asked.enter_context(closing(db.session(user.name)))
 
     def _tried(self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any]) -> Any:
         """Ask in a transaction that is taken back: who writes meanwhile waits."""
         request = request_of(question, document, files)
-        with closing(self._db.session(user.name)) as session:
+        with self._session(user) as session:
             try:
                 with session.transaction():
                     raise _AnsweredError(QUESTIONS[question].load()(session, request))
@@ -119,7 +124,7 @@ class Asker:
         arguments = [] if request is None else [request]
         if not asked.needs_database:
             return asked.load()(*arguments)
-        with closing(self._db.session(user.name)) as session:
+        with self._session(user) as session:
             if tolerances is not None:
                 session.type_tolerances = tolerances
             before = last_identification(session) if question in IDENTIFYING else None

@@ -198,6 +198,7 @@ class Desk:
         ``files`` are paths that the server itself fills in; they are no part of what is asked.
         """
         check_role(user, question)
+        self.asker.follow()
         key = self._key(question, document)
         with self._lock:
             ticket = self._tickets.get(key)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import getpass
 import shlex
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -26,43 +26,97 @@ def host_user_name() -> str:
     return "somebody"
 
 
-@dataclass(frozen=True)
-class Served:
-    """An open database. ``unwritten`` is why the file may not be written, None where it may: then ``newer`` returns
-    another database once somebody else wrote the file, else None."""
+class Copies:
+    """Copies of a file that is read and not written, each of one moment: who asks has the newest, as long as they ask.
 
-    db: Database
-    unwritten: str | None = None
-    newer: Callable[[], Database | None] | None = None
-
-
-class _Copies:
-    """Copies of a file, each of one moment. Two stay open: a question may still be asking the one before."""
+    A copy ends, and its file with it, once a newer one is there and its last question is answered.
+    """
 
     def __init__(self, path: str, working_folder: Path) -> None:
         self._path, self._working_folder = path, working_folder
+        #: Held while a copy is made; whoever asks meanwhile waits for it.
+        self._making = Lock()
+        #: Held while the newest copy becomes another, and while the questions of a copy are counted.
         self._lock = Lock()
-        self._open: list[ExitStack] = []
-        self._state: tuple[tuple[int, ...], ...] | None = None
+        self._state = state_of_file(path)
+        self._newest = self._made()
+        self._open = [self._newest]
 
-    def newer(self) -> Database | None:
-        """Return a database of the file as it is now; None where it is as the last one had it."""
-        with self._lock:
+    @property
+    def db(self) -> Database:
+        """The newest copy; use ``asked`` for whatever takes longer than a look."""
+        return self._newest.db
+
+    def follow(self, noted: Callable[[], None]) -> None:
+        """Have questions answered from the file as it is now; ``noted`` is called before any is asked of a new copy.
+
+        Raises StoreError where the file cannot be copied.
+        """
+        with self._making:
             state = state_of_file(self._path)
             if state == self._state:
-                return None
-            with ExitStack() as copied:
-                copy = copied.enter_context(copy_of_one_moment(self._path))
-                db = copied.enter_context(_confined(copy, self._working_folder))
-                self._open.append(copied.pop_all())
-            self._state = state
-            if len(self._open) > 2:
-                self._open.pop(0).close()
-            return db
+                return
+            copy = self._made()
+            copy.db.type_tolerances = self._newest.db.type_tolerances
+            with self._lock:
+                before, self._newest = self._newest, copy
+                self._open.append(copy)
+                self._state = state
+                noted()
+                is_idle = before.questions == 0
+                if is_idle:
+                    self._open.remove(before)
+            if is_idle:
+                before.held.close()
+
+    @contextmanager
+    def asked(self) -> Iterator[Database]:
+        """Yield the newest copy, which stays open for the block."""
+        with self._lock:
+            copy = self._newest
+            copy.questions += 1
+        try:
+            yield copy.db
+        finally:
+            with self._lock:
+                copy.questions -= 1
+                is_last = copy.questions == 0 and copy is not self._newest and copy in self._open
+                if is_last:
+                    self._open.remove(copy)
+            if is_last:
+                copy.held.close()
 
     def close(self) -> None:
-        for copied in self._open:
-            copied.close()
+        """End all copies."""
+        with self._lock:
+            ending, self._open = self._open, []
+        for copy in ending:
+            copy.held.close()
+
+    def _made(self) -> _Copy:
+        with ExitStack() as copied:
+            path = copied.enter_context(copy_of_one_moment(self._path))
+            db = copied.enter_context(_confined(path, self._working_folder))
+            return _Copy(db, copied.pop_all())
+
+
+@dataclass(eq=False)
+class _Copy:
+    """A copy that is open, what it holds, and how many ``questions`` are being asked of it."""
+
+    db: Database
+    held: ExitStack
+    questions: int = 0
+
+
+@dataclass(frozen=True)
+class Served:
+    """An open database. ``unwritten`` is why the file may not be written, None where it may: then ``copies`` are asked,
+    of which ``db`` is the first."""
+
+    db: Database
+    unwritten: str | None = None
+    copies: Copies | None = None
 
 
 @contextmanager
@@ -91,10 +145,5 @@ def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Ite
         with _confined(path, working_folder) as db:
             yield Served(db)
         return
-    copies = _Copies(str(path), working_folder)
-    try:
-        first = copies.newer()
-        assert first is not None, "the first look is of no state that was seen"
-        yield Served(first, why, copies.newer)
-    finally:
-        copies.close()
+    with closing(Copies(str(path), working_folder)) as copies:
+        yield Served(copies.db, why, copies)

@@ -71,7 +71,7 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
                 say(
                     f"{served.unwritten}: nobody can change anything here; what others store is seen with the next page"
                 )
-            gate = application(served.db, settings, working_folder, served.newer)
+            gate = application(served.db, settings, working_folder, served.copies)
             config = configuration(gate, settings)
             scheme = "http" if settings.certificate is None else "https"
 

@@ -17,6 +17,7 @@ from monitor.methods.chain.gross import gross_readings
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.workflow.identify.notes import gross_noted
+from monitor.workflow.intake import gross_doubts as at_import
 from monitor.workflow.intake.gross_doubts import gross_doubts
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -196,3 +197,42 @@ def test_identify_says_which_reading_of_a_touch_far_off_is_wrong_and_what_would_
     assert f"sequence {campaign.probings.sequence[row]} (point {campaign.probings.target[row]})" in str(
         refusal.value
     )
+
+
+def longer(campaign, times):
+    """A campaign whose runs touch everything so many times, with noise of 1 µm between the times."""
+    probings, rng = campaign.probings, np.random.default_rng(11)
+    rows = np.concatenate(
+        [np.tile(np.flatnonzero(probings.run == run), times) for run in np.unique(probings.run)]
+    )
+    many = probings.rows(rows)
+    sequence = np.concatenate([np.arange(1, np.sum(many.run == run) + 1) for run in np.unique(many.run)])
+    readings = {
+        axis: values + rng.normal(0.0, 1e-3, len(rows)) if axis in "XYZ" else values
+        for axis, values in many.readings.items()
+    }
+    return replace(campaign, probings=replace(many, sequence=sequence, readings=readings))
+
+
+@pytest.mark.parametrize("share", [0.7, 0.3])
+def test_a_campaign_that_is_looked_at_in_parts_has_the_same_wrong_readings(
+    virtual_campaigns, monkeypatch, share
+):
+    """Whole runs together, or a share of the rows of each: none is lost, none is looked at twice."""
+    campaign = longer(virtual_campaigns.on_machine("trunnion", 5)[0], 6)
+    row = int(second_run(campaign)[5])
+    spoiled = wrong.with_wrong_reading(campaign, row, "Y", 0.5)
+    (sentence,) = gross_doubts(spoiled)
+    most = int(share * len(campaign.probings))
+    monkeypatch.setattr(at_import, "MOST_TOGETHER", most)
+    parts = [part.probings for part in at_import._parts(spoiled)]
+    assert len(parts) > 1
+    # The runs of a group share what is left over.
+    assert max(map(len, parts)) <= most + len(campaign.runs)
+    rows = sorted(
+        pair for part in parts for pair in zip(part.run.tolist(), part.sequence.tolist(), strict=True)
+    )
+    probings = spoiled.probings
+    assert rows == sorted(zip(probings.run.tolist(), probings.sequence.tolist(), strict=True))
+    assert gross_doubts(spoiled) == (sentence,)
+    assert gross_doubts(campaign) == ()

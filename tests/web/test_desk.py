@@ -31,6 +31,9 @@ class _Asked:
         self.freshness, self.go, self.count, self.refuses = Freshness(), threading.Event(), 0, False
         self.fault: Exception | None = None
 
+    def follow(self) -> None:
+        """Have one file, and no copies of it."""
+
     def __call__(self, user: User, question: str, document: Any, files: Any = None) -> int:
         self.go.wait(60.0)
         if self.fault is not None:
@@ -181,6 +184,9 @@ def test_what_is_computed_says_how_far_it_is() -> None:
     class Telling:
         freshness = Freshness()
 
+        def follow(self) -> None:
+            """Have one file, and no copies of it."""
+
         def __call__(self, *_: object) -> str:
             told(0.25)
             told(0.4)
@@ -207,6 +213,9 @@ def test_a_page_says_what_is_done_where_nobody_knows_how_far_it_is() -> None:
     begun, end = threading.Event(), threading.Event()
 
     class Compiling(_Asked):
+        def follow(self) -> None:
+            """Have one file, and no copies of it."""
+
         def __call__(self, user: User, question: str, document: Any, files: Any = None) -> int:
             with saying("the program is being made ready"):
                 begun.set()

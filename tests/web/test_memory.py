@@ -32,6 +32,9 @@ class Answering:
     def __init__(self) -> None:
         self.freshness = Freshness()
 
+    def follow(self) -> None:
+        """Have one file, and no copies of it."""
+
     def __call__(self, *_: object) -> Any:
         return SimpleNamespace()
 
@@ -110,6 +113,9 @@ def test_answers_are_held_within_a_number_of_bytes_and_the_latest_always(
 
 
 class AnsweringMuch(Answering):
+    def follow(self) -> None:
+        """Have one file, and no copies of it."""
+
     def __call__(self, *_: object) -> Any:
         return (np.zeros(250_000),)
 

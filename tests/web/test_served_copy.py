@@ -41,7 +41,7 @@ def test_viewers_see_what_others_stored_and_nobody_is_kept_from_the_file(
     with opened(shop, room) as served:
         assert served.unwritten == f"{shop} may not be written"
         settings = ServerSettings(database=shop, reading_only=True)
-        gate = application(served.db, settings, room, served.newer)
+        gate = application(served.db, settings, room, served.copies)
         client = TestClient(gate, base_url="http://127.0.0.1:8765")
         assert client.get("/").status_code == 200
         assert _events(client) == []
@@ -61,4 +61,4 @@ def test_viewers_see_what_others_stored_and_nobody_is_kept_from_the_file(
 
 def test_a_file_that_may_be_written_is_served_itself(shop: Path, tmp_path: Path) -> None:
     with opened(shop, tmp_path) as served:
-        assert (served.unwritten, served.newer, served.db.path) == (None, None, str(shop))
+        assert (served.unwritten, served.copies, served.db.path) == (None, None, str(shop))

@@ -34,6 +34,9 @@ class Answering:
         self.answer = answer
         self.count = 0
 
+    def follow(self) -> None:
+        """Have one file, and no copies of it."""
+
     def __call__(self, *_: object) -> Any:
         self.count += 1
         return self.answer()

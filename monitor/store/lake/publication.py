@@ -58,7 +58,10 @@ _NOTHING_INLINED = "DATA_INLINING_ROW_LIMIT 0"
 _TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 40, 0.1, 5.0
 #: What is said of faults that may pass, and of those among them that stay: of a bucket, of PostgreSQL 15 and its client
 #: (who asks, with what password, for which database, by what address and options), of rights and room.
-_PASSING = ("conflict", "connection", "connect to", "failed to commit", "could not set lock", "deadlock")
+_PASSING = (
+    *("conflict", "connection", "connect to", "failed to commit", "could not set lock", "deadlock"),
+    "query_wait_timeout",
+)
 _LASTING = re.compile(
     r"nosuchbucket|accessdenied|\bhttp\b.*\b40[134]\b|\b40[134] \("
     r"|authentication failed|no password supplied|no pg_hba\.conf entry|fatal: [^:]* does not exist"
@@ -70,8 +73,10 @@ _LASTING = re.compile(
 #: tried so often, for 7 to 21 s (the pauses are drawn). So is a server that answers whoever connects in words that are
 #: not known here, those of another language: a wrong password and a start that is not over are not told apart there.
 _STANDBY, _TRIES_OF_UNSURE = "read-only transaction", 13
+#: What PostgreSQL and PgBouncer say of themselves while they are busy or a server behind them is away is known.
 _ANSWER = re.compile(
-    r"failed: \w+:\s(?!.*(starting up|shutting down|recovery|not accepting|too many|slots|terminating))"
+    r"failed: \w+:\s(?!.*(starting up|shutting down|recovery|not (yet )?accepting|too many|slots|terminating"
+    r"|due to timeout|query_wait_timeout|login_timeout|login has been failing|no more connections|cannot connect))"
 )
 #: How DuckLake names the statement that its catalogue refused.
 _QUERY = re.compile(r'Failed to execute query ".*": (?=ERROR)', re.DOTALL)

@@ -61,12 +61,24 @@ GERMAN = (
     'connection to server on socket "/s" failed: FATAL:  Datenbank »nolake« existiert nicht',
     'connection to server on socket "/s" failed: FATAL:  das Datenbanksystem startet',
 )
+#: What PgBouncer says, as its source has it, while all connections are in use or its server is away.
+PGBOUNCER = (
+    'connection to server at "h", port 6432 failed: FATAL:  query_wait_timeout',
+    'Failed to execute query "BEGIN": FATAL:  query_wait_timeout',
+    'connection to server at "h", port 6432 failed: FATAL:  client_login_timeout',
+    'connection to server at "h", port 6432 failed: FATAL:  no more connections allowed (max_client_conn)',
+    'connection to server at "h", port 6432 failed: FATAL:  server login has been failing, cached error: connect '
+    "failed (server_login_retry)",
+)
 PASSING = (
     'connection to server at "h", port 5432 failed: Connection refused Is the server running on that host?',
     'connection to server on socket "/s/.s.PGSQL.5432" failed: No such file or directory Is the server running?',
     'connection to server at "h", port 5432 failed: FATAL: the database system is starting up',
     'connection to server at "h", port 5432 failed: FATAL: sorry, too many clients already',
     'could not translate host name "h" to address: Temporary failure in name resolution: connect to it later',
+    'connection to server at "h", port 5432 failed: FATAL: the database system is not yet accepting connections',
+    'connection to server at "h", port 5432 failed: FATAL:  canceling authentication due to timeout',
+    *PGBOUNCER,
     "server closed the connection unexpectedly",
     'Failed to commit DuckLake transaction: Transaction conflict - attempting to insert into table "certificate"',
 )
