@@ -261,10 +261,13 @@ def _warm_up(name: str, warmth: WarmUp) -> str:
         if stable is None or stable > within
         else f"stable after {_hours(stable)} h"
     )
-    return (
-        f"{name}: warms up: {moves} by {abs(warmth.amplitude):.3g} {warmth.unit} within {_hours(within)} h, time "
-        f"constant {_hours(warmth.tau_h)} h; {ends}"
+    what, constant = (
+        ("warms up or drifts", "not determined")
+        if warmth.tau_h is None
+        else ("warms up", f"{_hours(warmth.tau_h)} h")
     )
+    change = f"{moves} by {abs(warmth.amplitude):.3g} {warmth.unit} within {_hours(within)} h"
+    return f"{name}: {what}: {change}, time constant {constant}; {ends}"
 
 
 def _hours(hours: float) -> str:

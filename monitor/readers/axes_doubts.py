@@ -60,6 +60,12 @@ def mistaken_axes(campaign: Campaign) -> MistakenAxes | None:
     steps, nominal = pairs(campaign, declared, at_zero=True)
     if len(nominal) < FEWEST_STEPS or off_places(campaign) is not None:
         return None
+    # Places in one line: a piece that stands turned looks like an exchange.
+    if (
+        declared.by_normals
+        and np.linalg.matrix_rank(nominal, tol=DISTANCE_TOLERANCE * np.linalg.norm(nominal, 2)) < 2
+    ):
+        return None
     nominal = nominal * _signs(campaign)
     if _share_off(steps, nominal) <= TELLING_SHARE:
         return None

@@ -16,8 +16,6 @@ from monitor.readers.spreadsheet import plain_csv
 
 #: Lines at the top of a file among which the head may stand under a title.
 LOOKED_AT = 8
-#: In a row of units: of a column that has none.
-_NO_UNIT = frozenset({"-", "–", "—", "1"})
 _NAME = re.compile(r"[A-Za-z]\w*")
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
@@ -191,11 +189,14 @@ def _why_no_row(number: int, row: list[str], width: int) -> str:
     cells = [cell.strip() for cell in row if cell.strip()]
     if not cells:
         return "the line is empty; remove it"
-    units = [foreign_unit(cell.strip("[]()")) for cell in cells if cell not in _NO_UNIT]
-    if number == 2 and len(units) > 1 and None not in units:
+    if (
+        number == 2
+        and not any(map(is_number, cells))
+        and any(foreign_unit(cell.strip("[]()")) for cell in cells)
+    ):
         return "this is a row of units; remove it: the names of the columns have their units"
     if len(cells) == 1 and width > 2 and not is_number(cells[0]) and cells[0] == row[0].strip():
-        return f"this is no row of the table, only {quoted(cells[0])}; remove it"
+        return f"this is no row of the table, only {quoted(cells[0])}; remove it, or fill its cells"
     return ""
 
 

@@ -16,6 +16,8 @@ from monitor.units import Unit, mistaken_for_mm
 
 #: Declared places are set up by hand: a few millimetres on 100 mm are usual.
 DISTANCE_TOLERANCE = 0.05
+#: Balls that are clamped one by one, of which a touching cycle asks no more than that it finds them.
+SET_UP_BY_HAND_MM = 5.0
 #: Rows of a run whose distances are taken: all pairs of a million rows would need 4 TB. Plans have 60 to 10 000.
 MOST_ROWS = 2000
 #: A rotary axis that is sent to zero reads some thousandths of a degree at most.
@@ -59,14 +61,15 @@ def off_places(campaign: Campaign) -> OffPlaces | None:
     nominal = np.linalg.norm(declared_steps, axis=1)
     if not len(nominal):
         return None
-    share = _share_off(steps, nominal, np.ones(3))
+    slack = SET_UP_BY_HAND_MM if declared.by_normals else 0.0
+    share = _share_off(steps, nominal, np.ones(3), slack)
     if share <= TELLING_SHARE:
         return None
     ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
     for unit in mistaken_for_mm():
         for axes in ("XYZ", "XY", "X", "Y", "Z"):
             scale = np.where([axis in axes for axis in "XYZ"], unit.factor, 1.0)
-            if _share_off(steps, nominal, scale) <= TELLING_SHARE / 2:
+            if _share_off(steps, nominal, scale, slack) <= TELLING_SHARE / 2:
                 return OffPlaces(declared.noun, ratio, len(nominal), share, axes, unit)
     return OffPlaces(declared.noun, ratio, len(nominal), share, "", None)
 
@@ -116,9 +119,10 @@ def pairs(campaign: Campaign, declared: DeclaredPlaces, *, at_zero: bool = False
     return (read[first] - read[second])[apart], nominal[apart]
 
 
-def _share_off(steps: Array, nominal: Array, scale: Array) -> float:
-    """Share of the distances that differ from the declared ones by more than the tolerance."""
-    return float(np.mean(np.abs(np.linalg.norm(steps * scale, axis=1) / nominal - 1.0) > DISTANCE_TOLERANCE))
+def _share_off(steps: Array, nominal: Array, scale: Array, slack: float) -> float:
+    """Share of the distances that differ from the declared ones by more than the tolerance and the ``slack`` in mm."""
+    off = np.abs(np.linalg.norm(steps * scale, axis=1) - nominal)
+    return float(np.mean(off > np.maximum(DISTANCE_TOLERANCE * nominal, slack)))
 
 
 def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:

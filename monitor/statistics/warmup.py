@@ -52,8 +52,13 @@ class WarmUp:
 
     @property
     def settles(self) -> bool:
-        """Whether the curve bends within the times seen; a longer time constant than their span is a straight line."""
-        return self.tau <= self.span
+        """Whether a curve that bends within the times seen agrees with the values, rather than straight lines alone."""
+        return self.tau_interval[0] <= self.span or self.tau_is_known
+
+    @property
+    def tau_is_known(self) -> bool:
+        """Whether tau says more than that the values go along a line: within the span, or bounded above."""
+        return self.tau <= self.span or bool(np.isfinite(self.tau_interval[1]))
 
     @property
     def share_seen(self) -> float:

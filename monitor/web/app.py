@@ -119,7 +119,8 @@ def _fault_of_address(fault: Any) -> str:
     name = fault["loc"][-1]
     if fault["type"] == "missing":
         return f"it lacks '{name}'; the first page leads to what there is"
-    return f"'{name}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}, not '{str(fault.get('input'))[:40]}'"
+    # What the address holds is not repeated: a link could make a page say anything.
+    return f"'{name}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}"
 
 
 async def _of_stale_form(request: Request, error: Exception) -> Response:

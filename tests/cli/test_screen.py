@@ -21,6 +21,7 @@ ARCSEC = 1e-6 * 1_296_000 / (2 * math.pi)
 OTHER = frozenset(
     {
         *(
+            "probability_out",
             "autocorrelation",
             "neighbours",
             "time_constant_days",
@@ -62,6 +63,7 @@ OTHER = frozenset(
             "lack_of_fit_p",
             "in_tolerance_at_next_check",
             "probability",
+            "probability_out",
             "slope_widening",
             "scatter_over_stated",
         ),

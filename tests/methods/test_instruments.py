@@ -694,11 +694,23 @@ def test_four_years_of_one_mount_are_one_history(tmp_path: Path) -> None:
 
 
 def test_the_uncertainty_of_a_mount_is_that_of_the_weights(tmp_path: Path) -> None:
-    """GUM framework by rows against the inverse normal matrix of the independent least squares, for 5 µrad."""
-    with Database(tmp_path / "mount.duckdb") as db:
-        import_campaign(db, example("mount-mmt-2023-07"))
-        request = UncertaintyRequest("mount-mmt-2023-07", method="guf", model_uncertainty=False)
-        answer = uncertainty(db, request)
+    """GUM framework by rows against the inverse normal matrix of the independent least squares, for 5 µrad.
+
+    The stars are told in another order: as recorded they follow themselves, which is in u beside the weights.
+    """
+    campaign = example("mount-mmt-2023-07")
+    told = campaign.probings
+    mixed = told.rows(np.random.default_rng(1).permutation(len(told)))
+    mixed = replace(campaign, probings=replace(mixed, sequence=told.sequence, time=told.time))
+    request = UncertaintyRequest(campaign.name, method="guf", model_uncertainty=False)
+    answers = []
+    for number, each in enumerate((mixed, campaign)):
+        with Database(tmp_path / f"mount-{number}.duckdb") as db:
+            import_campaign(db, each)
+            answers.append(uncertainty(db, request))
+    answer, recorded = answers
+    assert answer.input_covariance_source.neighbours is None
+    assert recorded.input_covariance_source.neighbours > 0.1
     _, u, rms = independent("mount-mmt-2023-07", 6)
     readings_ = 2 * len(example("mount-mmt-2023-07").probings)
     from_residuals = rms * ARCSECOND / np.sqrt(2.0) * np.sqrt(readings_ / (readings_ - 6.0))

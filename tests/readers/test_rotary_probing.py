@@ -175,4 +175,41 @@ def test_a_misspelt_ball_is_no_point_of_a_surface(balls, faults_of):
     """It was taken for a point and told to get more names."""
     (fault,) = faults_of(rewritten(balls, "probings.csv", "Kugel 2", "Kugle 2", 1))
     assert (fault.line, fault.column) == (6, "target")
-    assert fault.message == "run 1: 'Kugle 2' is no ball of [[artefact.balls]]; did you mean 'Kugel 2'?"
+    assert fault.message == (
+        "run 1: 'Kugle 2' is no ball of [[artefact.balls]]; did you mean 'Kugel 2'? "
+        "As a point it was touched at one pose only"
+    )
+
+
+def test_calibrated_diameters_differ_in_their_last_digits(balls):
+    for name, diameter in zip(CENTRES, ("25.0002", "24.9998", "25.0004"), strict=True):
+        toml = balls / "campaign.toml"
+        head, mark, rest = toml.read_text().partition(f'id = "{name}"')
+        toml.write_text(head + mark + rest.replace("diameter_mm = 25.0\n", f"diameter_mm = {diameter}\n", 1))
+    (told,) = doubts(read_campaign(rewritten(balls, "probings.csv", "x_mm,y_mm", "y_mm,x_mm")))
+    assert "x_mm and y_mm exchanged" in told
+
+
+def test_balls_in_one_line_say_nothing_of_exchanged_columns(balls):
+    """A piece that stands turned by a right angle looks the same."""
+    for name, centre, line in zip(CENTRES, CENTRES.values(), (-60.0, 0.0, 70.0), strict=True):
+        rewritten(
+            balls,
+            "campaign.toml",
+            f'{name}"\nnominal_mm = {list(centre)}',
+            f'{name}"\nnominal_mm = [{line}, 0.0, 60.0]',
+        )
+    head, *rows = (balls / "probings.csv").read_text().splitlines()
+    lines = dict(zip(CENTRES, (-60.0, 0.0, 70.0), strict=True))
+    at_zero = [row.split(",") for row in rows if row.split(",")[7] == "0"]
+    for cells in at_zero:
+        x, y, z = CENTRES[cells[3]]
+        moved = (float(cells[4]) - x, float(cells[5]) - y + lines[cells[3]], float(cells[6]) - z + 60.0)
+        cells[4:7] = [f"{value:.4f}" for value in moved]
+    for cells in at_zero:
+        rows.append(",".join(["1", str(len(rows) + 1), str(8.0 * len(rows)), *cells[3:7], "90", *cells[8:]]))
+    written = [",".join(cells) for cells in at_zero] + rows[len(at_zero) * 4 :]
+    for at, row in enumerate(written):
+        written[at] = ",".join(["1", str(at + 1), str(8.0 * at), *row.split(",")[3:]])
+    (balls / "probings.csv").write_text("\n".join([head, *written]) + "\n")
+    assert not any("exchanged" in told or "other sign" in told for told in doubts(read_campaign(balls)))

@@ -160,6 +160,35 @@ def test_what_holds_over_a_campaign_has_the_days_of_an_effect_without_a_test(tou
     assert inside > 0.945 * 2000
 
 
+def one_way(campaign, runs):
+    """The campaign in whose ``runs`` the bar is first and X goes down alone after it: play of X shows in none."""
+    told = campaign.probings
+    bar, x = np.char.startswith(told.target, "S"), told.readings["X"]
+    late = np.isin(told.run, runs)
+    kept = np.flatnonzero(~late | bar | (x < x[bar].min()))
+    order = np.where(late & ~bar, -x, told.sequence - 1000.0 * (bar & late))
+    along = kept[np.lexsort((order[kept], told.run[kept]))]
+    at = told.rows(kept)
+    return replace(campaign, probings=replace(told.rows(along), sequence=at.sequence, time=at.time))
+
+
+def test_an_effect_of_two_of_three_days_has_what_these_two_differ_by(touched) -> None:
+    """Half the difference of the two days, to one degree of freedom, beside what the readings give."""
+    whole = campaign_of(touched, np.full(9, 2.0), np.arange(9), seed=3)
+    selected = SelectedReadings("weeks", repeated_readings(fitted(whole).problem), np.arange(9))
+    amplitudes = [0.0, 0.1, 0.05, 6.0, 6.1, 5.9, 3.0, 3.0, 3.0]
+    campaign = one_way(campaign_of(touched, amplitudes, np.repeat([0, 1, 2], 3)), (7, 8, 9))
+    fit_ = fitted(campaign)
+    by_run = followed_effects(fit_.problem, fit_.solution).estimate[:, 0]
+    assert np.isfinite(by_run).tolist() == [True] * 6 + [False] * 3
+    result = evaluated(campaign, fit_, 1, selected)
+    assert result.behind.holds_for is HoldsFor.CAMPAIGN
+    (scatter,) = [line for line in result.framework.budget if line.source == SCATTER]
+    assert scatter.dof == 1.0
+    apart = by_run[3:6].mean() - by_run[:3].mean()
+    assert result.framework.u[-1] == pytest.approx(abs(apart) / 2.0, rel=0.01)
+
+
 @pytest.mark.parametrize("dof", [math.inf, 12.0])
 @pytest.mark.parametrize(("days", "per_day"), [(1, 2), (1, 5), (2, 3), (3, 4), (6, 1)])
 def test_calm_effects_are_said_to_scatter_in_5_percent_at_most(days: int, per_day: int, dof: float) -> None:

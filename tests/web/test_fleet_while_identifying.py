@@ -41,7 +41,7 @@ def test_identifying_every_campaign_tells_the_share_that_is_done(tmp_path: Path)
 
 def test_a_day_that_is_none_leaves_the_fleet(local: Served) -> None:
     page = local.client.get("/", params={"since": "abc"})
-    assert page.status_code == 200
+    assert page.status_code == 400
     assert "not &#39;abc&#39;: the machines of every day are shown" in page.text
     assert '<a href="/machine?name=' in page.text
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
 from datetime import timedelta
 
 import numpy as np
@@ -93,10 +95,33 @@ def test_what_does_not_settle_within_the_hours_of_a_day_is_no_warm_up():
     assert str(why) == "no warm-up: nothing settles within the 11 h recorded of a day"
 
 
+def test_a_slow_warm_up_of_a_day_is_kept_though_its_time_constant_is_not_determined():
+    """Nine runs over eight hours, a time constant of six: every one is stated, of some the change alone."""
+    unknown = 0
+    for size, seed in itertools.product((10.0, 20.0), range(20)):
+        rng = np.random.default_rng([1904, int(size), seed])
+        day = machine(rng, "warm-up", days=1, runs=9, size=size, tau=6.0)[0]
+        fit, why = warming(day, np.full(9, "A"), (), rng)
+        assert fit is not None, why
+        assert abs(fit.amplitude + size * np.expm1(-8.0 / 6.0)) < 5.0 * fit.u
+        assert fit.p_value < 0.05
+        if fit.tau_h is None:
+            assert fit.tau_interval_h[1] is None
+            assert fit.stable_after_h is None
+            unknown += 1
+    assert unknown > 0
+
+
 def test_the_words_name_what_was_seen_and_write_hours_in_full():
     fit = WarmUp("A", -4.0, 0.3, "µm", 400.0, 304.0, (250.0, 380.0), 820.0, (700.0, None), 0.6, 0.001, 0.008)
     assert _warm_up("EZ0A", fit) == (
         "EZ0A: warms up: rises by 4 µm within 400 h, time constant 300 h; not yet stable after the 400 h recorded"
+    )
+    assert _warm_up(
+        "EZ0A", replace(fit, amplitude=12.0, recorded_h=8.0, tau_h=None, stable_after_h=None)
+    ) == (
+        "EZ0A: warms up or drifts: falls by 12 µm within 8 h, time constant not determined; "
+        "not yet stable after the 8 h recorded"
     )
 
 

@@ -21,6 +21,8 @@ NORMAL = ("normal_x", "normal_y", "normal_z")
 LENGTH_TOLERANCE = 0.01
 # Normals of one point agree to what four decimals round.
 SAME_NORMAL = 1e-3
+#: Diameters of certificates differ in their last digits; steps are held against millimetres.
+SAME_DIAMETER_MM = 0.1
 #: A point touched at one pose says nothing of the axes; a sphere has four unknowns, so fewer touches say nothing.
 FEWEST_POSES, FEWEST_TOUCHES = 2, 4
 
@@ -90,7 +92,12 @@ def _points(
                 plan.file,
                 line,
                 "target",
-                f"run {run}: {quoted(target)} is no ball of [[artefact.balls]]; {meant.strip()}",
+                f"run {run}: {quoted(target)} is no ball of [[artefact.balls]]; {meant.strip()} As a point it "
+                + (
+                    f"has another normal on line {plan.lines[other[0]]}"
+                    if len(other)
+                    else "was touched at one pose only"
+                ),
             )
             continue
         if len(other) and not wrong[mine[0]]:
@@ -112,11 +119,16 @@ def _points(
 
 
 def declared(artefact: Artefact) -> DeclaredPlaces | None:
-    """The nominal centres of balls of one diameter, the commonest; None where fewer than two have it."""
-    by_diameter: dict[float, dict[str, npt.NDArray[np.float64]]] = {}
-    for ball in artefact.balls:
-        by_diameter.setdefault(ball.diameter, {})[ball.id] = np.array(ball.nominal)
-    places = max(by_diameter.values(), key=len, default={})
+    """The nominal centres of balls of one nominal diameter, the commonest; None where fewer than two have it."""
+    alike = [
+        {
+            ball.id: np.array(ball.nominal)
+            for ball in artefact.balls
+            if abs(ball.diameter - of.diameter) < SAME_DIAMETER_MM
+        }
+        for of in artefact.balls
+    ]
+    places = max(alike, key=len, default={})
     return DeclaredPlaces("balls", places, by_normals=True) if len(places) > 1 else None
 
 

@@ -274,8 +274,7 @@ def _parameter(parameter: ParameterHealth) -> ParameterLine:
     drift = _drift(parameter)
     return ParameterLine(
         name=parameter.name,
-        # As the first page names it; what a report of before has no name for is described.
-        description=parameter.in_words or parameter.description,
+        description=parameter.description,
         estimate=written(rounded.estimate),
         expanded=written(rounded.uncertainty),
         tolerance="" if parameter.tolerance is None else "± " + plain(parameter.tolerance),

@@ -255,7 +255,7 @@ def routes() -> APIRouter:
         ]
         first = min(max(first, 0), max(len(shown) - 1, 0))
         return page(
-            request, "fleet.html",
+            request, "fleet.html", status=400 if refusal else 200,
             empty=not machines.rows, waiting=waiting, moment=sums.moment,
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,

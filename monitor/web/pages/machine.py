@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
-from datetime import UTC, date, datetime, time, timedelta
+from datetime import UTC, date, datetime, time, timedelta, timezone
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -118,10 +118,18 @@ def routes() -> APIRouter:
 
 def _moment(request: Request, machine: str, text: str) -> datetime:
     """When something happened; without an offset by the clock of the shop, as the run nearest to it had it."""
-    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", {"machine": machine})
-    typed = typed_moment("when it happened", text, UTC)
-    nearest = min(values.started_at, key=lambda started: abs(started - typed), default=None)
-    return typed_moment("when it happened", text, None if nearest is None else nearest.tzinfo)
+    ask, user = request.app.state.asker, request.state.user
+    typed = typed_moment("when it happened", text, UTC).astimezone(UTC).replace(tzinfo=None)
+    measured = [
+        row for row in ask(user, "campaigns", {"machine": machine}).campaigns if row.first_run_at is not None
+    ]
+    if not measured:
+        return typed_moment("when it happened", text, None)
+    campaign = min(measured, key=lambda row: max(row.first_run_at - typed, typed - row.last_run_at))
+    runs = ask(user, "runs", {"campaign": campaign.campaign}).runs
+    run = min(runs, key=lambda row: abs(row.started_at - typed))
+    clock = timezone(run.started_at_local - run.started_at)
+    return typed_moment("when it happened", text, clock)
 
 
 def _values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:

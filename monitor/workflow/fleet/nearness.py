@@ -20,7 +20,7 @@ from monitor.statistics.sufficient import CellDrift, CellTests
 from monitor.store import FleetSums
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.steps import split_times
-from monitor.workflow.health.request import RISK
+from monitor.workflow.history.beyond_limit import RISK
 from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.history.forecast import RELIABILITY
 

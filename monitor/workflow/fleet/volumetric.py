@@ -10,8 +10,7 @@ from monitor.store import Database, MappedRun, latest_tolerances, mapped_runs
 from monitor.units import MICROMETRE
 from monitor.workflow.fleet.answer import FleetTableRow
 from monitor.workflow.fleet.attention import Attention, Onset
-from monitor.workflow.health.map import longest_beyond
-from monitor.workflow.health.request import RISK
+from monitor.workflow.history.beyond_limit import RISK, longest_beyond
 
 
 def share_of_limit(row: FleetTableRow) -> float:

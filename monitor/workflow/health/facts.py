@@ -64,7 +64,7 @@ def parameter_health(
     estimate, u, expanded = _stated(series, stated)
     return ParameterHealth(
         name=name,
-        description=referred(describe(name), (stated.frames or {}).get(name), texts_of()),
+        description=referred(in_words or describe(name), (stated.frames or {}).get(name), texts_of()),
         unit=series.unit,
         estimate=estimate,
         u=u,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import scipy
-
 from monitor.reporting.health.records import MapShare, PoseError, VolumetricMap
 from monitor.reporting.health.sentences import Pose, Position, Region
+from monitor.workflow.history.beyond_limit import longest_beyond
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
 
@@ -17,14 +16,6 @@ def probability_beyond(answer: VolumetricAnswer, limit_um: float) -> float:
     """
     worst = answer.worst
     return longest_beyond(worst.error_um - limit_um, worst.u_um, answer.degrees_of_freedom)
-
-
-def longest_beyond(beyond_um: float, u_um: float, freedom: float | None) -> float:
-    """The probability that a length, ``beyond_um`` above its limit, is above it; ``freedom`` None: infinite."""
-    if u_um <= 0.0:
-        return float(beyond_um > 0.0)
-    z = beyond_um / u_um
-    return float(scipy.special.ndtr(z) if freedom is None else scipy.special.stdtr(freedom, z))
 
 
 def stated_map(

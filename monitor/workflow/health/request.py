@@ -11,9 +11,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.engines import check_workers
-
-#: A machine may be out of tolerance where the probability of that is above this one.
-RISK = 0.05
+from monitor.workflow.history.beyond_limit import RISK
 
 
 @dataclass(frozen=True)

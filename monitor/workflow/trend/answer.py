@@ -173,7 +173,7 @@ class WarmUp:
     """The warm-up of the days that a campaign began cold or hot: its time constant, and when the machine is stable.
 
     ``amplitude`` is by how much the first run of a day lies above what it comes to within the hours recorded;
-    ``q_value`` the false discovery rate over all parameters.
+    ``tau_h`` None where a line does as well as any curve; ``q_value`` the false discovery rate over all parameters.
     """
 
     campaign: str
@@ -181,7 +181,7 @@ class WarmUp:
     u: float
     unit: str
     recorded_h: float
-    tau_h: float
+    tau_h: float | None
     tau_interval_h: tuple[float | None, float | None]
     stable_after_h: float | None
     stable_interval_h: tuple[float | None, float | None]

@@ -58,10 +58,14 @@ def _of_days(
         return None, Lack(Part.WARM_UP, Cause.DOES_NOT_SETTLE, needed=(float(f"{recorded:.2g}"),))
     p_value = max(fit.p_value, *_beside_drifts(part, day, stepped, np.exp(-hours / fit.tau)))
     tau, stable = fit.tau_interval, fit.stable_interval
+    # Where a line does as well, what the curve comes to beyond the hours recorded is nobody's measurement.
+    is_seen = fit.tau_is_known or fit.stable_after <= recorded
     return WarmUp(
         campaign=campaign, amplitude=fit.amplitude * fit.share_seen, u=fit.u_amplitude * fit.share_seen,
-        unit=part.unit, recorded_h=recorded, tau_h=fit.tau, tau_interval_h=(number(tau[0]), number(tau[1])),
-        stable_after_h=number(fit.stable_after), stable_interval_h=(number(stable[0]), number(stable[1])),
+        unit=part.unit, recorded_h=recorded,
+        tau_h=fit.tau if fit.tau_is_known else None, tau_interval_h=(number(tau[0]), number(tau[1])),
+        stable_after_h=number(fit.stable_after) if is_seen else None,
+        stable_interval_h=(number(stable[0]), number(stable[1])),
         stable_within=fit.tolerance, p_value=p_value,
     ), None  # fmt: skip
 

@@ -65,8 +65,8 @@ def scatter_of_effects(
 
     ``of_readings`` (m + a, m + a) is what the readings of all runs give, estimated with ``dof`` degrees of freedom.
     None where they scatter no more than chance makes of readings in ``_BY_CHANCE`` of campaigns. What is to hold over
-    a campaign of three days or more has what its days differ by whatever its size, and nothing of it in the parameters
-    of the run, whose days and readings have it already.
+    a campaign of three days or more has what the days of an effect differ by whatever its size, where three of them or
+    more determine it, and nothing of it in the parameters of the run, whose days and readings have it already.
     """
     problem, solution, followed = fit.problem, fit.solution, effects.followed
     first = len(of_readings) - len(effects.names)
@@ -84,7 +84,10 @@ def scatter_of_effects(
             values = followed.estimate[:, followed.names.index(name)]
             tail = _BY_CHANCE / len(effects.names)
             if over_days:
-                of_run, beyond = np.zeros_like(of_run), _between_days(values, days, variance)
+                of_run = np.zeros_like(of_run)
+            # Days on which no run determines the effect say nothing of how it scatters: its own days count.
+            if over_days and len(np.unique(days[np.isfinite(values)])) >= FEWEST_DAYS:
+                beyond = _between_days(values, days, variance)
             else:
                 beyond = _beyond(values, days, effects.index, variance, dof, tail)
         poses = (float(widened[column]) ** 2 - 1.0) * variance
@@ -127,10 +130,10 @@ def _beyond(
 
 
 def _between_days(values: Array, days: npt.NDArray[np.int64], variance: float) -> list[_Beyond]:
-    """What the means of days scatter beyond the ``variance`` of their mean by readings alone, if anything; no test
-    decides, since one misses most scatter of the size of that of the readings."""
+    """What the means of ``FEWEST_DAYS`` or more days scatter beyond the ``variance`` of their mean by readings alone,
+    if anything; no test decides, since one misses most scatter of the size of that of the readings."""
     means = _day_means(values, days)
-    of_mean = float(means.var(ddof=1)) / len(means) if len(means) >= FEWEST_DAYS else 0.0
+    of_mean = float(means.var(ddof=1)) / len(means)
     return [_Beyond(len(means) * (of_mean - variance), len(means), True)] if of_mean > variance else []
 
 
