@@ -57,7 +57,7 @@ class Parts:
 
 
 def read_parts(head: Head, runs_table: CsvTable | None, table: CsvTable | None, faults: Faults) -> Parts:
-    """Read runs and probings, and judge them by the rules of the method.
+    """Read runs and probings, and judge them by the rules of the method; the table of probings is empty then.
 
     Where the method is not known, nothing is said of columns that one method has and another has not.
     """
@@ -79,6 +79,8 @@ def _read_parts(head: Head, runs_table: CsvTable | None, table: CsvTable | None,
             head.machine.axes, head.machine.strokes, _targets(head), listed, head.rules, _setups(head)
         )
         part = probings_file.read_probings(table, expected, faults)
+        # What is judged now is judged by numbers; the text of a million rows is 0.6 GB.
+        table.columns.clear()
     if part is not None:
         _check_plan(head, part, faults)
     return Parts(runs, part)
