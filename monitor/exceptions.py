@@ -20,6 +20,10 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 class MonitorError(Exception):
     """Base of every error that the product raises on purpose."""
 
+    def __str__(self) -> str:
+        """Return the message, half characters of what it quotes escaped: it can be printed and sent."""
+        return super().__str__().encode("utf-8", "backslashreplace").decode("utf-8")
+
 
 class InputError(MonitorError):
     """What the user gave is wrong; the message says what would be right (exit status 2)."""
