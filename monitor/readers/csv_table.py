@@ -126,6 +126,9 @@ def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> 
 
 
 def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
+    if not header:
+        faults.add(file, 1, None, "the line is empty; line 1 names the columns")
+        return False
     sound = True
     names: set[str] = set()
     for number, name in enumerate(header, start=1):

@@ -319,3 +319,11 @@ def test_a_row_of_units_a_remark_and_an_empty_line_are_a_fault_each(tilting: Pat
         (len(rows) + 3, "the line is empty"),
         (len(rows) + 4, "this is no row of the table, only 'Geprüft: Jürgen'"),
     ]
+
+
+def test_an_empty_first_line_is_told(tilting: Path, faults_of: Any) -> None:
+    file = tilting / "runs.csv"
+    file.write_text("\n1,2,3\n")
+    assert [(fault.line, fault.message) for fault in faults_of(tilting) if fault.file == "runs.csv"] == [
+        (1, "the line is empty; line 1 names the columns")
+    ]

@@ -76,6 +76,8 @@ def identify_all(
                 answers.append(store(db, *task, result))
             except (DataError, InputError) as error:
                 refused.append(RefusedCampaign(name, str(error)))
+        # There is no more: what hands the results out ends while its engine is still there.
+        deque(results, maxlen=0)
     return IdentificationsAnswer(tuple(answers), tuple(refused))
 
 
