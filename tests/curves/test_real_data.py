@@ -86,6 +86,7 @@ def test_dziuba1_drift_then_yearly_with_bic_falling(told: dict[str, Any]) -> Non
     assert "humidity" in yearly["cause"]  # NIST: a seasonal effect of humidity on the equipment
 
 
+@pytest.mark.slow
 def test_mlco2mon_yearly_then_half_yearly(told: dict[str, Any]) -> None:
     assert effects(told, "mlco2mon") == ["time_year:sin1", "time_year:sin0.5"]
     deviation = [one["residual_deviation"] for one in told["mlco2mon"].history]

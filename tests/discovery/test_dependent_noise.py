@@ -128,6 +128,7 @@ def test_sign_flips_agree_with_fits_of_flipped_residuals(virtual_campaigns):
     assert p_value == pytest.approx((1 + beaten) / 128)
 
 
+@pytest.mark.slow
 def test_nothing_is_told_of_empty_campaigns_in_correlated_noise(virtual_campaigns, trial, explained, seeds):
     """At 1.5 % a campaign, two alarms in four are a chance of 1.3e-3."""
     alarms = []

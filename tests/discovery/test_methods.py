@@ -62,7 +62,8 @@ def test_modules_that_deviate_alike_in_every_run_are_no_effect(trial, thorough):
         assert trial.groups(trial.explained(trial.arms(np.random.default_rng(seed), 10))) == []
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
     """Was: EZZ:cyclic5mm of 0.8 mm and reversals of 0.3 to 0.4 mm beside what is hidden, out of the touches' noise."""
     campaign = trial.rotary(np.random.default_rng([seed, 9]), 6, named(trial, "EYZ:poly1"), perfect=True)
