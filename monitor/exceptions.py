@@ -49,6 +49,10 @@ class MistakenUnitError(DataError):
     """Readings that no machine of the file fits, with the unit that explains them: nothing else is to be looked for."""
 
 
+class TooManyRowsError(DataError):
+    """Rows that need more memory at once than there is: no mistake of the readings is to be looked for."""
+
+
 class NotConvergedError(DataError):
     """An adjustment that found no minimum: the readings contradict the file that describes the machine."""
 

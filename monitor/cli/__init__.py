@@ -60,6 +60,9 @@ def _one_thread() -> None:
 def _run(typed: Sequence[str], *, alone: bool) -> int:
     """Run a verb; one that is ``alone`` is all that this process is for."""
     for text in typed:
+        # A shell passes none on; who calls the command from Python may.
+        if "\0" in text:
+            raise InputError(f"{text!a} holds a character NUL, which no name and no text has")
         if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
             raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
     options = parse(typed)

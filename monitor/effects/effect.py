@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.effects.artefact import HEADS, ArtefactChange, parse_artefact
 from monitor.effects.change import Change
@@ -53,6 +54,10 @@ class ChainBasis:
         added = np.sum(self.columns * coefficients, axis=-1)
         errors[..., self.term.joint, self.term.stage, self.term.component] += added
 
+    def taken(self, rows: npt.NDArray[np.int64]) -> ChainBasis:
+        """Return the effect at chosen rows."""
+        return replace(self, columns=self.columns[rows])
+
 
 @dataclass(frozen=True)
 class ArtefactBasis:
@@ -72,6 +77,10 @@ class ArtefactBasis:
     def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
         """Shift ``target`` (n, 3) in place; ``coefficients`` is (k,) or (n, k)."""
         target += np.sum(self.shifts * np.expand_dims(coefficients, -2), axis=-1)
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> ArtefactBasis:
+        """Return the change at chosen rows."""
+        return replace(self, shifts=self.shifts[rows])
 
 
 @dataclass(frozen=True)
@@ -94,6 +103,10 @@ class TurnBasis:
     def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
         """Add the effect, in place, to ``errors`` (n, J, 2, 6); ``coefficients`` is (k,) or (n, k)."""
         errors[..., self.joint, MOTION, 3:] += np.sum(self.turns * np.expand_dims(coefficients, -2), axis=-1)
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> TurnBasis:
+        """Return the turn at chosen rows."""
+        return replace(self, turns=self.turns[rows])
 
 
 @dataclass(frozen=True)
@@ -118,6 +131,10 @@ class InstrumentBasis:
     def added(self, coefficients: Array) -> Array:
         """Return the change (n, d) of the numbers; ``coefficients`` is (k,) or (n, k)."""
         return np.asarray(np.sum(self.shown * np.expand_dims(coefficients, -2), axis=-1))
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> InstrumentBasis:
+        """Return the change at chosen rows."""
+        return replace(self, shown=self.shown[rows])
 
 
 Basis = ChainBasis | ArtefactBasis | TurnBasis | InstrumentBasis

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from monitor.exceptions import DataError
@@ -23,6 +24,7 @@ from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
+    from monitor.methods.chain.gross import GrossReading
     from monitor.methods.chain.identification import AsStated, Identification, StepwiseCoefficient, TakenUp
     from monitor.methods.chain.least_squares import Solution
     from monitor.methods.chain.results import AdviceOf
@@ -297,12 +299,9 @@ class Method:
         return Model(self.name)
 
 
-def _suspected(problem: ChainProblem) -> str:
+def _suspected(problem: ChainProblem, gross: tuple[GrossReading, ...]) -> str:
     """Which readings are grossly off, as the end of a refusal; empty where none stands out, or the same target in most
     runs: then the file is wrong throughout, not a row."""
-    from monitor.methods.chain.gross import gross_readings
-
-    gross = gross_readings(problem)
     runs_of_target = Counter(target for _, target in {(reading.run, reading.target) for reading in gross})
     if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
         return ""
@@ -398,17 +397,22 @@ class ChainMethod(Method):
         ``solve`` gives the solution of the problem. Raises DataError where the readings do not suffice or contradict
         the machine file, EffectError where the model names an effect that the machine or the data do not have.
         """
+        from monitor.methods.chain.gross_in_parts import gross_of
+        from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
         from monitor.methods.chain.results import identification
 
         model = model or self.own_model
         problem = self.problem_of(campaign, model)
         self.refuse(campaign, problem)
-        try:
-            solution = solve(problem)
-        except DataError as error:
-            raise type(error)(f"{error}{problem.unsettled}{_suspected(problem)}") from error
+        with within_memory(problem, 0 if problem.is_in_parts else TIMES_OF_FIT):
+            try:
+                solution = solve(problem)
+            except DataError as error:
+                gross = gross_of(campaign, problem, None, partial(self.problem_of, model=model))
+                raise type(error)(f"{error}{problem.unsettled}{_suspected(problem, gross)}") from error
+        gross = gross_of(campaign, problem, solution, partial(self.problem_of, model=model))
         return replace(
-            identification(campaign, model, problem, solution, self.advice),
+            identification(campaign, model, problem, solution, self.advice, gross),
             taken_up=self.taken_up(problem),
             as_stated=self.as_stated(problem),
         )

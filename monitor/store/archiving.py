@@ -17,6 +17,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import StoreError
 from monitor.records import SourceFile
 from monitor.store.analyses import save_analysis
@@ -103,7 +104,9 @@ def archive_faults(db: Database, folder: str | Path) -> Iterator[str]:
         for listed in document["files"]:
             path = Path(folder) / str(document["campaign_id"]) / Path(listed["file"]).name
             try:
-                sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+                sha256 = hashlib.sha256(
+                    read_bounded(path, max(listed["bytes"], LARGEST_DOCUMENT))
+                ).hexdigest()
             except OSError as fault:
                 yield f"{path}, of campaign {document['campaign']}, cannot be read: {fault.strerror or fault}"
                 continue

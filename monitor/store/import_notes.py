@@ -24,6 +24,8 @@ from monitor.units import CONDITION_SUFFIXES
 #: With two or three coordinates a probing, or a finer print, it does not.
 FEWEST_PROBINGS = 12
 
+#: Names of targets that become text at a time: those of a million rows take 60 MB.
+ROWS_AT_ONCE = 50_000
 #: A folder imported again and again under new names: so many campaigns, and runs of each, are named.
 MOST_CAMPAIGNS, MOST_PAIRS = 5, 5
 
@@ -44,7 +46,10 @@ def run_fingerprints(touches: Probings) -> dict[int, str]:
     for run, rows in zip(runs.tolist(), np.split(order, starts[1:]), strict=True):
         if len(rows) < FEWEST_PROBINGS:
             continue
-        fingerprint = hashlib.sha256("\0".join(touches.target[rows].tolist()).encode())
+        fingerprint = hashlib.sha256()
+        for start in range(0, len(rows), ROWS_AT_ONCE):
+            targets = touches.target[rows[start : start + ROWS_AT_ONCE]].tolist()
+            fingerprint.update(("\0" * bool(start) + "\0".join(targets)).encode())
         for name in sorted(measured):
             fingerprint.update(
                 name.encode() + b"\0" + np.asarray(measured[name][rows], dtype="<f8").tobytes()

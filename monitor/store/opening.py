@@ -14,6 +14,7 @@ from pathlib import Path
 
 import duckdb
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
 from monitor.store.kept_blocks import (
@@ -359,5 +360,5 @@ def _newest_backup(path: str) -> tuple[str, Path] | None:
         with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
             file = manifest.with_name(manifest.name.removesuffix(_MANIFESTS[1:]))
             if file.is_file():
-                backups.append((str(json.loads(manifest.read_text(encoding="utf-8"))["made_at"]), file))
+                backups.append((str(json.loads(read_bounded(manifest, LARGEST_DOCUMENT))["made_at"]), file))
     return max(backups, default=None)

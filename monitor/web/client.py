@@ -20,6 +20,7 @@ from typing import IO, Any
 from urllib.parse import urlsplit
 
 from monitor import __version__
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.documents import answer_from_document, to_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.web.access import JUDGING, NOT_OFFERED, ROOT, STAYING, address_of
@@ -254,8 +255,7 @@ def server_of_note(note: Note, tolerances: Mapping[str, Mapping[str, float]] | N
 def token_in(file: Path) -> str:
     """Return the token that the first line of a file is. Raises InputError."""
     try:
-        with file.open("rb") as content:
-            lines = content.read(4096).decode("ascii").split()
+        lines = read_bounded(file, LARGEST_SETTINGS).decode("ascii").split()
     except (OSError, ValueError) as error:
         raise InputError(f"the file of the token {file} cannot be read: {error}") from error
     if not lines:

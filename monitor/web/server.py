@@ -20,6 +20,7 @@ from socket import socket
 
 import uvicorn
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.web.app import application
 from monitor.web.gate import Gate
@@ -153,6 +154,9 @@ def _checked_certificate(settings: ServerSettings) -> str | None:
     if settings.certificate is None or settings.key is None:
         return None
     try:
+        for file in (settings.certificate, settings.key):
+            # OpenSSL would wait for whoever writes into a pipe.
+            read_bounded(file, LARGEST_SETTINGS)
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(
             settings.certificate, settings.key, password=""
         )

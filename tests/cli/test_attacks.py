@@ -154,6 +154,22 @@ def test_a_nul_in_the_name_of_a_database(typed: Any, name: str) -> None:
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("words", [("export",), ("backup",), ("report", "--out"), ("archive",), ("import",)])
+def test_a_nul_in_any_name_is_refused_in_words(typed: Any, db: Path, words: tuple[str, ...]) -> None:
+    said = typed(*words, "a\0b", db=db)
+    assert (said.status, said.out) == (2, "")
+    assert "holds a character NUL" in said.err
+
+
+@pytest.mark.parametrize("what", [endless, pipe, huge])
+def test_a_token_is_read_within_limits(typed: Any, tmp_path: Path, what: Any) -> None:
+    """Nobody is waited for who might write into a pipe."""
+    what(tmp_path / "token")
+    said = typed("campaigns", "--server", "http://127.0.0.1:1", "--server-token", tmp_path / "token")
+    assert said.status == 2
+    assert "not a regular file" in said.err or "is larger than" in said.err
+
+
 def test_a_pipe_as_database_is_refused_at_once(typed: Any, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     said = typed("campaigns", db=tmp_path / "pipe")

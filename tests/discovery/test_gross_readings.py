@@ -14,10 +14,10 @@ from monitor.discovery import fit, robust_fit
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.gross import gross_readings
+from monitor.methods.chain.parts import parts_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.workflow.identify.notes import gross_noted
-from monitor.workflow.intake import gross_doubts as at_import
 from monitor.workflow.intake.gross_doubts import gross_doubts
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -224,8 +224,8 @@ def test_a_campaign_that_is_looked_at_in_parts_has_the_same_wrong_readings(
     spoiled = wrong.with_wrong_reading(campaign, row, "Y", 0.5)
     (sentence,) = gross_doubts(spoiled)
     most = int(share * len(campaign.probings))
-    monkeypatch.setattr(at_import, "MOST_TOGETHER", most)
-    parts = [part.probings for part in at_import._parts(spoiled)]
+    monkeypatch.setattr("monitor.methods.chain.parts.MOST_TOGETHER", most)
+    parts = [part.probings for _, part in parts_of(spoiled)]
     assert len(parts) > 1
     # The runs of a group share what is left over.
     assert max(map(len, parts)) <= most + len(campaign.runs)

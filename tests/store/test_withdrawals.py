@@ -35,6 +35,7 @@ from monitor.store import (
     withdraw_campaign,
 )
 from monitor.store.catalogue import campaigns_of_machine
+from monitor.store.import_notes import run_fingerprints
 
 
 @pytest.fixture
@@ -283,3 +284,13 @@ def test_campaigns_from_before_the_hashes_are_compared_too(
     db.execute("DELETE FROM run_fingerprint")
     import_campaign(db, long_campaign(make_campaign, "two"))
     assert len(campaign_notes(db, "two")) == 1
+
+
+def test_the_hash_of_a_run_does_not_depend_on_how_much_of_it_is_hashed_at_a_time(
+    make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that are stored stay what they are."""
+    probings = long_campaign(make_campaign, "one").probings
+    whole = run_fingerprints(probings)
+    monkeypatch.setattr("monitor.store.import_notes.ROWS_AT_ONCE", 7)
+    assert run_fingerprints(probings) == whole

@@ -15,6 +15,7 @@ from monitor.discovery.machine.noise.rows import neighbours_of
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
+from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Array
 
@@ -187,18 +188,28 @@ def fit(
     """The least-squares point of a problem; probings that are left out get no weight.
 
     ``start`` is an earlier fit of the same runs with the same base, from which the search begins and whose correlation
-    of neighbours is kept.
+    of neighbours is kept. Raises DataError where the readings do not suffice, or all of them at once need more memory
+    than there is.
     """
     out = np.zeros(len(problem.context), dtype=bool) if left_out is None else left_out
     weighted = replace(problem, sigma=np.where(out[:, None], np.inf, problem.sigma)) if out.any() else problem
     if start is None:
-        return Fit(weighted, solve_problem(weighted), out)
+        return Fit(weighted, _solved(weighted), out)
     common = weighted.common_start.copy()
     names = start.problem.added_names
     if names == weighted.added_names[: len(names)]:
         common[: len(names)] = start.solution.common
-    fitted = Fit(weighted, solve_problem(weighted, start.solution.local, common), out)
+    fitted = Fit(weighted, _solved(weighted, start.solution.local, common), out)
     return fitted if start.whitening is None else fitted.with_correlation(start.whitening.correlation)
+
+
+def _solved(problem: ChainProblem, local: Array | None = None, common: Array | None = None) -> Solution:
+    """The solution of a problem with the linearisation of all rows, also where they are so many that it needs none."""
+    with within_memory(problem, TIMES_OF_FIT):
+        solution = solve_problem(problem, local, common)
+        if not problem.is_in_parts:
+            return solution
+        return replace(solution, last=problem.linearise(solution.local, solution.common))
 
 
 def fit_those_possible(

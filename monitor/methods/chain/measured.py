@@ -89,6 +89,12 @@ class MeasuredChain(ABC):
         return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(directions), rows))
 
     @property
+    def shared_by_rows(self) -> tuple[str, ...] | None:
+        """What is computed of all rows together, by its names, besides runs and targets, so that a row beside some
+        others tells what it tells beside all; None where rows cannot be parted."""
+        return None
+
+    @property
     def components(self) -> tuple[str, ...]:
         """Names of the d numbers of a row."""
         return ("x", "y", "z")

@@ -20,12 +20,16 @@ from monitor.effects import Basis, ChainEffect
 from monitor.exceptions import DataError, NotConvergedError
 from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
+from monitor.methods.chain.condensed import triangles
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
 from monitor.units import Unit, mistaken_for_mm
+
+#: Up to so many rows the derivatives of all stand side by side: 7 kB a row, 1 GB. Of more, those of ``ROWS_AT_ONCE``.
+MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 20_000
 
 
 @dataclass(frozen=True)
@@ -200,12 +204,34 @@ class ChainProblem(MeasuredChain):
         }
         return replace(self, context=replace(self.context.taken(rows), run=run), **arrays)
 
+    @property
+    def is_in_parts(self) -> bool:
+        """Whether the rows are so many that a fit takes some at a time. Added effects look at all rows together."""
+        return len(self.context) > MOST_AT_ONCE and self.shared_by_rows is not None and not self.added
+
+    def blocks(self) -> Iterator[Self]:
+        """The problem in blocks of ``ROWS_AT_ONCE`` rows in file order, each with the unknowns of the whole."""
+        for first in range(0, len(self.context), ROWS_AT_ONCE):
+            rows = np.arange(first, min(first + ROWS_AT_ONCE, len(self.context)))
+            part = self.taken(rows, self.context.run[rows])
+            for name in ("runs", "targets", *(self.shared_by_rows or ())):
+                vars(part)[name] = getattr(self, name)
+            vars(part)["_bases"] = tuple(basis.taken(rows) for basis in self._bases)
+            yield part
+
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, d) in mm, in file order."""
+        if self.is_in_parts:
+            return np.concatenate([part.vectors(local, common) for part in self.blocks()])
         return self.observe(self.evaluated(local, common).residual)
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives at (R, p) and (c,)."""
+        of_rows = Linearisation(*map(self.padded, self.of_rows(local, common)))
+        return self.with_calibrated(of_rows, local)
+
+    def of_rows(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
+        """Whitened residuals (n, d) at (R, p) and (c,), and derivatives (n, d, p) and (n, d, c), row by row."""
         pose = self.evaluated(local, common, jacobian=True)
         assert pose.by_error is not None
         nuisance = self.own_of(local)
@@ -216,17 +242,37 @@ class ChainProblem(MeasuredChain):
         by_common = np.zeros((len(self.context), pose.residual.shape[1], len(common)))
         for added, columns in zip(self.shared, self.common_columns, strict=True):
             by_common[:, :, columns] = added.displacement(common[columns], pose.by_error)
-        extra, by_extra = self.extras(nuisance)
+        return self._white(pose.residual), self._white(by_local), self._white(by_common)
+
+    def condensed(self, local: Array, common: Array) -> Linearisation:
+        """The same fit in p + c + 1 rows a run, and behind them its calibrated quantities: ``condensed.py``."""
+        unknowns = local.shape[1]
+        rows = triangles(self._numbers_of_blocks(local, common), len(self.runs), unknowns + len(common) + 1)
+        return self.with_calibrated(
+            Linearisation(rows[..., -1], rows[..., :unknowns], rows[..., unknowns:-1]), local
+        )
+
+    def _numbers_of_blocks(
+        self, local: Array, common: Array
+    ) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:
+        for block in self.blocks():
+            residual, by_local, by_common = block.of_rows(local, common)
+            yield block._run, np.concatenate([by_local, by_common, residual[..., None]], axis=-1)
+
+    def with_calibrated(self, of_rows: Linearisation, local: Array) -> Linearisation:
+        """What rows say at (R, p), and behind it what is known of the calibrated quantities of every run."""
+        extra, by_extra = self.extras(self.own_of(local))
         count = len(self.base_names)
+        none = np.zeros((*extra.shape, of_rows.common.shape[-1]))
         return Linearisation(
-            np.concatenate([self._white(pose.residual), extra], axis=1),
-            np.concatenate([self._white(by_local), np.pad(by_extra, ((0, 0), (0, 0), (count, 0)))], axis=1),
-            np.concatenate([self._white(by_common), np.zeros((*extra.shape, len(common)))], axis=1),
+            np.concatenate([of_rows.residual, extra], axis=1),
+            np.concatenate([of_rows.local, np.pad(by_extra, ((0, 0), (0, 0), (count, 0)))], axis=1),
+            np.concatenate([of_rows.common, none], axis=1),
         )
 
     def _white(self, rows: Array) -> Array:
         observed = self.observe(rows)
-        return self.padded(observed / self.sigma.reshape(self.sigma.shape + (1,) * (observed.ndim - 2)))
+        return np.asarray(observed / self.sigma.reshape(self.sigma.shape + (1,) * (observed.ndim - 2)))
 
 
 def stops(problem: ChainProblem, solution: Solution) -> Array:
@@ -258,7 +304,7 @@ def solve_problem(
     may have more than one minimum in it. Where no start converges, because the readings show only that something
     follows and not how late, it is held at the best of these values and is not determined. Raises DataError where
     that does not converge either, or where the readings fit only another machine. ``most`` bounds the steps where
-    nothing is searched.
+    nothing is searched. Of a problem that ``is_in_parts`` the solution's ``last`` is condensed.
     """
     begin = problem.start if local is None else local
     first = problem.common_start if common is None else common
@@ -267,7 +313,8 @@ def solve_problem(
         held = held_at_zero(problem.shared, problem.linearise(begin, first))
 
     def linearise(local: Array, common: Array) -> Linearisation:
-        return without_held(problem.linearise(local, common), held)
+        at = problem.condensed(local, common) if problem.is_in_parts else problem.linearise(local, common)
+        return without_held(at, held)
 
     starts = [np.where(held, 0.0, first)]
     searched = any(added.searched for added in problem.shared)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from monitor.methods.chain.gross import gross_readings
+from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -56,7 +56,12 @@ def refusals(problem: ChainProblem, null_space: Array, run: int, advice: AdviceO
 
 
 def identification(
-    campaign: Campaign, model: Model, problem: ChainProblem, solution: Solution, advice: AdviceOf
+    campaign: Campaign,
+    model: Model,
+    problem: ChainProblem,
+    solution: Solution,
+    advice: AdviceOf,
+    gross: tuple[GrossReading, ...],
 ) -> Identification:
     """The geometric errors of every run, with the covariance of the stated uncertainties."""
     count = len(problem.base_names)
@@ -100,6 +105,6 @@ def identification(
         added_covariance=shared.covariance,
         added_refused=shared.refused,
         iterations=solution.iterations,
-        gross=gross_readings(problem, solution),
+        gross=gross,
         followed=followed_effects(problem, solution),
     )

@@ -53,6 +53,11 @@ class TouchProblem(ChainProblem):
         return np.tile(np.concatenate([nominal, self.tip]), (len(self.runs), 1))
 
     @property
+    def shared_by_rows(self) -> tuple[str, ...]:
+        """Nothing more."""
+        return ()
+
+    @property
     def standard_lengths(self) -> Array:
         """The calibrated distances, in mm."""
         return np.array([distance.length[0] for distance in self.distances])

@@ -88,6 +88,11 @@ class RotaryProblem(ChainProblem):
         return self.apart
 
     @property
+    def shared_by_rows(self) -> tuple[str, ...]:
+        """Which targets are spheres."""
+        return ("_kinds",)
+
+    @property
     def components(self) -> tuple[str, ...]:
         """The one number of a touch."""
         return ("normal",)
@@ -196,7 +201,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
     normal = _normals(campaign)
     ball = np.isin(context.target, [sphere.id for sphere in campaign.artefact.balls])
     tip = campaign.probe.tip or (0.0, 0.0, 0.0)
-    none = np.zeros((len(context), len(chain.joints), 2, 6))
+    none = np.zeros((len(chain.joints), 2, 6))
     tips = evaluate(chain, context.positions, none, np.zeros((len(context), 3)), np.array(tip)).residual
     reference, apart = _references(context, tips, ball)
     problem = RotaryProblem(

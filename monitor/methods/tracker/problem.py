@@ -62,6 +62,11 @@ class TrackingProblem(ChainProblem):
         return np.tile(start, (len(self.runs), 1))
 
     @property
+    def shared_by_rows(self) -> tuple[str, ...]:
+        """The middles of the runs."""
+        return ("_centre",)
+
+    @property
     def largest_error(self) -> float:
         """A turn of 20 degrees."""
         return LARGEST_TURN

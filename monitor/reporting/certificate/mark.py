@@ -9,6 +9,8 @@ import base64
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
+
 #: Pictures that a laboratory's mark may be, and the largest that is printed.
 MARK_KINDS: Mapping[str, str] = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg"}
 MARK_BYTES = 512 * 1024
@@ -29,8 +31,7 @@ def read_mark(file: Path, name: str | None, faults: list[str]) -> str | None:
         faults.append(f"laboratory.mark is a picture ({', '.join(MARK_KINDS)}), but is {name!r}")
         return None
     try:
-        with path.open("rb") as stream:
-            content = stream.read(MARK_BYTES + 1)
+        content = read_bounded(path, LARGEST_DOCUMENT)
     except OSError as error:
         faults.append(f"laboratory.mark: {path} cannot be read: {error.strerror or error}")
         return None

@@ -18,6 +18,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.signature.field import NAME, field_drawing, place_in
 from monitor.reporting.signature.long_term import fetching_context, together_with_signature
@@ -166,7 +167,7 @@ def _file_signer(key: FileKey) -> Iterator[Any]:
     from pyhanko.sign import signers
 
     try:
-        content = key.path.read_bytes()
+        content = read_bounded(key.path, LARGEST_DOCUMENT)
     except OSError as error:
         raise InputError(f"the key file {key.path} cannot be read: {error.strerror or error}") from error
     passphrase = None if key.passphrase is None else key.passphrase.encode()

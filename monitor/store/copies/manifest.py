@@ -14,6 +14,7 @@ from pathlib import Path
 import duckdb
 
 from monitor import __version__
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import StoreError
 from monitor.store.kept_blocks import ENDING
 from monitor.store.opening import refuse_log_left, sync_folder
@@ -120,7 +121,7 @@ def manifest_of(path: Path) -> Path:
 def read_manifest(path: Path) -> Backup:
     """Return what a manifest says. Raises StoreError for what is none."""
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = json.loads(read_bounded(path, LARGEST_DOCUMENT))
         span = manifest.pop("span", None)
         return Backup(
             **manifest | {"tables": _checksums(manifest["tables"])},

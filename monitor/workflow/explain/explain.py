@@ -22,6 +22,7 @@ from monitor.discovery import (
 from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
+from monitor.methods.chain.memory import TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
@@ -71,9 +72,10 @@ def explanation_of(
         )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
-    explanation = search(
-        campaign, first.problem, label(model), rate=rate, rng=rng, first=first, gross=robust.points
-    )
+    with within_memory(first.problem, TIMES_OF_SEARCH):
+        explanation = search(
+            campaign, first.problem, label(model), rate=rate, rng=rng, first=first, gross=robust.points
+        )
     if is_hopeless(explanation):
         # The effects of the search leave nearly all of the residual: none of them is an answer.
         return replace(explanation, missing=(), suspect=(), moves=(), steps=())

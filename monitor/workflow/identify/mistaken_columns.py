@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from monitor.exceptions import DataError, MistakenUnitError
+from monitor.exceptions import DataError, MistakenUnitError, TooManyRowsError
+from monitor.methods.chain.parts import parts_of
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
@@ -16,9 +17,10 @@ def with_mistake(
     """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
 
     Columns that the import saw exchanged are said again. Else the changes are tried that would let the readings fit,
-    which takes up to half a minute; where none does, what else the import noticed of the columns is said.
+    which takes up to half a minute; where none does, what else the import noticed of the columns is said. Of very many
+    rows a part is tried.
     """
-    if isinstance(refusal, MistakenUnitError):
+    if isinstance(refusal, MistakenUnitError | TooManyRowsError):
         return refusal
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
@@ -28,7 +30,8 @@ def with_mistake(
     from monitor.reporting.machine_finding import mistake_sentence
     from monitor.workflow.explain.machine_answer import mistakes_found
 
-    mistakes = find_mistakes(campaign, problem_of, None)
+    _, part = next(parts_of(campaign))
+    mistakes = find_mistakes(part, problem_of, None)
     said = (mistake_sentence(mistakes_found(mistakes)),) if mistakes else column_doubts(campaign)
     return _with_sentences(refusal, said) if said else refusal
 

@@ -133,7 +133,11 @@ def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest
     """As ``evaluate``, of a campaign that is loaded."""
     campaign = runs_before(whole, request.before)
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
-    fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
+    problem = campaign_method(campaign).problem_of(campaign, as_model(model))
+    of_run = problem.context.run == (problem.runs[-1] if request.run is None else request.run)
+    # Before the fit, which takes minutes and memory where the rows are so many: a number is a reading or more.
+    _refuse_too_many(int(np.isfinite(problem.sigma[of_run]).sum()), request.method)
+    fitted = fit(problem)
     selected = None
     if request.select is not None:
         selected = selected_readings(db, request.select, campaign.name, model, fitted.problem)

@@ -1,0 +1,117 @@
+"""A campaign of very many rows is fitted some rows at a time: what comes out is what all rows at once give."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.discovery import fit
+from monitor.exceptions import TooManyRowsError
+from monitor.methods import campaign_method
+from monitor.methods.chain.memory import free_memory
+from monitor.progress import listening
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+CHAIN = "monitor.methods.chain"
+
+
+@pytest.fixture(params=["cold-cold", "tilting-table", "tracked-robot"])
+def campaign(request: pytest.FixtureRequest) -> Campaign:
+    """Balls that are touched, faces and spheres of a piece, reflectors that are tracked."""
+    return read_campaign(EXAMPLES / request.param)
+
+
+@pytest.fixture
+def in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let parts be so small that some lack a run, a target or the spheres."""
+    monkeypatch.setattr(f"{CHAIN}.problem.MOST_AT_ONCE", 20)
+    monkeypatch.setattr(f"{CHAIN}.problem.ROWS_AT_ONCE", 17)
+
+
+def test_the_triangle_of_a_run_says_what_its_rows_say(campaign: Campaign, in_parts: None) -> None:
+    problem = campaign_method(campaign).problem_of(campaign)
+    assert problem.is_in_parts
+    local = problem.start
+    whole, few = (
+        problem.linearise(local, problem.common_start),
+        problem.condensed(local, problem.common_start),
+    )
+    assert few.local.shape[1] == local.shape[1] + 1 + len(problem.extra_names)
+    for run in range(len(problem.runs)):
+        rows, triangle = (np.column_stack([at.local[run], at.residual[run]]) for at in (whole, few))
+        scale = np.linalg.norm(rows, axis=0)
+        scale[scale == 0.0] = 1.0
+        np.testing.assert_allclose(
+            triangle.T @ triangle / np.outer(scale, scale), rows.T @ rows / np.outer(scale, scale), atol=1e-12
+        )
+
+
+def test_identify_in_parts_is_identify_at_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers to a millionth of their standard uncertainty, and everything that is refused or noted."""
+    method = campaign_method(campaign)
+    at_once = method.identify(campaign)
+    monkeypatch.setattr(f"{CHAIN}.problem.MOST_AT_ONCE", 20)
+    monkeypatch.setattr(f"{CHAIN}.problem.ROWS_AT_ONCE", 17)
+    parted = method.identify(campaign)
+    assert (parted.iterations, parted.gross) == (at_once.iterations, at_once.gross)
+    for mine, theirs in zip(parted.runs, at_once.runs, strict=True):
+        u = np.sqrt(np.diag(theirs.covariance))
+        np.testing.assert_allclose(mine.estimate / u, theirs.estimate / u, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(mine.covariance, theirs.covariance, rtol=1e-6)
+        np.testing.assert_allclose(mine.residuals, theirs.residuals, atol=1e-9)
+        assert mine.chi_square == pytest.approx(theirs.chi_square, rel=1e-9)
+        assert (mine.refused, mine.degrees_of_freedom) == (theirs.refused, theirs.degrees_of_freedom)
+
+
+def test_effects_that_look_at_all_rows_are_fitted_at_once(in_parts: None) -> None:
+    campaign = read_campaign(EXAMPLES / "cold-cold")
+    method = campaign_method(campaign)
+    model = replace(method.own_model, added=("EXX:reversal",))
+    problem = method.problem_of(campaign, model)
+    assert not problem.is_in_parts
+
+
+def test_what_needs_more_memory_than_there_is_is_refused_in_words(
+    in_parts: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel would end the process; `identify` needs little, and goes on."""
+    monkeypatch.setattr(f"{CHAIN}.memory.SMALL", 1e6)
+    monkeypatch.setattr(f"{CHAIN}.memory.free_memory", lambda: 2e6)
+    campaign = read_campaign(EXAMPLES / "cold-cold")
+    method = campaign_method(campaign)
+    problem = method.problem_of(campaign)
+    with pytest.raises(
+        TooManyRowsError, match=r"1320 rows at once takes some 0 GB of memory, and 0.0 GB are free"
+    ):
+        fit(problem)
+    model = replace(method.own_model, added=("EXX:reversal",))
+    with pytest.raises(TooManyRowsError, match="import fewer of them: some runs, or one row of so many"):
+        method.identify(campaign, model)
+    assert len(method.identify(campaign).runs) == 44
+
+
+def test_much_memory_is_said_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{CHAIN}.memory.SMALL", 1e6)
+    said: list[str] = []
+    problem = campaign_method(campaign := read_campaign(EXAMPLES / "cold-cold")).problem_of(campaign)
+    with listening(lambda share: None, said.append):
+        fit(problem)
+    assert said == ["1320 rows at once, some 0 GB of memory", ""]
+
+
+@pytest.mark.skipif(not Path("/proc/meminfo").exists(), reason="only Linux says what is free")
+def test_free_memory_is_what_the_system_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    free = free_memory()
+    assert free is not None
+    assert 0.0 < free < 1e15
+    for name, text in (("_LIMIT", "3000000\n"), ("_USED", "1000000\n")):
+        (tmp_path / name).write_text(text)
+        monkeypatch.setattr(f"{CHAIN}.memory.{name}", tmp_path / name)
+    assert free_memory() == 2e6
+    monkeypatch.setattr(f"{CHAIN}.memory._MEMORY", tmp_path / "none")
+    assert free_memory() is None
