@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from monitor.records import Campaign
 
-#: So many rows are looked at together: the model takes 7 kB of memory for each, 350 MB. Plans have 60 to 10 000 a run.
-MOST_TOGETHER = 50_000
+#: So many rows are looked at together: the model takes 10 kB of memory for each, 250 MB. Plans have 60 to 10 000 a run.
+MOST_TOGETHER = 25_000
 #: Runs that are looked at together, where there are so many: what two or more of them read alike is no mistake of one.
 FEWEST_TOGETHER = 3
 

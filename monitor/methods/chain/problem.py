@@ -29,7 +29,7 @@ from monitor.records import Array
 from monitor.units import Unit, mistaken_for_mm
 
 #: Up to so many rows the derivatives of all stand side by side: 7 kB a row, 1 GB. Of more, those of ``ROWS_AT_ONCE``.
-MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 20_000
+MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 10_000
 
 
 @dataclass(frozen=True)
