@@ -27,8 +27,6 @@ from monitor.documents import to_document
 PIPE_WIDTH = 10_000
 # Words longer than this may be broken over lines in a narrow window; numbers and names never are.
 LONGEST_UNBROKEN = 24
-#: With these begins what a spreadsheet runs (OWASP, CSV injection).
-_FORMULA_STARTS = "=+-@\t\r"
 _MOMENT = re.compile(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(Z?)")
 
 
@@ -59,7 +57,11 @@ def _plain(answer: object) -> Any:
 
 def csv_cell(cell: object) -> object:
     """Return a cell as CSV has it: a text that a spreadsheet would run as a formula begins with an apostrophe."""
-    return "'" + cell if isinstance(cell, str) and cell[:1] in _FORMULA_STARTS and cell else cell
+    if not isinstance(cell, str):
+        return cell
+    # With these begins what a spreadsheet runs (OWASP, CSV injection); some programs trim what stands before it.
+    is_formula = cell[:1] in ("\t", "\r") or cell.lstrip()[:1] in tuple("=+-@")
+    return f"'{cell}" if is_formula else cell
 
 
 def say(text: str = "") -> None:

@@ -231,6 +231,17 @@ def test_csv_runs_no_formula_in_a_spreadsheet(typed: Any, db: Path, tmp_path: Pa
     assert "'=cmd|x" in (tmp_path / "out" / "registered_machine.csv").read_text()
 
 
+@pytest.mark.parametrize("text", [" =cmd|x", "\u00a0=cmd|x", "\t=cmd|x", "\n+1", " -2+3|x"])
+def test_csv_runs_no_formula_behind_spaces(typed: Any, db: Path, tmp_path: Path, text: str) -> None:
+    """A program that trims a cell would find the formula."""
+    with duckdb.connect(str(db)) as connection:
+        connection.execute("UPDATE registered_machine SET machine = ?", [text])
+    said = typed("sql", "--csv", "SELECT machine, 1 AS b FROM registered_machine", db=db)
+    assert f"'{text}" in said.out
+    assert typed("export", tmp_path / "out", db=db).status == 0
+    assert f"'{text}" in (tmp_path / "out" / "registered_machine.csv").read_text()
+
+
 def test_an_export_that_was_killed_does_not_hinder_the_next(typed: Any, db: Path, tmp_path: Path) -> None:
     left = tmp_path / "out.partial"
     left.mkdir()

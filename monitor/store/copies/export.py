@@ -22,8 +22,8 @@ from monitor.exceptions import InputError, NotFoundError, StoreError, did_you_me
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
-#: Texts that spreadsheets run as formulas (OWASP, CSV injection).
-_FORMULA = r"^[=+\-@\t\r]"
+#: Texts that spreadsheets run as formulas (OWASP, CSV injection), also those that trim what stands before one.
+_FORMULA = r"^([\t\r]|[\s\p{Z}]*[=+\-@])"
 #: Ends of names that are those of one file.
 _FILES = (".csv", ".parquet", ".xlsx", ".xls", ".json")
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
