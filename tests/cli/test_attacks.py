@@ -90,19 +90,21 @@ def test_a_run_of_many_rows_is_looked_at_within_bounded_memory(examples: Path) -
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 0.5e6
 
 
-#: Imports a folder and says how much memory this process alone took at most, in kB.
-IMPORTED = """
+#: Runs a verb and says how much memory this process alone took at most, in kB.
+MEASURED = """
 import re, sys
 from monitor.cli import main
-status = main(["--db", sys.argv[1], "import", sys.argv[2]])
+status = main(["--db", *sys.argv[1:]])
 print("took", re.search(r"VmHWM:\\s*(\\d+)", open("/proc/self/status").read())[1])
 raise SystemExit(status)
 """
 
 
 @pytest.mark.slow
-def test_a_million_rows_in_one_run_are_imported_within_a_gigabyte(folder: Path, tmp_path: Path) -> None:
-    """The model that looks for gross readings took 6.9 GB for all rows: 15 touches again and again, 1 µm of noise."""
+def test_a_million_rows_in_one_run_are_imported_and_identified_within_a_gigabyte(
+    folder: Path, tmp_path: Path
+) -> None:
+    """The model of all rows at once took 6.9 GB: the touches of a run again and again, 1 µm of noise."""
     rows = (folder / "probings.csv").read_text().splitlines()
     of_first = [row.split(",") for row in rows[1:] if row.startswith("1,")]
     noise = np.random.default_rng(3).normal(0.0, 1e-3, (999_990, 3))
@@ -114,14 +116,31 @@ def test_a_million_rows_in_one_run_are_imported_within_a_gigabyte(folder: Path, 
             read = [f"{float(cell) + part:.6f}" for cell, part in zip(touch[4:7], off, strict=True)]
             print(1, number + 1, float(number), touch[3], *read, *touch[7:], sep=",", file=file)
     (folder / "runs.csv").write_text("".join((folder / "runs.csv").read_text().splitlines(True)[:2]))
-    imported = subprocess.run(
-        [sys.executable, "-c", IMPORTED, str(tmp_path / "shop.duckdb"), str(folder)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert imported.returncode == 0, imported.stderr
-    assert "imported, 1 run, 999990 probings" in imported.stdout
-    assert "run 1: sequence 500001, ball" in imported.stdout + imported.stderr
-    assert int(imported.stdout.rpartition("took ")[2]) * 1024 < 1e9
+    for words, said in (
+        (("import", str(folder)), "imported, 1 run, 999990 probings"),
+        (("identify", folder.name, "--run", "1"), "EXX"),
+    ):
+        measured = subprocess.run(
+            [sys.executable, "-c", MEASURED, str(tmp_path / "shop.duckdb"), *words],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert measured.returncode == 0, measured.stderr
+        assert said in measured.stdout
+        assert "run 1: sequence 500001, ball" in measured.stdout + measured.stderr
+        assert int(measured.stdout.rpartition("took ")[2]) * 1024 < 1e9
+
+
+@pytest.mark.parametrize("verb", ["compare", "explain", "uncertainty"])
+def test_a_verb_that_needs_more_memory_than_there_is_says_so(
+    typed: Any, db: Path, verb: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel would end the process without a word."""
+    monkeypatch.setattr("monitor.methods.chain.memory.SMALL", 1e6)
+    monkeypatch.setattr("monitor.methods.chain.memory.free_memory", lambda: 2e6)
+    said = typed(verb, "cold-cold", db=db)
+    assert (said.status, said.out) == (2, "")
+    assert "1320 rows at once takes some" in said.err
+    assert said.err.count("\n") == 1
 
 
 def test_a_setting_of_another_kind_is_refused(typed: Any, db: Path, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from monitor.discovery import (
 from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
-from monitor.methods.chain.memory import TIMES_OF_SEARCH, within_memory
+from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
@@ -43,13 +43,16 @@ from monitor.workflow.models import as_model, label, resolve_for, subject_of
 SEED = 20260302
 
 
-def first_fit(campaign: Campaign, model: StoredModel) -> RobustFit:
+def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT) -> RobustFit:
     """The model fitted to a machine's campaign, without its grossly wrong readings.
 
-    Raises DataError where it cannot be fitted, with what looks wrong in the file where that can be said.
+    Raises DataError where it cannot be fitted, with what looks wrong in the file where that can be said, or where what
+    follows takes more memory, ``times`` that of all derivatives, than there is.
     """
     try:
-        return robust_fit(machine_problem(campaign, model))
+        problem = machine_problem(campaign, model)
+        with within_memory(problem, times):
+            return robust_fit(problem)
     except DataError as refusal:
         raise with_mistake(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
@@ -99,7 +102,8 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
 
 
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:
-    first = first_fit(campaign, model)
+    # A search that has not the memory is refused before minutes of fitting.
+    first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
     answer = with_measurements(machine_explanation(explanation), campaign, as_model(model))
 
