@@ -11,6 +11,7 @@ from by_path import load
 from monitor.reporting.health.answers import answers
 from monitor.reporting.health.page import machine_pages
 from monitor.reporting.health.records import DataQuality, PoseError, VolumetricMap
+from monitor.reporting.health.render import health_html
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.svg.map_slices import Slice
 
@@ -113,3 +114,14 @@ def test_a_machine_that_was_not_measured_has_no_empty_headings() -> None:
     assert not away.says_more
     assert moved.says_more
     assert all(measured.says_more for measured in machine_pages([page.GOOD, page.CHANGED, page.DRIFTED]))
+
+
+def test_without_a_tolerance_the_table_has_no_columns_of_dashes() -> None:
+    bare = page.machine("M", "no change seen", page.parameter(tolerance=None))
+    week, machines = page.fleet(bare, page.GOOD)
+    html = "".join(health_html(week, machines))
+    assert html.count('<th class="number">Tolerance</th>') == 1
+    assert html.count('data-name="Tolerance"') == 1
+    (judged,) = machine_pages([page.GOOD])
+    (free,) = machine_pages([bare])
+    assert (len(judged.widths), len(free.widths)) == (6, 4)

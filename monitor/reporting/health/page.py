@@ -126,13 +126,17 @@ class ParameterLine:
 
 @dataclass(frozen=True)
 class PrintedMachine:
-    """A machine's page; of one that ``says_more`` than that it was not measured, below its head."""
+    """A machine's page; of one that ``says_more`` than that it was not measured, below its head.
+
+    ``judged``: whether a parameter has a tolerance; the table else lacks its columns, and ``widths`` theirs.
+    """
 
     health: MachineHealth
     head: FleetLine
     meaning: str
     says_more: bool
     lines: tuple[ParameterLine, ...]
+    judged: bool
     widths: tuple[float, ...]
     no_trend: str
     changes: tuple[tuple[str, str, bool], ...]
@@ -211,6 +215,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
     shown = health.changes[:_CHANGES_SHOWN]
     blind = health.quality.blind_spots
     lines = tuple(_parameter(parameter) for parameter in health.parameters)
+    is_judged, widths = any(line.tolerance or line.out for line in lines), column_widths(lines)
     more = f" and {len(blind) - _BLIND_SHOWN} more" if len(blind) > _BLIND_SHOWN else ""
     return PrintedMachine(
         health=health,
@@ -218,7 +223,8 @@ def _page(health: MachineHealth) -> PrintedMachine:
         meaning=DUE_MEANS if is_due(health) else STATES[health.state],
         says_more=_says_more(health),
         lines=lines,
-        widths=column_widths(lines),
+        judged=is_judged,
+        widths=widths if is_judged else (*widths[:3], widths[4]),
         no_trend=(
             ""
             if any(parameter.drift for parameter in health.parameters)
