@@ -58,9 +58,9 @@ load: setup  ## 50 engineers at once while an import runs; trend pages of a larg
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py many $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py large --machines 1000 --weeks 100 $(ARGS)
 
-dcc-reader: setup  ## digital certificates read by PyDCC, which others wrote, in an environment of its own
+dcc-reader: setup  ## digital certificates read by PyDCC and PTB's dccQuantities, each in an environment of its own
 	@sh tests/setup/dcc_reader.sh
-	@$(PYTEST) -n 0 tests/reporting/test_pydcc.py $(ARGS)
+	@$(PYTEST) -n 0 --slow tests/reporting/test_pydcc.py tests/reporting/test_dcc_quantities.py $(ARGS)
 
 manual: setup  ## the manual as a site in manual-output/, and every block of code of its pages
 	@$(RUN) -c 'import furo, latex2mathml, myst_parser, sphinx' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt furo latex2mathml myst-parser sphinx

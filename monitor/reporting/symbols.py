@@ -44,15 +44,14 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
     knows_direction = _TELLS_ITS_DIRECTION.fullmatch(axis) is not None
-    if not knows_direction and not match["location"]:
-        return symbol  # the name does not say which are its roll, tilts and displacements
     spindle = knows_direction and len(axis) > 1 and axis[0] in "ABC"
     named = say("terms.spindle" if spindle else "terms.axis", name=axis)
-    kind = (
-        _location(match["direction"], axis if knows_direction else "", turns)
-        if match["location"]
-        else _motion(match["direction"], axis, turns, rest)
-    )
+    if match["location"]:
+        kind = _location(match["direction"], axis if knows_direction else "", turns)
+    elif knows_direction:
+        kind = _motion(match["direction"], axis, turns, rest)
+    else:
+        kind = "turn" if turns else "displacement"  # the name does not say which are its roll and its tilts
     shape = "" if kind == "gain" or not rest else f" ({rest})"
     return say(f"terms.{kind}", direction=direction, axis=named) + shape
 

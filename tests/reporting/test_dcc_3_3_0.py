@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_page import dcc_context
 from monitor.reporting.certificate.dsi import unit_of, written_unit
+from monitor.reporting.certificate.model_effect import ModelEffect
 from monitor.reporting.certificate.record import CertificateRecord, Condition, MeasuredCondition
 from monitor.reporting.certificate.tables import result_rows
 from monitor.reporting.pdf.render import pieces_of
@@ -149,3 +151,24 @@ def test_the_page_says_what_either_release_says(make_record: Make, language: str
     html = "".join(pieces_of("dcc.html", context))
     assert f"(PTB DCC {release})" in html
     assert str(made.relates_only) in html
+
+
+@pytest.mark.parametrize("release", ["3.2.1", "3.3.0"])
+def test_the_page_states_the_reversal_value_of_an_effect(make_record: Make, release: str) -> None:
+    """A standard uncertainty alone, which release 3.3.0 has of effects of the model, ended the page."""
+    made = dataclasses.replace(make_record(13), country="DE", dcc_version=release)
+    assert made.results is not None
+    effects = (ModelEffect("EXX:reversal", "µm", 5.85, 0.098, 6, 2, 11.7, 0.196),)
+    made = dataclasses.replace(made, results=(dataclasses.replace(made.results[0], effects=effects),))
+    results = dcc_context(dcc_xml(made))["measurements"][0].results
+    stated = [result for result in results if "EXX:reversal" in result.name]
+    (amplitude,), (reversal,) = (result.rows for result in stated)
+    shown = [(row.value, row.uncertainty, row.unit) for row in (amplitude, reversal)]
+    if release == "3.3.0":
+        assert [result.symbol for result in stated] == ["u", "u"]
+        assert shown == [("5.850", "0.098", "µm"), ("11.70", "0.20", "µm")]
+        assert not any(result.coverage for result in stated)
+    else:
+        assert [result.symbol for result in stated] == ["U", "U"]
+        assert shown == [("5.85", "0.20", "µm"), ("11.70", "0.39", "µm")]
+        assert all(re.search(r"\b2(\.0+)?\b", result.coverage) for result in stated)

@@ -156,32 +156,34 @@ def _condition(condition: ET.Element, texts: Texts) -> str:
 def _result(result: ET.Element, texts: Texts) -> ShownResult:
     quantity = result.find("dcc:data/dcc:quantity", _SPACES)
     rows: tuple[ValueRow, ...] = ()
-    coverage = ""
+    symbol, coverage = "u" if _ellipsoidal(result) else "U", ""
     correlations: tuple[CorrelationRow, ...] = ()
     if quantity is not None:
         vector, single = quantity.find("si:realListXMLList", _SPACES), quantity.find("si:real", _SPACES)
         if vector is not None:
             rows, coverage, correlations = _vector(vector, texts)
         elif single is not None:
-            rows, coverage = _single(single, _said(result, "dcc:name"), texts)
+            rows, symbol, coverage = _single(single, _said(result, "dcc:name"), texts)
     return ShownResult(
         name=_said(result, "dcc:name"),
         description=_said(result, "dcc:description"),
         text=_said(result, "dcc:data/dcc:text"),
         rows=rows,
-        symbol="u" if _ellipsoidal(result) else "U",
+        symbol=symbol,
         coverage=coverage,
         correlations=correlations,
     )
 
 
-def _single(quantity: ET.Element, label: str, texts: Texts) -> tuple[tuple[ValueRow, ...], str]:
-    """One value with its expanded uncertainty: D-SI 2.1 and 2.2.1 name it otherwise."""
-    expanded = float(_any(quantity, "valueExpandedMU", "uncertainty"))
+def _single(quantity: ET.Element, label: str, texts: Texts) -> tuple[tuple[ValueRow, ...], str, str]:
+    """One value with its uncertainty, the symbol and the coverage of that: expanded, which D-SI 2.1 and 2.2.1 name
+    otherwise, or standard."""
+    standard = _text(quantity, ".//si:valueStandardMU")
+    uncertainty = float(standard or _any(quantity, "valueExpandedMU", "uncertainty"))
     unit = written_unit(_text(quantity, "si:unit"))
-    rounded = round_result(float(_text(quantity, "si:value")), expanded)
+    rounded = round_result(float(_text(quantity, "si:value")), uncertainty)
     row = ValueRow(label, texts.number(rounded.estimate), texts.number(rounded.uncertainty), unit)
-    return (row,), _coverage(quantity, "", texts)
+    return ((row,), "u", "") if standard else ((row,), "U", _coverage(quantity, "", texts))
 
 
 def _vector(vector: ET.Element, texts: Texts) -> tuple[tuple[ValueRow, ...], str, tuple[CorrelationRow, ...]]:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 from monitor.reporting.adjusting import SEE_FIRST, adjusting
 from monitor.reporting.health.comparison import MissingEffect
-from monitor.reporting.health.concern import DRIFT_P, binding_shares, concern, likeliest_out, volumetric_binds
+from monitor.reporting.health.concern import (
+    DRIFT_P,
+    binding_shares,
+    concern,
+    likeliest_out,
+    out_of_tolerance,
+    volumetric_binds,
+)
 from monitor.reporting.health.news import CheckKind, NextCheck
 from monitor.reporting.health.records import (
     ALARMS,
@@ -37,8 +45,8 @@ _WITHOUT_LIMIT: tuple[State, ...] = (
     State.SUSPECT_DATA,
     State.NO_CHANGE_SEEN,
 )
-#: Names of machines in a sentence; of more, their number.
-_NAMED = 6
+#: Names of machines in a sentence, and of parameters that are out of tolerance; of more, their number.
+_NAMED, _OUT_NAMED = 6, 3
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
 _QUIET_IN_PART = (
     "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
@@ -102,6 +110,11 @@ def _out(health: MachineHealth) -> str:
     parameter, error_map, sentences = likeliest_out(health), health.map, []
     if parameter is not None and parameter.probability_out:
         sentences.append(_beyond(parameter))
+    others = [each for each in out_of_tolerance(health) if each is not parameter]
+    if others:
+        sentences.append(
+            f"also out of tolerance: {_counted([_stands_short(each) for each in others], _OUT_NAMED - 1)}"
+        )
     if error_map is not None and error_map.probability_out and error_map.limit_um is not None:
         sentences.append(
             f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
@@ -196,6 +209,12 @@ def _beyond(parameter: ParameterHealth) -> str:
     return f"{_stands(parameter)}{drift}; out of tolerance with a probability of {out}"
 
 
+def _stands_short(parameter: ParameterHealth) -> str:
+    value, _ = in_words(parameter.estimate, parameter.expanded, sign=True)
+    limit = plain(parameter.tolerance or 0.0)
+    return f"{parameter.in_words} ({parameter.name}: {value} {parameter.unit}, tolerance ± {limit})"
+
+
 def _stands(parameter: ParameterHealth) -> str:
     value, expanded = in_words(parameter.estimate, parameter.expanded, sign=True)
     limit = "" if parameter.tolerance is None else f", tolerance ± {plain(parameter.tolerance)}"
@@ -220,7 +239,7 @@ def _since(health: MachineHealth) -> str:
     if health.since is None:
         return "Not known: this is not stated run by run."
     if health.state in ALARMS:
-        return f"Since {day(health.since)}: every run since then lies beyond the tolerance."
+        return f"{_beyond_since(health, health.since)}: every run since then lies beyond the tolerance."
     if health.state is State.MODEL_FAILS:
         return f"Since {day(health.since)} at the latest, the first run that was compared."
     if health.state is State.DRIFTS:
@@ -238,11 +257,21 @@ def _since(health: MachineHealth) -> str:
     return f"Since {day(health.since)}."
 
 
+def _beyond_since(health: MachineHealth, since: datetime) -> str:
+    """Since when each of the parameters that are named lies beyond its tolerance; one day where it is the same."""
+    named = [each for each in out_of_tolerance(health)[:_OUT_NAMED] if each.out_since is not None]
+    days = {day(each.out_since) for each in named if each.out_since is not None} or {day(since)}
+    if len(days) == 1:
+        return f"Since {days.pop()}"
+    return "Since " + ", ".join(f"{day(each.out_since)} ({each.name})" for each in named if each.out_since)
+
+
 def to_do(health: MachineHealth) -> str:
     """Return what to do on a machine, and by when to measure it again."""
     parameter = concern(health)
-    name = "its errors" if parameter is None else f"{parameter.in_words} ({parameter.name})"
-    wrong, judged = name, name
+    name = "its errors" if parameter is None else _named(parameter)
+    out = [_named(each) for each in out_of_tolerance(health)]
+    wrong, judged = (_counted(out, _OUT_NAMED) if parameter is not None and out else name), name
     if volumetric_binds(health.state, health.parameters, health.map):
         shares, judged = binding_shares(health), "the volumetric error"
         wrong = (
@@ -275,6 +304,10 @@ def to_do(health: MachineHealth) -> str:
         else f"(next check: {_after_colon(str(health.next_check))})"
     )
     return _sentence(f"{action} {when}")
+
+
+def _named(parameter: ParameterHealth) -> str:
+    return f"{parameter.in_words} ({parameter.name})"
 
 
 def _adjusting(health: MachineHealth, action: str) -> str:
@@ -376,8 +409,13 @@ def _names(rows: Sequence[FleetRow]) -> str:
 
 def first_names(machines: Sequence[str]) -> str:
     """Return the first names of machines as a sentence names them, and how many more there are."""
-    more = len(machines) - _NAMED
-    return ", ".join(machines[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return _counted(machines, _NAMED)
+
+
+def _counted(names: Sequence[str], most: int) -> str:
+    """Return the first ``most`` of the names, and how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def _sentence(text: str) -> str:

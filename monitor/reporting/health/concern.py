@@ -58,11 +58,18 @@ def largest_shares(error_map: VolumetricMap) -> tuple[MapShare, ...]:
 
 
 def likeliest_out(health: MachineHealth) -> ParameterHealth | None:
-    """Return the parameter that is likeliest to be out of tolerance; None where only the volumetric error can be."""
-    likeliest = max(health.parameters, key=lambda parameter: parameter.probability_out or 0.0, default=None)
+    """Return the parameter that is likeliest to be out of tolerance, of two that are it as surely the one further
+    beyond; None where only the volumetric error can be."""
+    likeliest = max(health.parameters, key=_urgency, default=None)
     if likeliest is None or not volumetric_binds(health.state, health.parameters, health.map):
         return likeliest
     return likeliest if (likeliest.probability_out or 0.0) > _WORTH_A_WORD else None
+
+
+def out_of_tolerance(health: MachineHealth) -> tuple[ParameterHealth, ...]:
+    """Return the parameters that are more likely beyond their tolerance than within it, the most urgent first."""
+    out = (parameter for parameter in health.parameters if (parameter.probability_out or 0.0) > 0.5)
+    return tuple(sorted(out, key=_urgency, reverse=True))
 
 
 def drifting_without_limit(parameters: Sequence[ParameterHealth]) -> list[ParameterHealth]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from typing import Any
 
 from markupsafe import Markup
 
 from monitor.reporting.health.answers import URGENT, answers, first_names, reason, to_do
 from monitor.reporting.health.columns import column_widths
-from monitor.reporting.health.concern import concern
+from monitor.reporting.health.concern import DRIFT_P, concern
 from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
     ALARMS,
@@ -19,6 +20,7 @@ from monitor.reporting.health.records import (
     STATES,
     Change,
     ConditionRange,
+    Drift,
     Fleet,
     FleetRow,
     MachineHealth,
@@ -124,12 +126,17 @@ class ParameterLine:
 
 @dataclass(frozen=True)
 class PrintedMachine:
-    """A machine's page."""
+    """A machine's page; of one that ``says_more`` than that it was not measured, below its head.
+
+    ``judged``: whether a parameter has a tolerance; the table else lacks its columns, and ``widths`` theirs.
+    """
 
     health: MachineHealth
     head: FleetLine
     meaning: str
+    says_more: bool
     lines: tuple[ParameterLine, ...]
+    judged: bool
     widths: tuple[float, ...]
     no_trend: str
     changes: tuple[tuple[str, str, bool], ...]
@@ -138,6 +145,7 @@ class PrintedMachine:
     fit: tuple[tuple[str, str], ...]
     map: tuple[tuple[str, str], ...]
     map_picture: Markup
+    map_beyond: str
     blind: str
     refused: tuple[tuple[str, str], ...]
     imports: tuple[PrintedRefusal, ...]
@@ -207,13 +215,16 @@ def _page(health: MachineHealth) -> PrintedMachine:
     shown = health.changes[:_CHANGES_SHOWN]
     blind = health.quality.blind_spots
     lines = tuple(_parameter(parameter) for parameter in health.parameters)
+    is_judged, widths = any(line.tolerance or line.out for line in lines), column_widths(lines)
     more = f" and {len(blind) - _BLIND_SHOWN} more" if len(blind) > _BLIND_SHOWN else ""
     return PrintedMachine(
         health=health,
         head=_line(fleet_row(health)),
         meaning=DUE_MEANS if is_due(health) else STATES[health.state],
+        says_more=_says_more(health),
         lines=lines,
-        widths=column_widths(lines),
+        judged=is_judged,
+        widths=widths if is_judged else (*widths[:3], widths[4]),
         no_trend=(
             ""
             if any(parameter.drift for parameter in health.parameters)
@@ -225,12 +236,21 @@ def _page(health: MachineHealth) -> PrintedMachine:
         fit=_fit(health),
         map=_map(health.map),
         map_picture=map_picture(health.map),
+        map_beyond=_beyond_the_slices(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
         imports=tuple(printed_refusal(refusal) for refusal in health.quality.refused_imports),
         pictures=printed_pictures(health.model),
         reversal=_reversal(health),
     )
+
+
+def _says_more(health: MachineHealth) -> bool:
+    """Return whether there is anything to say of a machine beside that it was not measured this week."""
+    quality = health.quality
+    found = (health.parameters, health.changes, health.conditions, quality.suspect, quality.refused)
+    told = (quality.refused_imports, quality.remarks, quality.runs, health.model, health.map)
+    return health.state is not State.NOT_MEASURED or any(found) or any(told)
 
 
 def _reversal(health: MachineHealth) -> str:
@@ -288,29 +308,31 @@ def _parameter(parameter: ParameterHealth) -> ParameterLine:
 
 
 def _drift(parameter: ParameterHealth) -> str:
-    """The drift a year with its interval, and when the tolerance is reached where there is a sign of it."""
+    """The drift a year in the unit of its line with its interval, and when the limit is reached by any sign of it."""
     if parameter.drift is None:
         return ""
     u = parameter.drift.u_per_year
     slope, low, high = (
         in_words(value, u, sign=True)[0] for value in (parameter.drift.per_year, *parameter.drift.between)
     )
-    sentence = f"{slope} ({low} to {high}) {parameter.unit}/year"
+    sentence = f"{slope} ({low} to {high}) a year"
     if parameter.drift.season_not_told and parameter.drift.p_value < _DRIFT_P:
         sentence += f"; {DRIFT_OR_SEASON}"
     if parameter.out_since is not None:
         return f"{sentence}; beyond its tolerance since {parameter.out_since:%Y-%m-%d}"
     if parameter.drift.crosses_at is not None:
-        first, last = parameter.drift.crosses_between
+        sentence += _crossing(parameter, parameter.drift, parameter.drift.crosses_at)
+    return sentence
+
+
+def _crossing(parameter: ParameterHealth, drift: Drift, crosses_at: date) -> str:
+    """When a drift reaches the limit; of one that did before the last run, only where it is more than chance."""
+    if not parameter.history.times or crosses_at > parameter.history.times[-1].date():
+        first, last = drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""
         when = f" ({first} to {last})" if first and last else when
-        past = parameter.history.times and parameter.drift.crosses_at <= parameter.history.times[-1].date()
-        sentence += (
-            f"; already beyond its tolerance since about {parameter.drift.crosses_at}"
-            if past
-            else f"; tolerance reached about {parameter.drift.crosses_at}{when}"
-        )
-    return sentence
+        return f"; tolerance reached about {crosses_at}{when}"
+    return f"; by this trend beyond its tolerance since about {crosses_at}" if drift.p_value < DRIFT_P else ""
 
 
 def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
@@ -361,6 +383,17 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
         )
         lines.append(("by pose", f"at most (rms) {poses}"))
     return tuple(lines)
+
+
+def _beyond_the_slices(error_map: VolumetricMap | None) -> str:
+    """What to say where the slices show less than the worst error, so that nobody takes their scale for it."""
+    if error_map is None or not error_map.slices:
+        return ""
+    shown = max(length for one in error_map.slices for row in one.lengths_um for length in row)
+    longest, worst = micrometres(shown), micrometres(error_map.worst_um)
+    if longest == worst:
+        return ""
+    return f"The longest here is {longest}: the worst, {worst}, lies outside of these slices."
 
 
 def _span(change: Change) -> str:

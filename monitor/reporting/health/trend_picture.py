@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from monitor.reporting.health.concern import DRIFT_P
 from monitor.reporting.health.records import Drift, ParameterHealth
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE
 from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, text_width, tick_room, tick_words
@@ -29,8 +30,8 @@ _DAYS_PER_MONTH = DAYS_PER_YEAR / 12
 def trend_picture(machine: str, parameter: ParameterHealth) -> str:
     """Return the history of a parameter of a machine as SVG; no words stand inside the panel.
 
-    The line of the drift is drawn over the runs that it was found from, and dashed ahead to the day on which the
-    tolerance is reached, where that is no further ahead than the drift was watched for.
+    The line of a drift that is more than chance is drawn over the runs that it was found from, and dashed ahead to the
+    day on which the tolerance is reached, where that is no further ahead than the drift was watched for.
     """
     history, drift = parameter.history, parameter.drift
     half = np.nan_to_num(np.array(history.u) * parameter.expanded / parameter.u, posinf=0.0)
@@ -72,15 +73,26 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
         on.dots("".join(f"M{x:.1f} {y:.1f}h0" for x, y, _ in middles), colour, 11.0)
     if stated:
         _ends(on, panel, _days(history.times[-1]), *stated)
-    if drift is not None and drift.at_last is not None and drift.since is not None:
+    if drift is not None and _is_drawn(parameter):
         _drift(on, panel, drift, history.times[-1], last)
     return on.svg()
+
+
+def _is_drawn(parameter: ParameterHealth) -> bool:
+    """Return whether there is a line of a drift: one that is stated, or that will come to the limit soon. A line
+    through what chance or a step makes would be taken for a forecast."""
+    drift = parameter.drift
+    if drift is None or drift.at_last is None or drift.since is None:
+        return False
+    last = parameter.history.times[-1].date()
+    is_ahead = drift.crosses_at is not None and drift.crosses_at > last
+    return drift.p_value < DRIFT_P or (is_ahead and parameter.reaches_soon)
 
 
 def _end(parameter: ParameterHealth) -> datetime:
     """The last moment of the picture: the last run, or the day on which the limit is reached."""
     first, last = parameter.history.times[0], parameter.history.times[-1]
-    if parameter.drift is None or parameter.drift.at_last is None:
+    if parameter.drift is None or not _is_drawn(parameter):
         return last
     limit = last + (last - first) * _AHEAD
     crossing = parameter.drift.crosses_at
@@ -118,7 +130,7 @@ def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
         legend = "bars: scatter; with ends: U; blue: this week"
     if parameter.changed_at:
         legend += "; orange: a change"
-    if parameter.drift is not None and parameter.drift.at_last is not None:
+    if _is_drawn(parameter):
         legend += "; line: drift, dashed: forecast"
     on.text(0.0, 2.2 * LETTER, legend, colour=MID)
 
