@@ -21,7 +21,7 @@ from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.part import Part, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import COSINE, Rows
+from monitor.methods.instruments.reading import COSINE, SCALE, Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.pose import Pose
@@ -33,7 +33,7 @@ REACH, PLACES = 400.0, 150.0
 # Derivatives below this part of the largest are rounding.
 ROUNDING = 1e-9
 # What may be known of a setup and says of no place where it is.
-NO_PLACE = frozenset({"direction", "length"})
+NO_PLACE = frozenset({"direction", "length", SCALE})
 
 
 def mount_setup(chain: Chain) -> Setup:
