@@ -72,7 +72,8 @@ def said(seed: int, setups: str, off: np.ndarray) -> tuple[str, float, float]:
     except MonitorError as error:
         named = "tool_point_mm" in str(error)
         return "identify refuses" + (" and names the point" if named else ""), np.nan, np.nan
-    kinds = sorted({ground.kind.value for ground in grounds_of(campaign, robust, 1)})
+    # These lasers state nothing of their scale, and it is exact.
+    kinds = sorted({ground.kind.value for ground in grounds_of(campaign, robust, 1)} - {"scale"})
     solution, problem = robust.fit.solution, robust.fit.problem
     points = [each.moved for each in as_stated(problem) if "scale" not in each.moved]
     counted = {name for moved in points for names in moved.values() for name in names}

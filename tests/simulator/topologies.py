@@ -1,5 +1,6 @@
-"""Machines of any order of axes and any size, measured by laser, ball bar, R-test and a dial on a square; no line of the
-package.
+"""Machines of any order of axes and any size, measured by laser, ball bar, R-test and a dial on a square.
+
+Shares no line with the package.
 
 A topology is written as ``w C A b X Y Z t``: axes on the work's side from the work to the bed, then those to the tool.
 The size is that of a machine with strokes of 400 mm; travels, bars and spheres grow with it, the noise of a laser too.
