@@ -22,7 +22,7 @@ from monitor.store import Database, import_campaign, load_certificate
 from monitor.uncertainty import measured_run
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
-from monitor.workflow.certificate.taken_as_stated import tool_point_sentence
+from monitor.workflow.certificate.taken_as_stated import known_scale_sentence, tool_point_sentence
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -154,3 +154,16 @@ def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> No
     sure = replace(campaign, artefact=replace(campaign.artefact, setups=known))
     assert tool_point_sentence(sure, ("EX0C", "EY0C", "EC0X"), texts_of("en")) is None
     assert tool_point_sentence(campaign, ("EC0X", "EXX"), texts_of("en")) is None
+
+
+def test_a_scale_that_is_stated_as_known_is_printed() -> None:
+    campaign = read_campaign(EXAMPLES / "laser")
+    assert known_scale_sentence(campaign, texts_of("en")) is None
+    setups = tuple(replace(setup, known=("scale",)) for setup in campaign.artefact.setups)
+    exact = replace(campaign, artefact=replace(campaign.artefact, setups=setups))
+    assert known_scale_sentence(exact, texts_of("en")) == (
+        "The scale of laser interferometer is taken as exact, as campaign.toml states it; u holds no part for it"
+    )
+    german = known_scale_sentence(exact, texts_of("de"))
+    assert german is not None
+    assert german.startswith("Die Skale von laser interferometer gilt als fehlerfrei")
