@@ -77,7 +77,8 @@ def _scales(problem: InstrumentProblem) -> Iterator[AsStated]:
         lengths = np.zeros_like(problem.sigma)
         for part in problem.parts:
             if part.id in group:
-                lengths[part.at, : part.lengths.shape[1]] = part.lengths
+                read = part.lengths()
+                lengths[part.at, : read.shape[1]] = read
         moved: dict[str, None] = {}
         for run, local, common in zip(problem.runs, at.local, at.common, strict=True):
             column = np.zeros(len(local))

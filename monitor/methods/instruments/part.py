@@ -73,11 +73,11 @@ class Part:
     def _scales(self) -> tuple[str, ...]:
         return () if self.scale is None else (SCALE,)
 
-    @cached_property
-    def lengths(self) -> Array:
-        """The lengths (m, k) mm that were read, as the scale makes them: 0 for what is none, or was not read."""
+    def lengths(self, beyond: Array | float = 0.0) -> Array:
+        """The lengths (m, k) mm that were read, as the scale makes them, 0 for what is none, or was not read; those
+        that are shown where they are ``beyond`` (m, k) what was read."""
         numbers = len(self.reading.numbers)
-        read = np.nan_to_num(self.rows.measured[:, :numbers])
+        read = np.nan_to_num(self.rows.measured[:, :numbers] + beyond)
         read[:, numbers - self.reading.turns :] = 0.0
         return np.asarray(read + self.reading.besides)
 
@@ -132,9 +132,9 @@ class Part:
             shown = replace(shown, residual=drifted)
             by_own = np.concatenate([by_own, np.eye(drifts) * elapsed[:, None, None]], axis=2)
         if self._scales:
-            scaled = shown.residual + self.lengths * values[:, first + drifts, None]
-            shown = replace(shown, residual=scaled)
-            by_own = np.concatenate([by_own, self.lengths[:, :, None]], axis=2)
+            lengths = self.lengths(shown.residual)
+            shown = replace(shown, residual=shown.residual + lengths * values[:, first + drifts, None])
+            by_own = np.concatenate([by_own, lengths[:, :, None]], axis=2)
         if self._of_tool:
             assert shown.by_shift is not None  # the reader allows it for lengths alone
             by_point = shown.by_shift @ stance.turned
