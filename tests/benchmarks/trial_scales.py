@@ -116,6 +116,7 @@ def main() -> None:
                 drawn = float(np.random.default_rng([seed, 3]).normal())
                 off = size[0] * drawn if isinstance(size, tuple) else size
                 answers.setdefault(name, []).append(asked(scaled(right, off, stated, instruments), truth))
+        print(f"{seed + 1 - options.first} of {options.seeds}", file=sys.stderr, flush=True)
     for name, of_name in answers.items():
         inside, count = sum(answer["inside"] for answer in of_name), len(of_name)
         low, high = scipy.stats.binomtest(inside, count).proportion_ci(method="exact")

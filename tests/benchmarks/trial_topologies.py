@@ -6,7 +6,7 @@ every size (``--sizes``), measured in one run by laser, ball bar, R-test and a d
 (``tests/simulator/topologies.py``, no code shared with the package: it is told the names of the errors that the method
 has, and draws their values). Counted is what refuses the campaign or its certificate, what ``compare`` says at 1 %, and
 with ``--explain`` what the search finds. The region is the ellipsoid at 95 % (JCGM 102, 6.5.2). ``--first``: the first
-seed.
+seed; ``--only``: a part of a topology.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--sizes", action="store_true")
+    parser.add_argument("--only", default="")
     options = parser.parse_args()
     cases = (
         [("w C Y b X Z t", size, INSTRUMENTS[0]) for size in SIZES]
@@ -91,6 +92,8 @@ def main() -> None:
     )
     everything = []
     for topology, size, instruments in cases:
+        if options.only not in f"{topology},":
+            continue
         answers = []
         for seed in range(options.first, options.first + options.seeds):
             chosen = instruments or INSTRUMENTS[seed % len(INSTRUMENTS)]
