@@ -224,6 +224,8 @@ class LShape:
 
 #: The kinds of readings that tell where the tool point is against the work point, in the machine's own coordinates.
 FROM_TOOL_POINT = frozenset({"vector", "component", "distance", "displacement", "offset"})
+#: The kinds of readings that bring a unit of length of their own: whole travels and places, not deviations.
+BRINGS_SCALE = frozenset({"displacement", "point", "pose"})
 
 
 @dataclass(frozen=True)
@@ -237,7 +239,8 @@ class Setup:
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
     that in which a vector is read; ``known`` names the unknowns held as stated; ``drift_uncertainty`` (mm or rad) is
-    that of what its numbers drift over a run, ``tool_point_uncertainty`` (mm) of each coordinate of the tool point."""
+    that of what its numbers drift over a run, ``tool_point_uncertainty`` (mm) of each coordinate of the tool point,
+    ``scale_uncertainty`` (mm/mm) of what its lengths are off in proportion to themselves."""
 
     id: str
     reading: str
@@ -258,11 +261,17 @@ class Setup:
     certificate: str | None = None
     drift_uncertainty: float | None = None
     tool_point_uncertainty: float | None = None
+    scale_uncertainty: float | None = None
 
     @property
     def takes_tool_point(self) -> bool:
         """Whether its readings count from a tool point that is taken as it is stated."""
         return self.reading in FROM_TOOL_POINT and self.tool_point_uncertainty is None
+
+    @property
+    def takes_scale(self) -> bool:
+        """Whether its readings bring a unit of length that is taken as exact, without its being stated as known."""
+        return self.reading in BRINGS_SCALE and self.scale_uncertainty is None and "scale" not in self.known
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,15 @@ def _taken_up(answer: IdentifyAnswer) -> None:
 
 
 def _as_stated(answer: IdentifyAnswer) -> None:
-    """The stated tool points that numbers count from."""
+    """The stated tool points and scales that numbers count from."""
     for stated in answer.as_stated or ():
+        if "scale" in stated.moved:
+            counted = f"{', '.join(stated.moved['scale'])} {'counts' if _is_one(stated.moved) else 'count'}"
+            output.say(
+                f"the scale of {stated.name} is taken as exact: {counted} from it, and u does not say how well it "
+                "is known (state scale_standard_uncertainty_um_per_m)"
+            )
+            continue
         moved = ", ".join(f"{' and '.join(names)} with its {axis}" for axis, names in stated.moved.items())
         output.say(
             f"tool_point_mm of {stated.name} is taken as stated: {moved} {'moves' if _is_one(stated.moved) else 'move'}"

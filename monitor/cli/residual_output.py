@@ -34,7 +34,7 @@ def summary(comparison: MachineComparison | CurveComparison) -> None:
     number = output.micrometres if curve is None else four_digits
     unit = comparison.unit
     base = "" if curve is None else f" ({curve.base})"
-    source = "the probe's stated uncertainty" if curve is None else "the stated uncertainty"
+    source = "the stated uncertainty"
     expected = (
         ""
         if comparison.expected_rms is None

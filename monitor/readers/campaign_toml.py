@@ -21,7 +21,7 @@ from monitor.records import (
     Setup,
 )
 from monitor.sources import HALF_WIDTHS, QUANTITIES, Law, Sharing, Source
-from monitor.units import MICROMETRE, MICRORADIAN
+from monitor.units import METRE, MICROMETRE, MICRORADIAN
 
 
 def campaign_toml(campaign: Campaign) -> str:
@@ -135,6 +135,7 @@ def _setup(setup: Setup) -> Iterator[str]:
         ("length_mm", setup.length, _number),
         ("length_standard_uncertainty_um", setup.length_uncertainty, um),
         ("direction_standard_uncertainty_urad", setup.direction_uncertainty, urad),
+        ("scale_standard_uncertainty_um_per_m", setup.scale_uncertainty, decimal_in(MICROMETRE.per(METRE))),
     )
     yield from (f"{key} = {write(value)}" for key, value, write in keys if value is not None)
     if setup.along is not None:

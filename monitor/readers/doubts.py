@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from monitor.readers.axes_doubts import mistaken_axes
+from monitor.readers.repeated_rows import repeated_rows
 from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
 from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar
@@ -60,6 +61,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _pressure_and_humidity,
             _days,
             _to_come,
+            repeated_rows,
         )
         for sentence in check(campaign)
     )

@@ -17,7 +17,7 @@ _OF_TARGET = re.compile(
 )
 #: An unknown of an instrument, a stylus, or a piece in its place (``XY shift u``).
 _OF_SETUP = re.compile(
-    r"(?P<setup>.+ )??(?P<kind>beam|cosine error|frame|length|shift|slope|tilt|tip|turn|work point|zero)"
+    r"(?P<setup>.+ )??(?P<kind>beam|cosine error|frame|length|scale|shift|slope|tilt|tip|turn|work point|zero)"
     r"(?P<part> [abcuvxyz])?"
 )
 

@@ -120,7 +120,7 @@ def test_one_explanation_measures_by_one_root_mean_square(typed: Any, tmp_path: 
     document = typed("explain", "hidden-reversal-x", "--json", db=db).document
     remaining, expected = document["remaining"]["rms_um"], document["expected_rms_um"]
     assert [effect["effect"] for effect in document["missing"]] == ["EXX:reversal"]
-    assert f"expected {expected:.2f} µm from the probe's stated uncertainty" in said
+    assert f"expected {expected:.2f} µm from the stated uncertainty" in said
     assert f"with all of this in the model: RMS {remaining:.2f} µm, expected {expected:.2f} µm" in said
 
 

@@ -186,3 +186,25 @@ def test_what_such_a_plan_does_not_have_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=match):
         _plan(tmp_path, **asked)
+
+
+@pytest.mark.parametrize(
+    ("example", "keys", "u"), [("laser", {"scale_uncertainty": 1e-6}, 1e-6), ("ball-bar", {}, 3e-6)]
+)
+def test_what_an_instrument_shares_is_not_better_known_by_measuring_again(
+    example: str, keys: dict[str, float], u: float
+) -> None:
+    """The scale of a laser, 0.3 um of a bar of 100 mm: until 26 November 2026 each test was read by another bar."""
+    campaign = read_campaign(EXAMPLES / example)
+    setups = tuple(replace(setup, **keys) for setup in campaign.artefact.setups)
+    campaign = replace(campaign, artefact=replace(campaign.artefact, setups=setups))
+    method = campaign_method(campaign)
+    assert isinstance(method.plan, InstrumentPlan)
+    forecast = method.plan.forecast(campaign, method.own_model, 1, LIMITS)
+    present = forecast.present()
+    assert not any("scale" in name or "length" in name for name in present)
+    assert present["EXX"] == pytest.approx(u, rel=0.05)
+    same = [test for test in forecast.tests if test.available][:4]
+    for test in same:
+        promised = forecast.together([test]).u["EXX"]
+        assert 0.98 * u < promised <= 1.0001 * present["EXX"]

@@ -87,6 +87,7 @@ def said(around: Path, name: str, old: str, new: str, count: int = 1) -> str:
         ("square.prn", "G21", "", "nothing states the unit of column 'Z' of square.prn"),
         ("square.prn", "G21", "G21\nG20", "line 4: the log goes from mm (line 3) to inch"),
         ("square.prn", "0000 D-", "0000-", "line 4: "),
+        ("square.prn", "D-0.02512", "D-2.512E-02", "line 4: '2.512E-02' may be a power of ten"),
         ("square.prn", " D-0.", "\nD-0.", "the line has Z where others have Z, D; the log is cut here"),
         ("plate.qif", "<UnitName>mm", "<UnitName>ell", "column LinearUnit: 'ell' is no unit of lengths"),
         ("plate.qif", "</QIFDocument>", "", "this is no XML: "),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import statistics
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,34 @@ def test_a_repeated_position_was_approached_from_beyond() -> None:
     )
 
 
+def test_a_unidirectional_test_begins_each_run_in_its_direction() -> None:
+    """The axis returns without a reading; by the step alone its first target was approached from the other side."""
+    targets = np.linspace(0.0, 200.0, 5)
+    position = np.tile(targets, 4)
+    np.testing.assert_array_equal(directions_of_approach(position), np.ones(20))
+    np.testing.assert_array_equal(directions_of_approach(position[::-1]), -np.ones(20))
+    deviation = np.random.default_rng(3).normal(0.0, 1.0, 20)
+    answer = positioning(
+        position, deviation, tolerance=0.1, u_reading=0.1, u_gain=0.0, rng=np.random.default_rng(1)
+    )
+    s = [statistics.stdev(deviation[index::5]) for index in range(5)]
+    mean = [statistics.fmean(deviation[index::5]) for index in range(5)]
+    assert answer.figures.repeatability_forward == pytest.approx(4.0 * max(s), rel=1e-12)
+    high, low = ([m + sign * 2.0 * each for m, each in zip(mean, s, strict=True)] for sign in (1.0, -1.0))
+    assert answer.figures.accuracy_forward == pytest.approx(max(high) - min(low), rel=1e-12)
+    assert np.isnan([answer.figures.reversal, answer.figures.repeatability_backward]).all()
+
+
+def test_a_reading_that_is_missing_turns_no_direction() -> None:
+    """Forward to 4 and back, with 2 missing on the way back, then with the far end read once."""
+    np.testing.assert_array_equal(
+        directions_of_approach(np.array([0.0, 1, 2, 3, 4, 4, 3, 1, 0])), [1, 1, 1, 1, 1, -1, -1, -1, -1]
+    )
+    np.testing.assert_array_equal(
+        directions_of_approach(np.array([0.0, 1, 2, 4, 3, 2, 1, 0])), [1, 1, 1, 1, -1, -1, -1, -1]
+    )
+
+
 def test_figures_need_what_they_compare() -> None:
     """One direction only: no reversal, no bi-directional figure, and no uncertainty of what there is not."""
     position = np.linspace(0.0, 100.0, 6)
@@ -135,6 +165,14 @@ def test_iso_230_4_a_radius_that_depends_on_the_sense_is_hysteresis() -> None:
     assert answer.hysteresis == pytest.approx(3.0, abs=1e-2)
     assert answer.circular[1] == pytest.approx(4.0, abs=1e-2)
     assert answer.both == pytest.approx(7.0, abs=2e-2)
+
+
+def test_hysteresis_is_of_what_both_senses_passed() -> None:
+    """An oval of 10 um read over a whole turn and back over 220 degrees: across the rest the one sense has no path."""
+    there, back = np.arange(0.0, 359.0, 2.0), np.arange(220.0, -1.0, -2.0)
+    angles = np.deg2rad(np.concatenate([there, back]))
+    answer = evaluated(10.0 * np.cos(2.0 * angles), angles)
+    assert answer.hysteresis == pytest.approx(0.0, abs=0.02)
 
 
 def test_the_minimum_zone_is_no_wider_than_the_least_squares_zone_and_both_hold_the_path() -> None:

@@ -22,7 +22,7 @@ from monitor.store import Database, import_campaign, load_certificate
 from monitor.uncertainty import measured_run
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
-from monitor.workflow.certificate.tool_points import tool_point_sentence
+from monitor.workflow.certificate.taken_as_stated import known_scale_sentence, tool_point_sentence
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -144,8 +144,9 @@ def test_a_certificate_of_the_campaign_comes_first(
 def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> None:
     """A sphere that goes round with C tells where C is by the stated tool point; a dial on Z tells nothing of it."""
     campaign = read_campaign(EXAMPLES / "four-instruments")
-    (stated,) = identify(db, IdentifyRequest("four-instruments")).as_stated or ()
+    stated, scale = identify(db, IdentifyRequest("four-instruments")).as_stated or ()
     assert (stated.name, dict(stated.moved)) == ("R-test", {"x": ("EX0C",), "y": ("EY0C",)})
+    assert (scale.name, dict(scale.moved)) == ("laser interferometer", {"scale": ("EXX", "EYY", "EZZ")})
     sentence = tool_point_sentence(campaign, ("EX0C", "EY0C", "EC0X"), texts_of("en"))
     assert sentence is not None
     assert sentence.startswith("EX0C, EY0C count from the tool points as stated (R-test), whose uncertainty")
@@ -153,3 +154,16 @@ def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> No
     sure = replace(campaign, artefact=replace(campaign.artefact, setups=known))
     assert tool_point_sentence(sure, ("EX0C", "EY0C", "EC0X"), texts_of("en")) is None
     assert tool_point_sentence(campaign, ("EC0X", "EXX"), texts_of("en")) is None
+
+
+def test_a_scale_that_is_stated_as_known_is_printed() -> None:
+    campaign = read_campaign(EXAMPLES / "laser")
+    assert known_scale_sentence(campaign, texts_of("en")) is None
+    setups = tuple(replace(setup, known=("scale",)) for setup in campaign.artefact.setups)
+    exact = replace(campaign, artefact=replace(campaign.artefact, setups=setups))
+    assert known_scale_sentence(exact, texts_of("en")) == (
+        "The scale of laser interferometer is taken as exact, as campaign.toml states it; u holds no part for it"
+    )
+    german = known_scale_sentence(exact, texts_of("de"))
+    assert german is not None
+    assert german.startswith("Die Skale von laser interferometer gilt als fehlerfrei")

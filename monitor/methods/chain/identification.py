@@ -48,8 +48,9 @@ class TakenUp:
 
 @dataclass(frozen=True)
 class AsStated:
-    """A tool point that is taken as stated, of an instrument or of setups, ``name``: ``moved`` has, by its coordinates
-    x, y and z, the errors that move with it and that no reading tells from it."""
+    """A tool point or scale that is taken as stated, of an instrument or of setups, ``name``: ``moved`` has, by its
+    coordinates x, y and z, the errors that move with it and that no reading tells from it, and by ``scale`` those that
+    its scale moves."""
 
     name: str
     setups: tuple[str, ...]

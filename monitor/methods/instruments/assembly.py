@@ -19,9 +19,9 @@ from monitor.effects import (
 from monitor.exceptions import DataError, EffectError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.instruments.base import instrument_base
-from monitor.methods.instruments.part import Part, tool_id_of
+from monitor.methods.instruments.part import Part, scale_id_of, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
+from monitor.methods.instruments.reading import LEVER, SCALE, Reading, Rows, Stance, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.model import Model, chain_of
@@ -122,6 +122,8 @@ def _parts(
                 drift=drift,
                 tool_point=setup.tool_point_uncertainty,
                 tool_id=tool_id_of(setup),
+                scale=None if SCALE in setup.known else setup.scale_uncertainty,
+                scale_id=scale_id_of(setup),
             )
         )
     return tuple(parts)

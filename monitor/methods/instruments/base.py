@@ -19,9 +19,9 @@ from monitor.machine import COMPONENTS, MOTION, Chain
 from monitor.methods.chain.base_effects import location_candidates
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
-from monitor.methods.instruments.part import Part, tool_id_of
+from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import COSINE, Rows
+from monitor.methods.instruments.reading import COSINE, SCALE, Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.pose import Pose
@@ -33,7 +33,7 @@ REACH, PLACES = 400.0, 150.0
 # Derivatives below this part of the largest are rounding.
 ROUNDING = 1e-9
 # What may be known of a setup and says of no place where it is.
-NO_PLACE = frozenset({"direction", "length"})
+NO_PLACE = frozenset({"direction", "length", SCALE})
 
 
 def mount_setup(chain: Chain) -> Setup:
@@ -218,8 +218,8 @@ def _generic_problem(
         if isinstance(reading, Pose):
             rows = replace(rows, measured=reading.ideal(rows))
         at = number * count + np.arange(count)
-        u_tool = setup.tool_point_uncertainty
-        parts.append(Part(setup.id, reading, rows, at, tool_point=u_tool, tool_id=tool_id_of(setup)))
+        # Drift, scale and tool point are known beforehand: what does the same as these has a number all the same.
+        parts.append(Part(setup.id, reading, rows, at))
     rows_in_all = count * len(setups)
     context = Context(
         chain=chain,

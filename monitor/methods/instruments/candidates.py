@@ -16,7 +16,7 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.machine import Chain, evaluate, orientation, touching_positions
 from monitor.records import Array, Setup, Vector
-from monitor.units import MICROMETRE, MICRORADIAN
+from monitor.units import METRE, MICROMETRE, MICRORADIAN
 
 #: Stops of a linear sweep (ISO 230-2:2014, 4.3.2 asks for five a metre at least), angles of a turn and of a circle.
 STOPS, TURNS, CIRCLE = 11, 12, 36
@@ -48,6 +48,7 @@ def usual_instruments(tool_point: Vector) -> tuple[Setup, ...]:
             lengths(f"usual-laser-{letter}", "displacement", 0.3, "laser interferometer"),
             direction=way,
             direction_uncertainty=MICRORADIAN.to_internal(200.0),
+            scale_uncertainty=MICROMETRE.per(METRE).to_internal(0.5),
         )
         for letter, way in LETTERS.items()
     ]

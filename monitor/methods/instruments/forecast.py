@@ -1,8 +1,9 @@
 """What a test would say of a machine's parameters beside what was measured, before anyone measures.
 
 The derivatives of the rows at the machine without errors, whitened by what each setup states, are the information;
-unknowns of a setup (centre of a bar, turn of a beam, zero) are taken out of its rows first, as a later fit would do. A
-test belongs to one run together with the readings that are there. First order: errors of 1 mrad change u by 1e-3.
+unknowns of a setup (centre of a bar, turn of a beam, zero) are taken out of its rows first, as a later fit would do;
+what setups of one instrument share (a bar's length, a laser's scale, a tool point) is one unknown of all tests. A test
+belongs to one run together with the readings that are there. First order: errors of 1 mrad change u by 1e-3.
 """
 
 from __future__ import annotations
@@ -34,16 +35,18 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class _Information:
-    """The derivatives (k, k) of all rows by base and added coefficients, as a triangle."""
+    """The derivatives (k, k) of all rows by base and added coefficients and by what several setups ``share``, as a
+    triangle; what is shared with the u that it is known to beforehand, infinite where it is not."""
 
     names: tuple[str, ...]
     triangle: Array
+    share: Mapping[str, float]
 
     def joined(self, other: _Information) -> _Information:
         """Both together, among the coefficients of either: what one instrument does wrong is in its rows alone."""
         names = tuple(dict.fromkeys((*self.names, *other.names)))
         both = [information.among(names).triangle for information in (self, other)]
-        return _Information(names, _triangle(np.vstack(both)))
+        return _Information(names, _triangle(np.vstack(both)), {**self.share, **other.share})
 
     def among(self, names: tuple[str, ...]) -> _Information:
         """The same among more coefficients, of which these rows say nothing."""
@@ -51,17 +54,21 @@ class _Information:
             return self
         wider = np.zeros((len(self.triangle), len(names)))
         wider[:, [names.index(name) for name in self.names]] = self.triangle
-        return _Information(names, _triangle(np.vstack([wider, np.zeros((len(names), len(names)))])))
+        rows = np.vstack([wider, np.zeros((len(names), len(names)))])
+        return _Information(names, _triangle(rows), self.share)
 
     def u(self) -> dict[str, float]:
         """Standard uncertainties in internal units; NaN where the rows do not determine a coefficient."""
-        scale = np.linalg.norm(self.triangle, axis=0)
+        known = np.diag([1.0 / self.share.get(name, np.inf) for name in self.names])
+        rows = np.vstack([self.triangle, known])
+        scale = np.linalg.norm(rows, axis=0)
         scale[scale == 0.0] = 1.0
-        _, strength, vectors = np.linalg.svd(self.triangle / scale, full_matrices=True)
+        _, strength, vectors = np.linalg.svd(np.linalg.qr(rows / scale, mode="r"), full_matrices=True)
         rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
         spread = np.sqrt(np.sum((vectors[:rank] / strength[:rank, None]) ** 2, axis=0)) / scale
         is_open = np.abs(vectors[rank:]).max(axis=0, initial=0.0) >= MEMBER_SHARE
-        return dict(zip(self.names, np.where(is_open, np.nan, spread).tolist(), strict=True))
+        u = zip(self.names, np.where(is_open, np.nan, spread).tolist(), strict=True)
+        return {name: value for name, value in u if name not in self.share}
 
 
 class InstrumentForecast:
@@ -193,11 +200,18 @@ class InstrumentForecast:
 
 
 def _information(problem: InstrumentProblem) -> _Information:
-    """The derivatives of a run by base and added coefficients, the setups' own unknowns taken out."""
+    """The derivatives of a run by base and added coefficients and by what its setups share, their other unknowns taken
+    out."""
     at = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
-    count = len(problem.base_names)
-    wanted = np.hstack([at.local[0, :, :count], at.common[0]])
-    by_own = at.local[0, :, count:]
+    count, share = len(problem.base_names), _shared(problem)
+    is_shared = np.array([number in share for number in range(len(problem.own_names))], dtype=bool)
+    local = at.local[0].copy()
+    # What is known of these counts once, whatever tests there are.
+    beforehand = len(local) - len(problem.extra_names)
+    known = np.array([problem.own_names.index(name) in share for name in problem.extra_names], dtype=bool)
+    local[beforehand:][known] = 0.0
+    wanted = np.hstack([local[:, :count], at.common[0], local[:, count:][:, is_shared]])
+    by_own = local[:, count:][:, ~is_shared]
     scale = np.linalg.norm(by_own, axis=0)
     scale[scale == 0.0] = 1.0
     vectors, strength, _ = np.linalg.svd(by_own / scale, full_matrices=False)
@@ -206,7 +220,21 @@ def _information(problem: InstrumentProblem) -> _Information:
     wanted = wanted - basis @ (basis.T @ wanted)
     wanted = np.where(np.linalg.norm(wanted, axis=0) > ROUNDING * size, wanted, 0.0)
     rows = np.vstack([wanted, np.zeros((wanted.shape[1], wanted.shape[1]))])
-    return _Information((*problem.base_names, *problem.added_names), _triangle(rows))
+    names = (*problem.base_names, *problem.added_names, *(share[number][0] for number in sorted(share)))
+    return _Information(names, _triangle(rows), dict(share.values()))
+
+
+def _shared(problem: InstrumentProblem) -> dict[int, tuple[str, float]]:
+    """What setups of one instrument share, by its place among the own unknowns: what it is in words, and the u to which
+    it is known beforehand."""
+    share = {}
+    for part, columns in zip(problem.parts, problem.own_columns, strict=True):
+        u_of = dict(part.prior())
+        for index, (name, column) in enumerate(zip(part.unknowns, columns.tolist(), strict=True)):
+            what = part.shared(name, None)
+            if what is not None:
+                share[column] = (f"{name} of {what}", u_of.get(index, float("inf")))
+    return share
 
 
 def _triangle(rows: Array) -> Array:

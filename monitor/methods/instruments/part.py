@@ -1,9 +1,13 @@
-"""The rows of one setup: what its kind reads, and the drift of what it reads.
+"""The rows of one setup: what its kind reads, and what is off in it as its setup states: drift, scale, tool point.
 
 A zero that drifts while a setup is measured (sensors, holder, spindle or table warm up) is an unknown of every run
 where the setup states how large it may be: one for every number of a row, in proportion to the time from the setup's
 first row of the run to its last. It begins as known to be zero with the stated standard uncertainty, so that readings
 which show it (a pose that is measured again) estimate it, and what they do not show stands in u of the parameters.
+
+The scale of its lengths likewise (the wavelength of a laser in air whose temperature and pressure are measured, a
+tracker, a bar of several lengths): one factor of all that its instrument reads, in all runs, so that it stays however
+often is measured.
 
 The tool point likewise, where the setup states an uncertainty of it: a head that turns shows it (the length from its
 axis to the tool), and where no axis turns the tool it stands in u. Setups of one instrument with the same tool point
@@ -19,7 +23,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, mean_of_runs
+from monitor.methods.instruments.reading import SCALE, Reading, Rows, Shown, Stance, mean_of_runs
 from monitor.records import Array, Setup
 
 #: What the tool point is off where it is stated with an uncertainty.
@@ -31,13 +35,18 @@ def tool_id_of(setup: Setup) -> Hashable:
     return (setup.instrument, setup.tool_point, setup.tool_point_uncertainty) if setup.instrument else None
 
 
+def scale_id_of(setup: Setup) -> Hashable:
+    """What setups of one instrument have in common that state the same uncertainty of their scale."""
+    return (setup.instrument, setup.scale_uncertainty) if setup.instrument else None
+
+
 @dataclass(frozen=True)
 class Part:
     """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, their indices ``at`` (m,) among all
     rows, the ``instrument`` as people call it, and the standard uncertainty ``drift`` (mm, of angles what they come to
     at one metre) of what its numbers drift over a run, None where they do not; ``tool_point`` (mm) is that of each
     coordinate of the tool point, None where it is as stated; ``tool_id`` is the same for setups that have the same
-    one."""
+    one; ``scale`` (mm/mm) that of its lengths in proportion to themselves, ``scale_id`` as ``tool_id``."""
 
     id: str
     reading: Reading
@@ -47,11 +56,30 @@ class Part:
     drift: float | None = None
     tool_point: float | None = None
     tool_id: Hashable = None
+    scale: float | None = None
+    scale_id: Hashable = None
 
     @cached_property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the q unknowns of each run: those of the kind, drifts, what the tool point is off."""
-        return (*self.reading.unknowns, *self._drifts, *self._of_tool)
+        """Names of the q unknowns of each run: those of the kind, drifts, the scale, what the tool point is off."""
+        return (*self.reading.unknowns, *self._drifts, *self._scales, *self._of_tool)
+
+    @property
+    def staying(self) -> tuple[str, ...]:
+        """Unknowns of what is the same in all runs of a campaign, where they are known beforehand."""
+        return (*self.reading.staying, *self._scales)
+
+    @property
+    def _scales(self) -> tuple[str, ...]:
+        return () if self.scale is None else (SCALE,)
+
+    def lengths(self, beyond: Array | float = 0.0) -> Array:
+        """The lengths (m, k) mm that were read, as the scale makes them, 0 for what is none, or was not read; those
+        that are shown where they are ``beyond`` (m, k) what was read."""
+        numbers = len(self.reading.numbers)
+        read = np.nan_to_num(self.rows.measured[:, :numbers] + beyond)
+        read[:, numbers - self.reading.turns :] = 0.0
+        return np.asarray(read + self.reading.besides)
 
     @property
     def _of_tool(self) -> tuple[str, ...]:
@@ -68,11 +96,13 @@ class Part:
         """What setups with the same value have an unknown in common; ``alone`` where it is the setup's own."""
         if name in self._of_tool and self.tool_id is not None:
             return self.tool_id
+        if name in self._scales and self.scale_id is not None:
+            return self.scale_id
         shared: Mapping[str, Hashable] = self.reading.shared
         return shared.get(name, alone)
 
     def start(self, runs: int) -> Array:
-        """Where the search for the unknowns begins (R, q): without drift, the tool point as stated."""
+        """Where the search for the unknowns begins (R, q): without drift, scale and tool point as stated."""
         begin = self.reading.start(runs)
         return np.hstack([begin, np.zeros((runs, len(self.unknowns) - begin.shape[1]))])
 
@@ -83,7 +113,11 @@ class Part:
 
     def prior(self) -> tuple[tuple[int, float], ...]:
         """Unknowns that are known with a standard uncertainty: index and u in mm or rad; they are 0 as stated."""
-        u_of = [*(self.drift for _ in self._drifts), *(self.tool_point for _ in self._of_tool)]
+        u_of = [
+            *(self.drift for _ in self._drifts),
+            *(self.scale for _ in self._scales),
+            *(self.tool_point for _ in self._of_tool),
+        ]
         stated = enumerate(u_of, start=len(self.reading.unknowns))
         return (*self.reading.prior(), *((index, u) for index, u in stated if u is not None))
 
@@ -97,6 +131,10 @@ class Part:
             drifted = shown.residual + elapsed[:, None] * values[:, first : first + drifts]
             shown = replace(shown, residual=drifted)
             by_own = np.concatenate([by_own, np.eye(drifts) * elapsed[:, None, None]], axis=2)
+        if self._scales:
+            lengths = self.lengths(shown.residual)
+            shown = replace(shown, residual=shown.residual + lengths * values[:, first + drifts, None])
+            by_own = np.concatenate([by_own, lengths[:, :, None]], axis=2)
         if self._of_tool:
             assert shown.by_shift is not None  # the reader allows it for lengths alone
             by_point = shown.by_shift @ stance.turned

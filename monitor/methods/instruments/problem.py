@@ -370,7 +370,7 @@ class InstrumentProblem(ChainProblem):
 
     @cached_property
     def stays(self) -> Stays | None:
-        """The lengths of bars that are known beforehand: one bar has one length in all runs."""
+        """The lengths of bars and scales that are known beforehand: one bar has one length in all runs."""
         if not self.shares_bars or len(self.runs) < 2:
             return None
         rows = np.flatnonzero(self.extras_in_common)
@@ -379,12 +379,12 @@ class InstrumentProblem(ChainProblem):
 
     @property
     def extras_in_common(self) -> npt.NDArray[np.bool_]:
-        """The lengths of bars; how an instrument is set up and drifts is another in each run."""
+        """The lengths of bars and scales; how an instrument is set up and drifts is another in each run."""
         staying = {
             int(columns[index])
             for part, columns in zip(self.parts, self.own_columns, strict=True)
             for index, name in enumerate(part.unknowns)
-            if name in part.reading.staying
+            if name in part.staying
         }
         return np.array([index in staying for index, _ in self._priors], dtype=bool)
 

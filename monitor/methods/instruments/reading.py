@@ -26,6 +26,8 @@ TURN, SHIFT = ("frame a", "frame b", "frame c"), ("frame x", "frame y", "frame z
 
 #: The unknown of a beam that acts as a gain: known beforehand, or no gain of an axis had a number.
 COSINE = "cosine error"
+#: What lengths are off in proportion to themselves, where that is stated with an uncertainty.
+SCALE = "scale"
 
 
 #: The factor from a column of the file to mm, by the end of its name; a component of a direction has none.
@@ -121,6 +123,11 @@ class Reading(Protocol):
     #: Unknowns of what is the same in all runs of a campaign (a bar), where they are known beforehand.
     staying: ClassVar[tuple[str, ...]]
 
+    @property
+    def besides(self) -> float:
+        """The length in mm that a reading has besides its number, as that of a bar."""
+        ...
+
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
         """Make the reading of a setup from its rows; the rows with the constants of the kind."""
@@ -169,6 +176,10 @@ class Plain:
     turns: ClassVar[int] = 0
     relative: ClassVar[bool] = False
     staying: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def besides(self) -> float:
+        return self.setup.length or 0.0
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:

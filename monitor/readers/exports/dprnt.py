@@ -23,6 +23,8 @@ _WORD = re.compile(
 _ROW = re.compile(rf"(?:{_WORD.pattern}[\s,;*]*)+")
 #: A line that begins as a row does; where it is none it is damaged.
 _BEGINS = re.compile(r"[A-Z]{1,2}\s*=?\s*[+-]?[0-9]*\.[0-9]")
+#: A power of ten behind a number, which would read as a letter of its own.
+_POWER = re.compile(r"[0-9.]+E[+-]?[0-9]{1,3}(?=[A-Z\s,;*]|$)")
 _UNITS = {"G20": "inch", "INCH": "inch", "G70": "inch", "G21": "mm", "MM": "mm", "G71": "mm", "METRIC": "mm"}
 _UNIT = re.compile(r"\b(G20|G21|G70|G71|INCH|MM|METRIC)\b")
 _LENGTHS = frozenset("XYZUVWIJKDR")
@@ -66,6 +68,13 @@ def read(file: ExportFile, how: WordSettings, faults: Faults) -> Export | None:
         for name in _UNIT.findall(text.upper()):
             units.setdefault(_UNITS[name], number)
         body = _UNIT.sub("", text.upper()).strip()
+        if "E" not in how.letters and _ROW.fullmatch(body) and (power := _POWER.search(body)):
+            faults.add(
+                file.name, number, None,
+                f"{quoted(power[0])} may be a power of ten or a number with the letter E behind it; print decimals, or "
+                'name the letter in the mapping: words = ["X", "E"]',
+            )  # fmt: skip
+            return None
         if _ROW.fullmatch(body):
             pairs = _WORD.findall(body)
             if len({letter for letter, _ in pairs}) < len(pairs):

@@ -31,6 +31,7 @@ class GroundKind(StrEnum):
     UNITS = "units"
     WORK_POINT = "work-point"
     INSTRUMENTS = "instruments"
+    SCALE = "scale"
     SIMULATED = "simulated"
 
 
@@ -41,7 +42,7 @@ class Ground:
     Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
     them. Lack of fit has a parameter as its subject where it is about its budget; units have columns as theirs, and
     none where the residuals are a ``size`` of what the statements leave, or the setup of which they are. Of what was
-    simulated the subject is the machine. Of instruments
+    simulated the subject is the machine, of a scale the instrument with the parameters that rest on it. Of instruments
     the subject is a parameter with the two that disagree, and ``size`` is their E_n; or it is who contradicts all
     others, by ``size`` in standard uncertainties. Where it may be any of several they are ``several``, each by its
     name; where nobody alone explains it there is no subject.

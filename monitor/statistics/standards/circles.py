@@ -17,6 +17,9 @@ from monitor.records import Array
 
 #: A least-squares circle has three unknowns; fewer points than this, or an arc below half a turn, say nothing of it.
 FEWEST_POINTS, SHORTEST_ARC = 12, np.pi
+#: Two senses are compared where the one has points no further apart than this many of its usual steps: across a wider
+#: gap a straight line between its ends says nothing of the path.
+WIDEST_GAP = 3.0
 #: Draws for the uncertainties: the standard deviation of so many is known to 2 %.
 DRAWS = 1000
 
@@ -118,24 +121,28 @@ def _figures(angle: Array, deviation: Array, sense: Array, senses: list[int]) ->
     if len(senses) == 2:
         centred, _ = _centred(angle, deviation)
         figures["G"] = np.ptp(centred, axis=1)
-        figures["H"] = np.max(np.abs(_difference(angle, centred, sense)), axis=1)
+        apart = np.abs(_difference(angle, centred, sense))
+        figures["H"] = np.max(apart, axis=1) if apart.shape[1] else np.full(len(deviation), np.nan)
     return figures
 
 
 def _difference(angle: Array, centred: Array, sense: Array) -> Array:
-    """Deviations (B, k) of the one sense less those (B, n) of the other, straight between its points."""
+    """Deviations (B, k) of the one sense less those (B, n) of the other, straight between its points, where it has
+    some: both senses of a partial circle may end elsewhere."""
     first, second = sense == 1, sense == -1
     at = angle[first] % (2.0 * np.pi)
     order = np.argsort(angle[second] % (2.0 * np.pi), kind="stable")
     places = (angle[second] % (2.0 * np.pi))[order]
     values = centred[:, second][:, order]
+    usual = float(np.median(np.diff(np.unique(np.round(places, 6)))))
     places = np.concatenate([places[-1:] - 2.0 * np.pi, places, places[:1] + 2.0 * np.pi])
     values = np.concatenate([values[:, -1:], values, values[:, :1]], axis=1)
     right = np.clip(np.searchsorted(places, at), 1, len(places) - 1)
     gap = np.maximum(places[right] - places[right - 1], 1e-12)
     share = (at - places[right - 1]) / gap
     between = values[:, right - 1] * (1.0 - share) + values[:, right] * share
-    return np.asarray(centred[:, first] - between)
+    is_beside = gap <= WIDEST_GAP * usual
+    return np.asarray((centred[:, first] - between)[:, is_beside])
 
 
 def minimum_zone(columns: Array, deviation: Array) -> float:

@@ -28,7 +28,7 @@ from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 from monitor.store import Database, check_analysis, stored_analyses
 from monitor.units import MICROMETRE, Unit
-from monitor.workflow.certificate.tool_points import tool_point_sentence
+from monitor.workflow.certificate.taken_as_stated import known_scale_sentence, tool_point_sentence
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer
 from monitor.workflow.uncertainty.machine_frame import frames_of, in_machine_frame
 from monitor.workflow.uncertainty.stored import KIND, StatedUncertainty, restored
@@ -275,8 +275,11 @@ def _evaluation(
             verdict=_verdict(monte_carlo, texts),
         )
         parts.append(checked[:1].upper() + checked[1:])
-    as_stated = tool_point_sentence(evaluated.campaign, evaluated.names, texts)
-    return ". ".join([*parts, *([] if as_stated is None else [as_stated]), _how_it_fits(evaluated, texts)])
+    as_stated = (
+        tool_point_sentence(evaluated.campaign, evaluated.names, texts),
+        known_scale_sentence(evaluated.campaign, texts),
+    )
+    return ". ".join([*parts, *(each for each in as_stated if each), _how_it_fits(evaluated, texts)])
 
 
 def _verdict(monte_carlo: StoredMonteCarlo, texts: Texts) -> str | None:

@@ -65,6 +65,7 @@ def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground,
         *_common_gain(campaign, robust, run),
         *_work_points(robust, run),
         *_instruments(campaign, robust, run),
+        *_exact_scales(campaign, robust, run),
         *_scale_bar(campaign, run),
         *_temperature(campaign, measured),
     )
@@ -180,6 +181,14 @@ def _instruments(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Gr
         subject = f"{apart.parameter}: {apart.first}, {apart.second}"
         limit = limit_of(apart.comparisons, DISAGREE, apart.degrees_of_freedom)
         yield Ground(GroundKind.INSTRUMENTS, run, subject, apart.e_n, limit)
+
+
+def _exact_scales(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
+    """Instruments that bring the unit of length, and nobody says how well: 1 K of air is 1 µm/m in every gain."""
+    for stated in campaign_method(campaign).as_stated(robust.fit.problem):
+        names = stated.moved.get("scale")
+        if names:
+            yield Ground(GroundKind.SCALE, run, f"{stated.name} ({', '.join(names)})")
 
 
 def _scale_bar(campaign: Campaign, run: int) -> Iterator[Ground]:

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import COSINE, Plain, Rows, Shown, Stance, direction_of
+from monitor.methods.instruments.reading import COSINE, SCALE, Plain, Rows, Shown, Stance, direction_of
 from monitor.records import Array
 
 #: A laser is set up along an axis to a millimetre over a metre.
@@ -30,7 +30,7 @@ class Displacement(Plain):
 
     name: ClassVar[str] = "displacement"
     columns: ClassVar[tuple[str, ...]] = ("reading_um",)
-    holdable: ClassVar[tuple[str, ...]] = ("direction",)
+    holdable: ClassVar[tuple[str, ...]] = ("direction", SCALE)
     relative: ClassVar[bool] = True
 
     @property

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.methods.instruments.frames import first_frame, seen_points
-from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Shown, Stance
+from monitor.methods.instruments.reading import SCALE, SHIFT, TURN, Plain, Rows, Shown, Stance
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
 
@@ -36,7 +36,7 @@ class Point(Plain):
 
     name: ClassVar[str] = "point"
     columns: ClassVar[tuple[str, ...]] = ("point_x_mm", "point_y_mm", "point_z_mm")
-    holdable: ClassVar[tuple[str, ...]] = ("frame", "targets")
+    holdable: ClassVar[tuple[str, ...]] = ("frame", "targets", SCALE)
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:

@@ -1,4 +1,4 @@
-"""What a certificate says of stated tool points: the places of which axes of the table count from them."""
+"""What a certificate says of stated tool points, from which places of the table's axes count, and of known scales."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.methods.model import chain_of
-from monitor.records import Campaign, Setup
+from monitor.records import BRINGS_SCALE, Campaign, Setup
 from monitor.reporting.texts import Texts
 
 
@@ -27,6 +27,16 @@ def tool_point_sentence(campaign: Campaign, names: Sequence[str], texts: Texts) 
     setups = [setup for axis in dict.fromkeys(axis_of[name] for name in places) for setup in setups_of[axis]]
     instruments = dict.fromkeys(setup.instrument or setup.id for setup in setups)
     return texts("evaluation.tool_points", places=", ".join(places), instruments=", ".join(instruments))
+
+
+def known_scale_sentence(campaign: Campaign, texts: Texts) -> str | None:
+    """Whose scale holds as exact because the campaign states it as known, without its full stop; None for nobody's."""
+    instruments = dict.fromkeys(
+        setup.instrument or setup.id
+        for setup in campaign.artefact.setups
+        if setup.reading in BRINGS_SCALE and "scale" in setup.known
+    )
+    return texts("evaluation.known_scale", instruments=", ".join(instruments)) if instruments else None
 
 
 def _that_turn(campaign: Campaign, axis: str) -> list[Setup]:
