@@ -41,8 +41,8 @@ def unchecked_readings(fit: Fit, names: tuple[str, ...]) -> Unchecked | None:
     rows, shares = [], np.zeros(len(columns_of_names))
     for row in np.flatnonzero(fit.has_weight.any(axis=1)):
         read = row * numbers + np.flatnonzero(fit.has_weight[row])
-        left, directions = np.linalg.eigh(np.eye(len(read)) - basis[read] @ basis[read].T)
-        moved = np.abs(inverse[:, read] @ directions[:, left < _LEFT]).max(axis=1, initial=0.0) / u
+        part_left, directions = np.linalg.eigh(np.eye(len(read)) - basis[read] @ basis[read].T)
+        moved = np.abs(inverse[:, read] @ directions[:, part_left < _LEFT]).max(axis=1, initial=0.0) / u
         if np.any(moved > _MOVES):
             rows.append(int(problem.context.sequence[row]))
             shares = np.maximum(shares, moved)
