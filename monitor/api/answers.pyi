@@ -14,6 +14,7 @@ from monitor.reporting.budget import DayToDay
 from monitor.reporting.budget import HoldsFor
 from monitor.reporting.budget import LengthReference
 from monitor.reporting.budget import StatedSource
+from monitor.reporting.budget import Unchecked
 from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
@@ -571,6 +572,8 @@ class TypedUncertaintyAnswer(Answer[UncertaintyAnswer]):
     def sources(self) -> tuple[StatedSource, ...] | None: ...
     @property
     def length(self) -> LengthReference | None: ...
+    @property
+    def unchecked(self) -> Unchecked | None: ...
     @property
     def grounds(self) -> tuple[Ground, ...] | None: ...
     @property

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from monitor.cli import output
 from monitor.reporting.budget import HoldsFor, budget_lines, line_words
-from monitor.reporting.budget_words import days_sentences, length_sentence, negative_sentence, source_words
+from monitor.reporting.budget_words import (
+    days_sentences,
+    length_sentence,
+    negative_sentence,
+    source_words,
+    unchecked_sentence,
+)
 from monitor.reporting.texts import texts_of
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
@@ -25,6 +31,8 @@ def behind(answer: UncertaintyAnswer) -> None:
         output.say(sentence)
     if answer.day_to_day is not None and answer.day_to_day.not_from_zero:
         output.say(negative_sentence(answer.day_to_day, texts))
+    if answer.unchecked is not None:
+        output.say(unchecked_sentence(answer.unchecked, texts))
     if answer.length is not None:
         output.say(length_sentence(answer.length, texts))
 

@@ -251,14 +251,12 @@ def _cycle(name: str, wave: Cycle) -> str:
 
 
 def _warm_up(name: str, warmth: WarmUp) -> str:
-    moves, within, stable = (
-        "falls" if warmth.amplitude > 0.0 else "rises",
-        warmth.recorded_h,
-        warmth.stable_after_h,
-    )
+    moves, stable = "falls" if warmth.amplitude > 0.0 else "rises", warmth.stable_after_h
+    # A server of version 0.2.0 does not say how many hours were recorded.
+    recorded = "" if warmth.recorded_h is None else f"{_hours(warmth.recorded_h)} h"
     ends = (
-        f"not yet stable after the {_hours(within)} h recorded"
-        if stable is None or stable > within
+        f"not yet stable after the {recorded or 'hours'} recorded"
+        if stable is None or (warmth.recorded_h is not None and stable > warmth.recorded_h)
         else f"stable after {_hours(stable)} h"
     )
     what, constant = (
@@ -266,7 +264,7 @@ def _warm_up(name: str, warmth: WarmUp) -> str:
         if warmth.tau_h is None
         else ("warms up", f"{_hours(warmth.tau_h)} h")
     )
-    change = f"{moves} by {abs(warmth.amplitude):.3g} {warmth.unit} within {_hours(within)} h"
+    change = f"{moves} by {abs(warmth.amplitude):.3g} {warmth.unit}{recorded and f' within {recorded}'}"
     return f"{name}: {what}: {change}, time constant {constant}; {ends}"
 
 

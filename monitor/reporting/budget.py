@@ -89,6 +89,15 @@ class LengthReference:
     not_in_u: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
+@dataclass(frozen=True)
+class Unchecked:
+    """The ``sequence`` numbers of the readings of a run that no other reading checks, and the ``parameters`` that they
+    move, the one that they move most first."""
+
+    sequence: tuple[int, ...]
+    parameters: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class BudgetLine:
     """A line of the budget: what it adds to u of every parameter (m,), as a standard uncertainty in display units.
@@ -111,6 +120,7 @@ class Budget:
     day_to_day: DayToDay | None = None
     sources: tuple[StatedSource, ...] = ()
     length: LengthReference | None = None
+    unchecked: Unchecked | None = field(default=None, metadata=OMITTED)
 
     def of(self, places: Sequence[int]) -> Budget:
         """The budget of the parameters at ``places`` alone."""

@@ -10,6 +10,7 @@ from monitor.reporting.budget import (
     LengthKind,
     LengthReference,
     StatedSource,
+    Unchecked,
     larger_than_u,
 )
 from monitor.reporting.numbers import decimal_of, round_result, round_to_place, round_uncertainty
@@ -51,6 +52,15 @@ def days_sentences(
 def negative_sentence(days: DayToDay, texts: Texts) -> str:
     """Which estimates of u_day were negative; empty where none was."""
     return texts("budget.negative", names=", ".join(days.not_from_zero)) if days.not_from_zero else ""
+
+
+def unchecked_sentence(unchecked: Unchecked, texts: Texts) -> str:
+    """Which readings nothing checks, and what a wrong one of them moves."""
+    rows, names = (
+        ", ".join([*shown[:_NAMED], *["..."] * (len(shown) > _NAMED)])
+        for shown in (tuple(map(str, unchecked.sequence)), unchecked.parameters)
+    )
+    return texts("budget.unchecked", rows=rows, names=names)
 
 
 def length_sentence(length: LengthReference, texts: Texts) -> str:

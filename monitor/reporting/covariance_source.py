@@ -34,11 +34,12 @@ class CovarianceSource:
 
     ``runs`` and ``dof``, the degrees of freedom, belong to a covariance that was estimated from repeated runs, ``u_um``
     to one that was stated or is the repeatability, in µm, ``times`` to a repeatability as a multiple of what each
-    setup of an instrument states. ``selection`` names the stored selection (or campaign) whose
-    runs were taken. ``for_the_run`` is true where repeated runs would have sufficed and an uncertainty of the run
-    itself was asked for. ``neighbours`` is the correlation of a reading with the one before it, where the residuals
-    show one. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known`` whose errors are
-    no part of u.
+    setup of an instrument states. ``selection`` names the stored selection (or campaign) whose runs were taken.
+    ``for_the_run`` is true where repeated runs would have sufficed and an uncertainty of the run itself was asked for.
+    ``neighbours`` is the correlation of a reading with the one before it, where the residuals show one, and
+    ``further`` its factor with each further reading; with ``of_poses`` the correlation is that of the readings of one
+    pose, and the factor that of each further pose. ``linear_axes`` says that stated errors of the linear axes were
+    added, ``taken_as_known`` whose errors are no part of u.
     """
 
     kind: CovarianceKind
@@ -51,6 +52,8 @@ class CovarianceSource:
     times: float | None = field(default=None, metadata=OMITTED)
     for_the_run: bool | None = field(default=None, metadata=OMITTED)
     neighbours: float | None = field(default=None, metadata=OMITTED)
+    further: float | None = field(default=None, metadata=OMITTED)
+    of_poses: bool | None = field(default=None, metadata=OMITTED)
 
 
 def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) -> str:
@@ -62,9 +65,12 @@ def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) ->
     times = "" if source.times is None else f"{source.times:.2g}".replace(".", say.decimal_sign)
     key = f"covariance.{source.kind.value}" + "_for_the_run" * bool(source.for_the_run)
     sentence = say(key, runs=source.runs, dof=source.dof, u=u, times=times)
-    if source.neighbours is not None:
-        alike = f"{source.neighbours:.2g}".replace(".", say.decimal_sign)
-        sentence = say("covariance.neighbours", sentence=sentence, correlation=alike)
+    if source.neighbours is not None and source.further is not None:
+        alike, further = (
+            f"{number:.2g}".replace(".", say.decimal_sign) for number in (source.neighbours, source.further)
+        )
+        key = "covariance.neighbours" + "_of_poses" * bool(source.of_poses)
+        sentence = say(key, sentence=sentence, correlation=alike, further=further)
     if source.selection is not None:
         sentence = say("covariance.selection", name=source.selection, sentence=sentence)
     if source.linear_axes:

@@ -23,6 +23,7 @@ OTHER = frozenset(
         *(
             "autocorrelation",
             "neighbours",
+            "further",
             "time_constant_days",
             "axes",
             "bartlett",

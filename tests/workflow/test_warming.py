@@ -11,6 +11,7 @@ import pytest
 import scipy
 
 from monitor.cli.trend_output import _warm_up
+from monitor.documents import from_document, to_document
 from monitor.reporting.lacks import Cause
 from monitor.statistics import control_false_discoveries
 from monitor.workflow.history.changes import search_changes
@@ -113,7 +114,7 @@ def test_a_slow_warm_up_of_a_day_is_kept_though_its_time_constant_is_not_determi
 
 
 def test_the_words_name_what_was_seen_and_write_hours_in_full():
-    fit = WarmUp("A", -4.0, 0.3, "µm", 400.0, 304.0, (250.0, 380.0), 820.0, (700.0, None), 0.6, 0.001, 0.008)
+    fit = WarmUp("A", -4.0, 0.3, "µm", 304.0, (250.0, 380.0), 820.0, (700.0, None), 0.6, 0.001, 0.008, 400.0)
     assert _warm_up("EZ0A", fit) == (
         "EZ0A: warms up: rises by 4 µm within 400 h, time constant 300 h; not yet stable after the 400 h recorded"
     )
@@ -122,6 +123,18 @@ def test_the_words_name_what_was_seen_and_write_hours_in_full():
     ) == (
         "EZ0A: warms up or drifts: falls by 12 µm within 8 h, time constant not determined; "
         "not yet stable after the 8 h recorded"
+    )
+
+
+def test_the_answer_of_a_server_of_version_0_2_0_has_no_recorded_hours():
+    fit = WarmUp("A", -4.0, 0.3, "µm", 2.0, (1.5, 2.5), 6.0, (5.0, 8.0), 0.6, 0.001, 0.008, 8.0)
+    document = to_document(fit)
+    del document["recorded_h"]
+    older = from_document(WarmUp, document)
+    assert older == replace(fit, recorded_h=None)
+    assert _warm_up("EZ0A", older) == "EZ0A: warms up: rises by 4 µm, time constant 2 h; stable after 6 h"
+    assert _warm_up("EZ0A", replace(older, stable_after_h=None)) == (
+        "EZ0A: warms up: rises by 4 µm, time constant 2 h; not yet stable after the hours recorded"
     )
 
 

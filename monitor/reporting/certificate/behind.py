@@ -13,6 +13,7 @@ from monitor.reporting.budget_words import (
     length_sentence,
     negative_sentence,
     source_words,
+    unchecked_sentence,
 )
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.tables import Number, aligned
@@ -71,9 +72,12 @@ def printed_behind(result: ResultSet, texts: Texts) -> PrintedBehind | None:
 
 
 def behind_sentences(result: ResultSet, budget: Budget, texts: Texts) -> tuple[str, ...]:
-    """For which time the uncertainty holds, and which day means span more than U."""
+    """For which time the uncertainty holds, which day means span more than U, and which readings nothing checks."""
     units = dict(zip(result.names, result.units, strict=True))
-    return days_sentences(budget.holds_for, budget.day_to_day, _expanded(result), units, texts)
+    sentences = days_sentences(budget.holds_for, budget.day_to_day, _expanded(result), units, texts)
+    if budget.unchecked is not None:
+        sentences += (unchecked_sentence(budget.unchecked, texts),)
+    return sentences
 
 
 def _expanded(result: ResultSet) -> dict[str, float]:

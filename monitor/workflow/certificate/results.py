@@ -221,6 +221,7 @@ def _budget(answer: UncertaintyAnswer) -> Budget | None:
         answer.day_to_day,
         answer.sources or (),
         answer.length,
+        answer.unchecked,
     )
 
 

@@ -180,7 +180,6 @@ class WarmUp:
     amplitude: float
     u: float
     unit: str
-    recorded_h: float
     tau_h: float | None
     tau_interval_h: tuple[float | None, float | None]
     stable_after_h: float | None
@@ -188,6 +187,7 @@ class WarmUp:
     stable_within: float
     p_value: float
     q_value: float | None = None
+    recorded_h: float | None = None
 
 
 @dataclass(frozen=True)

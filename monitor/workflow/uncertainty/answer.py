@@ -13,7 +13,7 @@ import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.records import Array, FrameOfReference, ValidationVerdict
-from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource, Unchecked
 from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
@@ -131,8 +131,9 @@ class UncertaintyAnswer:
     parameters without a number. ``mcm`` and ``validation`` are left out where no Monte Carlo was asked for.
     ``holds_for`` says for which time the uncertainty holds, ``day_to_day`` how runs and days differ, ``sources`` which
     Type B sources were stated, ``length`` to what gains refer; all are None in an answer of an earlier version.
-    ``grounds`` speak against a certificate of the run; None where they were not determined. ``effects`` are those of
-    the parameters that belong to the whole campaign, being added to the model; ``effects_outside`` says why none are.
+    ``unchecked`` are readings that no other checks. ``grounds`` speak against a certificate of the run; None where they
+    were not determined. ``effects`` are those of the parameters that belong to the whole campaign, being added to the
+    model; ``effects_outside`` says why none are.
     """
 
     campaign: str
@@ -157,6 +158,7 @@ class UncertaintyAnswer:
     day_to_day: DayToDay | None = field(default=None, metadata=OMITTED)
     sources: tuple[StatedSource, ...] | None = field(default=None, metadata=OMITTED)
     length: LengthReference | None = field(default=None, metadata=OMITTED)
+    unchecked: Unchecked | None = field(default=None, metadata=OMITTED)
     grounds: tuple[Ground, ...] | None = field(default=None, metadata=OMITTED)
     effects: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     effects_outside: Outside | None = field(default=None, metadata=OMITTED)

@@ -35,6 +35,7 @@ from monitor.workflow.uncertainty.sources import (
     shown_part,
     stated,
 )
+from monitor.workflow.uncertainty.unchecked import unchecked_readings
 from monitor.workflow.uncertainty.with_effects import EffectOutputs, source_effect
 
 
@@ -130,6 +131,7 @@ def beside_readings(
             day_to_day=_day_to_day(fit, campaign, run, components),
             sources=stated(sources, counted),
             length=length_reference(campaign, number, _gains(fit, run.names), sources),
+            unchecked=unchecked_readings(fit, run.names),
         ),
         bool(linear) and linear <= axes_stated(sources, chain),
     )

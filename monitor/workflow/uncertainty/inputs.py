@@ -106,9 +106,13 @@ def _stated_inputs(
     source = _stated_source(u, stated, several=several, selection=selection)
     if alike is None:
         return inputs, source
-    neighbours = round(alike.correlation.rho * alike.correlation.share, 3)
     covariance = alike.matrix * np.outer(deviation, deviation)
-    return replace(inputs, covariance=covariance), replace(source, neighbours=neighbours)
+    return replace(inputs, covariance=covariance), replace(
+        source,
+        neighbours=round(alike.neighbours, 3),
+        further=alike.correlation.rho,
+        of_poses=alike.of_poses or None,
+    )
 
 
 def readings_of_runs(

@@ -6,69 +6,94 @@ well: then u is too large rather than too small.
 A slow drift, a warm spindle, a probe that forgets slowly: such noise moves parameters by more than independent noise of
 the same size, and the residuals show less of it. What the search for missing effects takes out before it looks
 (``discovery.machine.noise``) is put into the covariance here.
+
+Readings of one pose of a robot share how its joints came to rest there: one part of their variance is common to all of
+them, and follows that of the pose before by the correlation (docs/trials-robots.md has the rates).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import Fit
 from monitor.discovery.machine.noise.correlation import Correlation, Whitening
+from monitor.discovery.machine.noise.rows import Rows
 from monitor.methods.chain.poses import shared_poses
 from monitor.records import Array
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.touched_run import TouchedRun
 
+#: A step from row to row of one pose, of a step from pose to pose: rows of nothing but shared noise stay different.
+WITHIN_A_POSE = 0.02
+
 
 @dataclass(frozen=True)
 class Resemblance:
     """How the readings of a run resemble each other: their ``matrix`` (N, N) of correlations and the ``correlation``
-    that it is of; ``scale`` is the standard deviation of a reading over the stated one, by generalised least squares.
+    that it is of, from reading to reading or ``of_poses``; ``scale`` is the standard deviation of a reading over the
+    stated one, by generalised least squares.
     """
 
     matrix: Array
     correlation: Correlation
     scale: float
+    of_poses: bool
+
+    @property
+    def neighbours(self) -> float:
+        """The correlation of a reading with the one before it, with ``of_poses`` with the others of its pose."""
+        return self.correlation.share * (1.0 if self.of_poses else self.correlation.rho)
 
 
 def resemblance_of(fit: Fit, run: MeasuredRun) -> Resemblance | None:
-    """The resemblance of the readings of one ``run`` of a fit; None where its residuals show none.
-
-    None, too, where numbers share their poses (a robot): these are what resembles, and have a yardstick of their own.
-    """
-    if shared_poses(fit.problem, fit.solution) is not None:
-        return None
-    correlation = fit.correlation()
+    """The resemblance of the readings of one ``run`` of a fit; None where its residuals show none."""
+    pose = shared_poses(fit.problem, fit.solution)
+    design = fit.noise_design
+    if pose is not None:
+        design = replace(design, rows=_from_pose_to_pose(design.rows, pose))
+    correlation = design.correlation(fit.solution.last.residual)
     if correlation is None:
         return None
-    white = fit.with_correlation(correlation)
+    rows = design.rows
+    white = replace(fit, whitening=Whitening(rows, correlation)).white
+    scale = float(np.sum(white**2)) / max(fit.degrees_of_freedom, 1)
     index = int(np.flatnonzero(fit.problem.runs == run.problem.runs[0])[0])
-    whitening = white.whitening
-    assert whitening is not None
+    touches = rows.correlated(index, correlation.rho, correlation.share)
     if isinstance(run, TouchedRun):
-        # The linear axes drift alike, each by itself. A touch without weight has no row of its own.
-        triangle = whitening.factors[0][index] + np.diag(~whitening.rows.weighted[index] * 1.0)
-        touches = np.linalg.inv(triangle)[: run.probings, : run.probings]
-        matrix = np.kron(touches @ touches.T, np.eye(len(run.linear)))
+        # The linear axes drift alike, each by itself.
+        matrix = _each_alike(touches[: run.probings, : run.probings], len(run.linear))
     else:
-        numbers = _root(white, whitening, index)[run.problem.is_number.ravel()]
-        matrix = numbers @ numbers.T
-    scale = float(np.sum(white.white**2)) / max(fit.degrees_of_freedom, 1)
+        is_number = run.problem.is_number
+        matrix = _of_numbers(touches[: len(is_number), : len(is_number)], rows, index)
+        matrix = matrix[np.ix_(is_number.ravel(), is_number.ravel())]
     size = np.sqrt(np.diag(matrix))
     size = np.where(size > 0.0, size, 1.0)
-    return Resemblance(matrix / np.outer(size, size), correlation, float(np.sqrt(scale)))
+    matrix /= size
+    matrix /= size[:, None]
+    return Resemblance(matrix, correlation, float(np.sqrt(scale)), pose is not None)
 
 
-def _root(white: Fit, whitening: Whitening, index: int) -> Array:
-    """What independent numbers are as those of the run at ``index``: (n d, n d) for its n rows."""
-    rows = whitening.rows
-    count = int(np.sum(white.problem.context.run == white.problem.runs[index])) * rows.numbers
-    shape = white.solution.last.residual.shape
-    root = np.empty((count, count))
-    for number in range(count):
-        unit = np.zeros(shape)
-        unit[index, number] = 1.0
-        root[:, number] = whitening.undone(unit)[index, :count]
-    return root
+def _from_pose_to_pose(rows: Rows, pose: npt.NDArray[np.int64]) -> Rows:
+    """Rows that follow each other from ``pose`` (M,) of every whitened number to pose."""
+    of_touch = pose.reshape(len(rows.weighted), -1)[:, : rows.count : rows.numbers]
+    stays = np.diff(rows.by_neighbours(of_touch), axis=1, prepend=-2) == 0
+    steps = np.ones(stays.shape) if rows.steps is None else rows.steps
+    return replace(rows, steps=np.where(stays, WITHIN_A_POSE, steps))
+
+
+def _of_numbers(touches: Array, rows: Rows, index: int) -> Array:
+    """The correlations (n d, n d) of the numbers of n rows from those (n, n) of drifts in one direction."""
+    count, numbers = len(touches), rows.numbers
+    if rows.turned is None:
+        return _each_alike(touches, numbers)
+    turned = rows.turned[index, :count]
+    matrix = np.einsum("iba,ij,jbc->iajc", turned, touches, turned, optimize=True)
+    return np.asarray(matrix.reshape(count * numbers, -1))
+
+
+def _each_alike(touches: Array, numbers: int) -> Array:
+    """The correlations of so many numbers of every touch, each of which follows the same of the touch before."""
+    return np.asarray(np.kron(touches, np.eye(numbers)), dtype=np.float64)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from monitor.discovery import Fit
 from monitor.records import Campaign
 from monitor.refusal import Refusal
-from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource, Unchecked
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import StoredModel
@@ -18,12 +18,14 @@ from monitor.workflow.uncertainty.request import Asked
 
 @dataclass(frozen=True)
 class Behind:
-    """What stands behind a stated uncertainty: for which time it holds, how days differ, the sources, the length."""
+    """What stands behind a stated uncertainty: for which time it holds, how days differ, the sources, the length,
+    and which readings nothing checks."""
 
     holds_for: HoldsFor
     day_to_day: DayToDay
     sources: tuple[StatedSource, ...]
     length: LengthReference | None
+    unchecked: Unchecked | None
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,7 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         day_to_day=result.behind.day_to_day,
         sources=result.behind.sources or None,
         length=result.behind.length,
+        unchecked=result.behind.unchecked,
         effects=result.effects or None,
         effects_outside=result.effects_outside,
     )

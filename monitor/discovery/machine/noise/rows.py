@@ -54,6 +54,22 @@ class Rows:
         order = self.order if runs is None else self.order[runs]
         return touches[np.arange(len(touches))[:, None], order]
 
+    def correlated(self, index: int, rho: float, share: float) -> Array:
+        """The correlations (T, T) of the touches of the run at ``index``, in the order of measuring: those of one
+        series resemble each other by ``share`` times ``rho`` to the power of the steps between them."""
+        count = self.weighted.shape[1]
+        steps = np.ones(count) if self.steps is None else self.steps[index]
+        along = np.cumsum(steps)
+        matrix = share * rho ** np.abs(along[:, None] - along)
+        if self.begins is not None:
+            series = np.cumsum(self.begins[index])
+            matrix[series[:, None] != series] = 0.0
+        np.fill_diagonal(matrix, 1.0)
+        if self.order is None:
+            return np.asarray(matrix)
+        back = np.argsort(self.order[index])
+        return np.asarray(matrix[back[:, None], back])
+
 
 def rows_of(problem: ChainProblem) -> Rows:
     """The layout of the whitened numbers of a problem, in the order of measuring."""
