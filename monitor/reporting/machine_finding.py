@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -60,16 +61,29 @@ class Scattering:
     deviation_um: float
 
 
-@dataclass(frozen=True)
-class RunUnlike:
+class RunUnlike(Protocol):
     """A run that leaves ``times`` what the others leave; ``neighbours`` is the correlation of one reading with the
     next, ``as_if`` the effect that makes up most of it, drifting."""
 
-    run: int
-    times: float
-    deviation_um: float
-    neighbours: float
-    as_if: str | None
+    @property
+    def run(self) -> int:
+        """Its number."""
+
+    @property
+    def times(self) -> float:
+        """How many times as much it leaves."""
+
+    @property
+    def deviation_um(self) -> float:
+        """The standard deviation of a reading in it."""
+
+    @property
+    def neighbours(self) -> float:
+        """Near zero where it scatters, near one where it wanders."""
+
+    @property
+    def as_if(self) -> str | None:
+        """What drifted in it, if that is seen."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.methods.samba.method import problem_of
 from monitor.records import Campaign
-from monitor.reporting.machine_finding import MachineFinding, RunUnlike, machine_sentences
+from monitor.reporting.machine_finding import MachineFinding, machine_sentences
+from monitor.workflow.explain.explain_answer import UnlikeRun
 
 
 def apart(campaign: Campaign) -> tuple[RunApart, ...]:
@@ -92,7 +93,7 @@ def test_a_run_apart_is_told_in_a_sentence(neighbours: float, as_if: str | None,
         unfitted=[],
         hopeless=False,
         mistakes=[],
-        unlike_runs=[RunUnlike(2, 2.3, 2.2, neighbours, as_if)],
+        unlike_runs=[UnlikeRun(2, 2.3, 2.2, neighbours, 1e-9, as_if)],
     )
     text = machine_sentences(finding)
     assert "Run 2 leaves 2.3 times as much as the others (2.2 µm in a reading)" in text

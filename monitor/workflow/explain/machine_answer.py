@@ -22,7 +22,6 @@ from monitor.reporting.machine_finding import (
     MissingEffect,
     MistakeFound,
     Move,
-    RunUnlike,
     Scattering,
     fits_too_well,
     machine_sentences,
@@ -269,10 +268,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
         for each in explanation.scatter
     )
-    unlike_runs = tuple(
-        UnlikeRun(each.run, each.times, um(each.deviation), each.neighbours, each.p_value, each.as_if)
-        for each in explanation.apart
-    )
+    unlike_runs = _unlike_runs(explanation)
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
     if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -301,10 +297,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                     Scattering(problem.target_word, each.target, each.times, each.deviation_um)
                     for each in scattering
                 ),
-                unlike_runs=[
-                    RunUnlike(each.run, each.times, each.deviation_um, each.neighbours, each.as_if)
-                    for each in unlike_runs
-                ],
+                unlike_runs=unlike_runs,
                 limits=explanation.limits,
                 most_bad_points=MOST_BAD_POINTS,
                 unfitted=explanation.unfitted,
@@ -322,6 +315,21 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         scattering=scattering,
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
+    )
+
+
+def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:
+    """The runs that leave more than the others."""
+    return tuple(
+        UnlikeRun(
+            each.run,
+            each.times,
+            MICROMETRE.to_display(each.deviation),
+            each.neighbours,
+            each.p_value,
+            each.as_if,
+        )
+        for each in explanation.apart
     )
 
 

@@ -19,8 +19,8 @@ from monitor.discovery.machine.suspects.anomalies import checked_parts, statisti
 from monitor.discovery.search.projection import orthonormal
 from monitor.records import Array
 
-# Runs of a real machine differ by a third; what is less has not spoilt anything, unless it is seen what drifted.
-LEAST_TIMES, LEAST_WITH_DRIFT = 1.35, 1.1
+# Runs of a real machine differ by a third; what is less has not spoilt anything.
+LEAST_TIMES = 1.35
 FALSE_ALARM = 1e-4
 # Of two runs one is unlike the other, and nobody knows which.
 FEWEST_RUNS = 3
@@ -53,7 +53,9 @@ def runs_apart(scene: ChainScene) -> tuple[RunApart, ...]:
         return ()
     typical, judged = _typical(fit)
     apart = [
-        found for number in range(len(runs)) if (found := _apart(scene, typical, judged, number)) is not None
+        unlike
+        for number in range(len(runs))
+        if (unlike := _apart(scene, typical, judged, number)) is not None
     ]
     return tuple(apart) if 2 * len(apart) < len(runs) else ()
 
@@ -77,8 +79,7 @@ def _apart(scene: ChainScene, typical: Array, judged: npt.NDArray[np.bool_], num
     # Medians of a slow wave say little: its mean does.
     times = max(times, float(np.sqrt(np.mean(mine) / np.mean(others))))
     p_value = _p_value(mine, others) * len(fit.problem.runs)
-    as_if = _as_if(scene, number, times) if times > LEAST_WITH_DRIFT else None
-    if as_if is None and (times < LEAST_TIMES or p_value > FALSE_ALARM):
+    if times < LEAST_TIMES or p_value > FALSE_ALARM:
         return None
     sigma = fit.problem.sigma[inside]
     stated = float(np.sqrt(np.mean(sigma[np.isfinite(sigma)] ** 2)))
@@ -88,7 +89,7 @@ def _apart(scene: ChainScene, typical: Array, judged: npt.NDArray[np.bool_], num
         stated * float(np.sqrt(np.median(others))) * times,
         _neighbours(fit.vectors[judged & inside]),
         min(1.0, p_value),
-        as_if,
+        _as_if(scene, number, times),
     )
 
 
