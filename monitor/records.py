@@ -42,6 +42,16 @@ class Verdict(StrEnum):
     SOMETHING_IS_MISSING = "something is missing"
 
 
+class SecondSetup(StrEnum):
+    """What a second set-up has that tells effects apart where no pose of the first one does."""
+
+    LONGER_STYLUS = "longer_stylus"
+    STYLUS_BESIDE = "stylus_beside"
+    TURNED = "turned"
+    FURTHER = "further"
+    HIGHER = "higher"
+
+
 @dataclass(frozen=True)
 class AuditAnchor:
     """The last entry of a database's audit chain at a moment: its number and its SHA-256, hexadecimal.

@@ -47,6 +47,7 @@ from monitor.workflow.explain.explain_answer import MachineMissing
 from monitor.workflow.explain.explain_answer import MovedTarget
 from monitor.workflow.explain.explain_answer import Remaining
 from monitor.workflow.explain.explain_answer import ScatteringTarget
+from monitor.workflow.explain.explain_answer import UnlikeRun
 from monitor.workflow.explain.version_answer import CurveVersion
 from monitor.workflow.explain.version_answer import MachineVersion
 from monitor.workflow.fleet.answer import FleetAnswer
@@ -260,6 +261,8 @@ class TypedExplainAnswer(Answer[ExplainAnswer]):
     def taken_for_machine(self) -> tuple[InstrumentAlias, ...]: ...
     @property
     def scattering(self) -> tuple[ScatteringTarget, ...]: ...
+    @property
+    def unlike_runs(self) -> tuple[UnlikeRun, ...]: ...
     @property
     def added_together(self) -> tuple[str, ...]: ...
     @property

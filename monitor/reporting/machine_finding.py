@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -32,6 +33,8 @@ class MistakeFound:
     rms_undone: float
 
 
+#: From this correlation of neighbours on a run wanders rather than scatters.
+WANDERS = 0.25
 #: What moved where all targets did.
 WHOLE_PIECE = "The piece on the table"
 
@@ -58,6 +61,31 @@ class Scattering:
     deviation_um: float
 
 
+class RunUnlike(Protocol):
+    """A run that leaves ``times`` what the others leave; ``neighbours`` is the correlation of one reading with the
+    next, ``as_if`` the effect that makes up most of it, drifting."""
+
+    @property
+    def run(self) -> int:
+        """Its number."""
+
+    @property
+    def times(self) -> float:
+        """How many times as much it leaves."""
+
+    @property
+    def deviation_um(self) -> float:
+        """The standard deviation of a reading in it."""
+
+    @property
+    def neighbours(self) -> float:
+        """Near zero where it scatters, near one where it wanders."""
+
+    @property
+    def as_if(self) -> str | None:
+        """What drifted in it, if that is seen."""
+
+
 @dataclass(frozen=True)
 class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
@@ -75,6 +103,7 @@ class MachineFinding:
     hopeless: bool
     mistakes: Sequence[MistakeFound]
     scattering: Sequence[Scattering] = ()
+    unlike_runs: Sequence[RunUnlike] = ()
     unseen: bool = False
 
 
@@ -136,6 +165,7 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"({each.deviation_um:.1f} µm in a reading): see whether it sits firmly and clean; its readings counted "
             "by so much less."
         )
+    sentences += [_unlike(each) for each in finding.unlike_runs]
     for move in finding.moves:
         verb = "stepped" if move.stepped else "moved"
         at = f"at run {move.run}"
@@ -149,6 +179,18 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"{', '.join(finding.unfitted)}."
         )
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
+
+
+def _unlike(unlike: RunUnlike) -> str:
+    how = "from one reading to the next: see whether probe, tip and targets sat firmly then"
+    if unlike.neighbours > WANDERS:
+        how = "wandering slowly: look for what warmed, a door, a draught or a clamp then"
+    if unlike.as_if is not None:
+        how = f"as if {unlike.as_if} drifted while it was measured"
+    return (
+        f"Run {unlike.run} leaves {unlike.times:.1f} times as much as the others ({unlike.deviation_um:.1f} µm in a "
+        f"reading), {how}. It counted like the others: measure it again, or leave it out of the campaign."
+    )
 
 
 def _missing_sentences(finding: MachineFinding) -> list[str]:

@@ -10,8 +10,10 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor.exceptions import MonitorError
+from monitor.records import SecondSetup
 from monitor.reporting.numbers import round_result, written
 from monitor.reporting.runs_that_tell import runs_that_tell
+from monitor.reporting.second_setup import IN_WORDS
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.attention import ATTENTION, Attention
@@ -295,5 +297,8 @@ def what_breaks(tie: Tie) -> str:
             f"measure more poses over the whole range of {' and '.join(tie.axes)}, and some under another load"
         ),
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
-        TieBreak.NOTHING: "no touch of these targets does: they move the tip alike, and one correction serves both",
+        TieBreak.SETUP: f"measure a run more {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
+        TieBreak.NOTHING: (
+            "no touch of these targets does: they move the tip alike, and one correction serves both with this stylus"
+        ),
     }[tie.broken_by]

@@ -66,6 +66,7 @@ OTHER = frozenset(
             "probability_out",
             "slope_widening",
             "scatter_over_stated",
+            "neighbours",
         ),
         *("correlation", "allowed_for", "widening", "weight", "high", "low", "present", "proposed", "sums"),
         *(

@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 from by_path import simulator
 
+from monitor.discovery.machine.separation.distances import Pair, distance_of
+from monitor.discovery.machine.separation.setups import decides, of_effects, setups_of
+from monitor.machine import parse_topology
+from monitor.records import SecondSetup
+
 
 @pytest.fixture(scope="module")
 def campaign_with(virtual_campaigns):
@@ -81,3 +86,45 @@ def test_nothing_is_offered_where_there_is_nothing_to_separate(virtual_campaigns
     (found,) = explained(campaign_with(sim.five_days_plan(), 3, sim.Effect("EXX:poly2", peak_um=8.0))).missing
     assert found.rivals == ()
     assert found.separation.poses == ()
+
+
+def test_another_stylus_is_named_where_no_pose_tells_a_tilt_from_a_shift():
+    """With a tip 120 mm from the gauge a tilt of the carriage and its positioning move it alike, with one 50 mm longer
+    they do not: against a least squares of both set-ups together, each with unknowns of its own."""
+    rng = np.random.default_rng(5)
+    direction = rng.choice([-1.0, 1.0], 40)
+    own = rng.standard_normal((2, 40, 3))
+
+    def rows(setup, length_mm):
+        return np.column_stack([own[setup], direction, 40e-3 * length_mm * direction])
+
+    def products(setup, length_mm):
+        return rows(setup, length_mm).T @ rows(setup, length_mm)
+
+    one, other, same = products(0, 120.0), products(1, 170.0), products(1, 120.0)
+    assert not decides(Pair((0, 1), one, same[None]), 3, runs=4)
+    assert decides(Pair((0, 1), one, other[None]), 3, runs=4)
+    nothing = np.zeros((40, 3))
+    free = np.block(
+        [[own[0], nothing, direction[:, None]], [nothing, own[1], direction[:, None]]],
+    )
+    tilt = np.concatenate([rows(0, 120.0)[:, -1], rows(1, 170.0)[:, -1]])
+    left = tilt - free @ np.linalg.lstsq(free, tilt, rcond=None)[0]
+    apart = distance_of(of_effects(one, 3) + of_effects(other, 3), 4)
+    assert apart == pytest.approx(2.0 * np.linalg.norm(left), rel=1e-6)
+
+
+def test_set_ups_move_the_tip_or_the_targets():
+    chain = parse_topology("w C B X b Z Y t")
+    tip = np.array([0.0, 0.0, -120.0])
+    moved = {each.setup: each for each in setups_of(chain, tip)}
+    assert set(moved) == set(SecondSetup)
+    assert moved[SecondSetup.LONGER_STYLUS].tip == pytest.approx([0.0, 0.0, -170.0])
+    places = np.array([[100.0, 0.0, 30.0]])
+    assert moved[SecondSetup.TURNED].targets(places) == pytest.approx(
+        np.array([[np.sqrt(0.5) * 100.0, np.sqrt(0.5) * 100.0, 30.0]])
+    )
+    assert moved[SecondSetup.HIGHER].targets(places) == pytest.approx(np.array([[100.0, 0.0, 80.0]]))
+    assert moved[SecondSetup.HIGHER].tip == pytest.approx(tip)
+    # Readings of the tip itself say nothing of the stylus' length.
+    assert SecondSetup.LONGER_STYLUS not in {each.setup for each in setups_of(chain, np.zeros(3))}

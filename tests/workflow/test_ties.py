@@ -7,9 +7,14 @@ from types import SimpleNamespace
 import pytest
 
 from monitor.discovery.machine.separation.separate import Separation
+from monitor.records import SecondSetup
 from monitor.workflow.explain.ties import Tie, TieBreak, ties_of
 
 POSES = Separation(({"C": 0.5},), 0.1, 12.0, (("EXC:harmonic2", "EYC:harmonic2"),))
+STYLUS = Separation(
+    (), 0.0, 0.0, (("EAY:reversal", "EYY:reversal"), ("EAY:reversal", "EZY:reversal")),
+    (SecondSetup.LONGER_STYLUS, None),
+)  # fmt: skip
 NONE = Separation((), 0.0, 0.0)
 
 
@@ -21,6 +26,13 @@ NONE = Separation((), 0.0, 0.0)
             (Tie(("EXB:harmonic3",), TieBreak.POSES), Tie(("EYC:harmonic2",), TieBreak.NOTHING)),
         ),
         ("EXC:harmonic2", NONE, ("EXB:harmonic3",), (Tie(("EXB:harmonic3",), TieBreak.PLAN),)),
+        (
+            "EAY:reversal", STYLUS, ("EYY:reversal", "EZY:reversal"),
+            (
+                Tie(("EYY:reversal",), TieBreak.SETUP, setup=SecondSetup.LONGER_STYLUS),
+                Tie(("EZY:reversal",), TieBreak.NOTHING),
+            ),
+        ),
         (
             "EXX:poly1@warmup20min", NONE, ("EXX:poly1@x_axis_degC", "EXX:poly1"),
             (

@@ -14,13 +14,14 @@ import numpy as np
 
 from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
+from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
 from monitor.discovery.machine.joints.curve_findings import with_curves
 from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
-from monitor.discovery.machine.scene import ChainScene, ChainVariant
+from monitor.discovery.machine.scene import ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
@@ -33,6 +34,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
@@ -56,7 +58,8 @@ class Explanation:
     looks wrong, ``mistakes`` says how, and nothing else is reported.
     ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
     leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
-    less. ``together`` is the verdict of the tests of all residuals together, under the model as given.
+    less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
+    under the model as given.
     """
 
     comparison: ChainComparison
@@ -72,6 +75,7 @@ class Explanation:
     limits: tuple[Limit, ...] = ()
     taken_for_machine: tuple[TakenUp, ...] = ()
     scatter: tuple[Scatter, ...] = ()
+    apart: tuple[RunApart, ...] = ()
     together: Verdict | None = None
 
 
@@ -146,6 +150,7 @@ def explain(
         limits=latest.limits,
         taken_for_machine=taken_for_machine(latest.scene),
         scatter=tuple(suspects.scatter.values()),
+        apart=_apart(latest, variants, varies=bool(suspects.varying)),
     )
 
 
@@ -189,6 +194,15 @@ def _search_with_curves(first: Fit, search: ChainSearch) -> tuple[tuple[ChainVar
         clean = fit(problem, suspects.left_out(problem), first)
         curves = joint_curves(clean, variants, rate) or curves
     return curves, latest
+
+
+def _apart(latest: ChainRound, variants: Sequence[ChainVariant], *, varies: bool) -> tuple[RunApart, ...]:
+    """The runs that leave more than the others under what was found; none where an effect varies from run to run, or
+    readings share their poses."""
+    if varies or poses_of_rows(latest.under) is not None:
+        return ()
+    drifts = [variant for variant in variants if variant.family.endswith("@run_time")]
+    return runs_apart(scene_of(latest.under, drifts))
 
 
 def _steps(campaign: Campaign, latest: ChainRound, rng: np.random.Generator) -> list[Step]:

@@ -173,6 +173,19 @@ class ScatteringTarget:
 
 
 @dataclass(frozen=True)
+class UnlikeRun:
+    """A run that leaves ``times`` what the others leave, ``deviation_um`` in a reading, with the correlation of
+    ``neighbours``: near zero where it scatters, near one where it wanders. ``as_if`` drifted in it."""
+
+    run: int
+    times: float
+    deviation_um: float
+    neighbours: float
+    p_value: float
+    as_if: str | None = None
+
+
+@dataclass(frozen=True)
 class MovedTarget:
     """A target that stands elsewhere from a probing of a run on; ``of_all`` where the whole piece moved, by this much
     in its middle."""
@@ -281,6 +294,7 @@ class MachineExplanation:
     remaining: Remaining | None = None
     taken_for_machine: tuple[InstrumentAlias, ...] = ()
     scattering: tuple[ScatteringTarget, ...] = ()
+    unlike_runs: tuple[UnlikeRun, ...] = ()
     added_together: tuple[str, ...] = ()
 
 

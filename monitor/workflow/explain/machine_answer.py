@@ -41,6 +41,7 @@ from monitor.workflow.explain.explain_answer import (
     MovedTarget,
     Remaining,
     ScatteringTarget,
+    UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
 from monitor.workflow.explain.shared_answer import (
@@ -267,6 +268,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
         for each in explanation.scatter
     )
+    unlike_runs = _unlike_runs(explanation)
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
     if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -295,6 +297,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                     Scattering(problem.target_word, each.target, each.times, each.deviation_um)
                     for each in scattering
                 ),
+                unlike_runs=unlike_runs,
                 limits=explanation.limits,
                 most_bad_points=MOST_BAD_POINTS,
                 unfitted=explanation.unfitted,
@@ -310,7 +313,23 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
         scattering=scattering,
+        unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
+    )
+
+
+def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:
+    """The runs that leave more than the others."""
+    return tuple(
+        UnlikeRun(
+            each.run,
+            each.times,
+            MICROMETRE.to_display(each.deviation),
+            each.neighbours,
+            each.p_value,
+            each.as_if,
+        )
+        for each in explanation.apart
     )
 
 

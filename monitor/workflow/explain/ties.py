@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from monitor.documents import OMITTED
 from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS
+from monitor.records import SecondSetup
 from monitor.workflow.plan.test_answer import TestAnswer
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class TieBreak(Enum):
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
     INSTRUMENT = "instrument"
+    #: No pose of the present set-up does; another stylus does, or targets that stand elsewhere (``setup``).
+    SETUP = "setup"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
 
@@ -42,7 +45,7 @@ class TieBreak(Enum):
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
     ``axes`` those to index or to move, ``measurement`` the test of an instrument. What stays the same through a run
-    shows nothing where ``drivers`` have to vary ``within_runs``."""
+    shows nothing where ``drivers`` have to vary ``within_runs``; ``setup`` is the second set-up to measure in."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak
@@ -50,23 +53,33 @@ class Tie:
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
     within_runs: bool = field(default=False, metadata=OMITTED)
     measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
+    setup: SecondSetup | None = field(default=None, metadata=OMITTED)
 
 
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) -> tuple[Tie, ...]:
     """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_touched`` says that touches
     are planned, and are not poses that something outside sees."""
-    actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...]], list[str]] = {}
+    actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None], list[str]] = {}
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
+        setup = _setup(effect, rival) if kind is TieBreak.NOTHING else None
+        if setup is not None:
+            kind = TieBreak.SETUP
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
         if kind is TieBreak.PLAN and not is_touched:
             kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
-        actions.setdefault((kind, drivers, axes), []).append(rival)
+        actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(
-        Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs)
-        for (kind, drivers, axes), names in actions.items()
+        Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, setup=setup)
+        for (kind, drivers, axes, setup), names in actions.items()
     )
+
+
+def _setup(effect: ChainMissing, rival: str) -> SecondSetup | None:
+    """The second set-up that tells a rival which no pose does."""
+    pairs = zip(effect.separation.together, effect.separation.setups, strict=False)
+    return next((setup for pair, setup in pairs if {effect.effect, rival} == set(pair)), None)
 
 
 def is_of_instrument(text: str) -> bool:
@@ -75,14 +88,14 @@ def is_of_instrument(text: str) -> bool:
 
 
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:
+    if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
+        return TieBreak.NOTHING, (), ()
     driver, other = _driver(effect.effect), _driver(rival)
     if driver not in OF_POSES or other not in OF_POSES:
         if driver != other:
             columns = (_recorded(name) for name in (driver, other) if name not in OF_POSES)
             return TieBreak.DRIVERS, tuple(dict.fromkeys(columns)), ()
         return TieBreak.INDEXATIONS, (driver,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
-    if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
-        return TieBreak.NOTHING, (), ()
     return (TieBreak.POSES if effect.separation.poses else TieBreak.PLAN), (), ()
 
 

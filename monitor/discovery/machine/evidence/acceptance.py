@@ -40,6 +40,8 @@ from monitor.discovery.search.sign_flips import FEWEST, p_value_by_flips
 BLOCK = 15
 # More than this part of what is seen of an effect is what was stated beforehand.
 OF_STATEMENTS = 0.5
+# A run that shows more than this part of an effect shows it alone: the others would determine it ten times worse.
+OF_ONE_RUN = 0.99
 # So many effects within the shape of another are named at most.
 MOST_NAMED = 5
 
@@ -124,7 +126,22 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
     def predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect lowers the errors on what was left out; true where what was stated beforehand (the length
         of a bar, a beam) is what it takes the contradiction from: no reading is predicted better by that."""
-        return self._is_of_statements(candidate) or super().predicts(others, candidate)
+        if self._is_of_statements(candidate):
+            return True
+        if self._is_of_one_run(others, candidate):
+            before, after = (
+                self.scene.held_out_error_by_poses(self.scene.columns(some))
+                for some in (others, [*others, candidate])
+            )
+            return before is None or after is None or after < before
+        return super().predicts(others, candidate)
+
+    def _is_of_one_run(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether nearly all that the data see of an effect beside others is in one of several runs (a warm-up in the
+        first of a day): the other runs do not determine it, and what they say of it predicts nothing."""
+        columns = orthonormal(without(self.scene.remainders.beside(others).basis, candidate.columns))
+        weights = np.bincount(self.scene.run, weights=np.sum(columns**2, axis=1))
+        return len(weights) > 1 and float(weights.max()) > OF_ONE_RUN * float(weights.sum())
 
     def _is_of_statements(self, candidate: ChainCandidate) -> bool:
         """Whether most of what the data see of an effect are calibrated quantities, not readings."""

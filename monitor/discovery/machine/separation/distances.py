@@ -102,13 +102,13 @@ def _unseen(nuisance: Array, columns: Array) -> Array:
 
 def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
     """Select the poses, one after the other, that separate the closest pair most over a number of runs."""
-    close = [pair for pair in pairs if _distance(pair.present, runs) <= DECIDES]
+    close = [pair for pair in pairs if distance_of(pair.present, runs) <= DECIDES]
     separable = [pair for pair in close if _is_separable(pair, runs)]
     alike = tuple(pair.effects for pair in close if not _is_separable(pair, runs))
     if not separable:
         return Selection((), 0.0, 0.0, alike)
     grams = [pair.present for pair in separable]
-    before = after = min(_distance(gram, runs) for gram in grams)
+    before = after = min(distance_of(gram, runs) for gram in grams)
     selected: list[int] = []
     for _ in range(MOST_POSES):
         each = [_distances(gram + pair.additions, runs) for gram, pair in zip(grams, separable, strict=True)]
@@ -126,11 +126,12 @@ def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
 
 def _is_separable(pair: Pair, runs: int) -> bool:
     """Whether all poses together separate a pair."""
-    best = _distance(pair.present + pair.additions.sum(axis=0), runs)
-    return best >= DECIDES and best >= WORTHWHILE * _distance(pair.present, runs)
+    best = distance_of(pair.present + pair.additions.sum(axis=0), runs)
+    return best >= DECIDES and best >= WORTHWHILE * distance_of(pair.present, runs)
 
 
-def _distance(gram: Array, runs: int) -> float:
+def distance_of(gram: Array, runs: int) -> float:
+    """Standard deviations between a pair over all runs, for its Gram matrix (q, q)."""
     return float(_distances(gram[None], runs)[0])
 
 

@@ -7,7 +7,7 @@ machine reaches are offered, and only where they decide.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,14 +16,15 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
-from monitor.discovery.machine.separation.distances import PlanRows, pairs_of, select_poses
+from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
+from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
-from monitor.effects.drivers import Always
+from monitor.effects.drivers import Always, EachRun
 from monitor.effects.drivers.gravity import Gravity
 from monitor.exceptions import DataError
 from monitor.machine import Chain, Joint, evaluate, touching_positions
 from monitor.methods.chain.touch import TouchProblem
-from monitor.records import Array
+from monitor.records import Array, SecondSetup
 
 # The grid of rotary positions; finer ones change the choice, not what it achieves.
 STEP_RAD = np.pi / 6.0
@@ -31,6 +32,8 @@ STEP_RAD = np.pi / 6.0
 QUARTERS, EIGHTHS = 4, 8
 # Effects of a group that are separated from each other, the most convincing ones.
 MOST_EFFECTS = 6
+# A second set-up of which the machine reaches less than this part of the poses is no plan.
+SMALLEST_PART = 0.5
 # Linear axes without a stroke in the machine file may go this much further than they went.
 STRETCH = 1.25
 
@@ -39,12 +42,13 @@ STRETCH = 1.25
 class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
-    separates; they do not count."""
+    separates; they do not count. ``setups`` are second set-ups that separate such pairs, None where none does."""
 
     poses: tuple[dict[str, float], ...]
     before: float
     after: float
     together: tuple[tuple[str, str], ...] = ()
+    setups: tuple[SecondSetup | None, ...] = ()
 
 
 NO_POSES = Separation((), 0.0, 0.0)
@@ -98,7 +102,7 @@ class _Touches:
             expected=None,
             run=self.pose,
             sequence=np.arange(count),
-            time=np.zeros(count),
+            time=np.full(count, float(np.mean(present.time))),
             day_time=np.full(count, float(np.mean(present.day_time))),
             run_time=np.full(count, 0.5),
             target=self.target,
@@ -118,13 +122,13 @@ def separating_poses(
 
     ``strokes`` gives the range of axes in mm or rad where the machine file has one. No poses are offered where
     effects differ by their driver (other times and temperatures separate those), where no pose decides, or where
-    the method is not one of touching balls.
+    the method is not one of touching balls. Of effects with the same driver the poses count at its mean value.
     """
     problem, context = fit.problem, fit.problem.context
-    plain = [rival for rival in rivals if _is_plain(rival)]
-    if not isinstance(problem, TouchProblem) or not plain or not _is_plain(effect):
+    alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
+    if not isinstance(problem, TouchProblem) or not alike:
         return NO_POSES
-    group = [member for member in (effect, *plain) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
+    group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
     turned = any(member.joint.kind == "spindle" for member in group)
     grid = _grid(context.chain, context.positions, strokes or {}, EIGHTHS if turned else QUARTERS)
     tip = problem.own_of(fit.solution.local)[0, -3:]
@@ -137,31 +141,88 @@ def separating_poses(
     pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
     selection = select_poses(pairs, len(problem.runs))
     together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
+    setups = _second_setups(fit, group, present, coefficients, selection.alike, strokes or {})
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
     numbers = np.unique(new.run)
     poses = tuple(
         {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
     )
-    return Separation(poses, selection.before, selection.after, together)
+    return Separation(poses, selection.before, selection.after, together, setups)
 
 
-def _is_plain(effect: MachineEffect) -> bool:
-    """Whether an effect is one of the chain that depends on where the axes stand alone, and on no other driver."""
-    return isinstance(effect, ChainEffect) and isinstance(effect.driver, (Always, Gravity))
+def _second_setups(
+    fit: Fit,
+    group: Sequence[ChainEffect],
+    present: PlanRows,
+    coefficients: Array,
+    alike: Sequence[tuple[int, int]],
+    strokes: Mapping[str, tuple[float, float]],
+) -> tuple[SecondSetup | None, ...]:
+    """For each pair that no pose separates the easiest second set-up that does, at the poses of the present plan."""
+    told_apart: dict[tuple[int, int], SecondSetup] = {}
+    if not alike:
+        return ()
+    tip = fit.problem.own_of(fit.solution.local)[0, -3:]
+    for moved in setups_of(fit.problem.context.chain, tip):
+        pairs = _pairs_in(moved, fit, group, present, coefficients, strokes)
+        for pair in pairs:
+            is_open = pair.effects in alike and pair.effects not in told_apart
+            if is_open and decides(pair, present.nuisance.shape[-1], len(fit.problem.runs)):
+                told_apart[pair.effects] = moved.setup
+        if len(told_apart) == len(alike):
+            break
+    return tuple(told_apart.get(pair) for pair in alike)
+
+
+def _pairs_in(
+    moved: Moved,
+    fit: Fit,
+    group: Sequence[ChainEffect],
+    present: PlanRows,
+    coefficients: Array,
+    strokes: Mapping[str, tuple[float, float]],
+) -> list[Pair]:
+    """The pairs of a group with what a run in a second set-up adds; none where the machine reaches too little of it."""
+    problem, context = fit.problem, fit.problem.context
+    assert isinstance(problem, TouchProblem)
+    turning = np.array([joint.turns for joint in context.chain.joints])
+    visited = np.unique(np.where(turning, np.round(context.positions, 6), 0.0), axis=0)
+    touches = _reachable_touches(problem, visited, moved.tip, strokes, moved.targets)
+    if touches is None or len(touches.positions) < SMALLEST_PART * len(visited) * len(set(touches.target)):
+        return []
+    new = touches.context(context)
+    new = replace(new, run=np.full(len(new), problem.runs[0]))
+    rows = _rows_of_new(fit, new, moved.tip, group)
+    return pairs_of(present, rows, np.zeros(len(new), dtype=np.int64), coefficients)
+
+
+def _have_same_driver(effect: MachineEffect, rival: MachineEffect) -> bool:
+    """Whether poses may tell two effects apart: both are of the chain, and they depend on where the axes stand alone or
+    on the same driver."""
+    if not isinstance(effect, ChainEffect) or not isinstance(rival, ChainEffect):
+        return False
+    if isinstance(effect.driver, EachRun):
+        return False
+    plain = [isinstance(each.driver, (Always, Gravity)) for each in (effect, rival)]
+    return all(plain) or (not any(plain) and effect.driver_text == rival.driver_text)
 
 
 def _reachable_touches(
-    problem: TouchProblem, grid: Array, tip: Array, strokes: Mapping[str, tuple[float, float]]
+    problem: TouchProblem,
+    grid: Array,
+    tip: Array,
+    strokes: Mapping[str, tuple[float, float]],
+    standing: Callable[[Array], Array] = np.asarray,
 ) -> _Touches | None:
-    """Touches of all balls at those poses of a grid where the machine reaches every ball; None where they cannot be
-    computed."""
+    """Touches of all balls, where they are ``standing``, at those poses of a grid where the machine reaches every ball;
+    None where they cannot be computed."""
     context, chain = problem.context, problem.context.chain
     first = context.run == problem.runs[0]
     balls = [target for target in problem.targets if int(np.sum(context.target[first] == target)) >= 3]
     pose = np.repeat(np.arange(len(grid)), len(balls))
     centres = {str(t): context.nominal[np.flatnonzero(context.target == t)[0]] for t in balls}
     targets = list(balls) * len(grid)
-    nominal = np.array([centres[target] for target in targets])
+    nominal = standing(np.array([centres[target] for target in targets]))
     errors = np.zeros((len(nominal), len(chain.joints), 2, 6))
     try:
         positions = touching_positions(chain, np.repeat(grid, len(balls), axis=0), errors, nominal, tip)
