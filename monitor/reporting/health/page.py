@@ -248,9 +248,9 @@ def _page(health: MachineHealth) -> PrintedMachine:
 def _says_more(health: MachineHealth) -> bool:
     """Return whether there is anything to say of a machine beside that it was not measured this week."""
     quality = health.quality
-    found = (health.parameters, health.changes, health.conditions, quality.suspect, quality.refused)
-    told = (quality.refused_imports, quality.remarks, quality.runs, health.model, health.map)
-    return health.state is not State.NOT_MEASURED or any(found) or any(told)
+    results = (health.parameters, health.changes, health.conditions, health.model, health.map)
+    remarks = (quality.runs, quality.suspect, quality.refused, quality.refused_imports, quality.remarks)
+    return health.state is not State.NOT_MEASURED or any(results) or any(remarks)
 
 
 def _reversal(health: MachineHealth) -> str:

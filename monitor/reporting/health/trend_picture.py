@@ -140,10 +140,10 @@ def _title(machine: str, parameter: ParameterHealth) -> str:
     name = f"{parameter.in_words} ({parameter.name}) / {parameter.unit}"
     if text_width(f"{machine[:_NAME_OF_MACHINE]}…: {name}", bold=True) > WIDTH_MM * SCALE:
         name = f"{parameter.name} / {parameter.unit}"
-    title, kept = f"{machine}: {name}", len(machine)
-    while text_width(title, bold=True) > WIDTH_MM * SCALE and kept > 1:
-        kept -= 1
-        title = f"{machine[:kept]}…: {name}"
+    title, signs = f"{machine}: {name}", len(machine)
+    while text_width(title, bold=True) > WIDTH_MM * SCALE and signs > 1:
+        signs -= 1
+        title = f"{machine[:signs]}…: {name}"
     return title
 
 
