@@ -389,7 +389,7 @@ def _beyond_the_slices(error_map: VolumetricMap | None) -> str:
     """What to say where the slices show less than the worst error, so that nobody takes their scale for it."""
     if error_map is None or not error_map.slices:
         return ""
-    shown = max(length for one in error_map.slices for row in one.lengths_um for length in row)
+    shown = max(length for part in error_map.slices for row in part.lengths_um for length in row)
     longest, worst = micrometres(shown), micrometres(error_map.worst_um)
     if longest == worst:
         return ""
