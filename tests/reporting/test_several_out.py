@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import date, datetime
 from pathlib import Path
@@ -14,6 +15,7 @@ from monitor.reporting.health.records import DataQuality, PoseError, VolumetricM
 from monitor.reporting.health.render import health_html
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.svg.map_slices import Slice
+from monitor.reporting.svg.plot import text_width
 
 page = load("first_page_records", Path(__file__).with_name("test_first_page.py"))
 
@@ -125,3 +127,14 @@ def test_without_a_tolerance_the_table_has_no_columns_of_dashes() -> None:
     (judged,) = machine_pages([page.GOOD])
     (free,) = machine_pages([bare])
     assert (len(judged.widths), len(free.widths)) == (6, 4)
+
+
+def test_a_title_of_the_longest_names_stays_in_the_picture() -> None:
+    """The words of an effect and its symbol were cut off at the edge, and the machine's name was a letter."""
+    effect = "EXC1:harmonic2@lagged_spindle_front_degC"
+    long = replace(page.parameter(effect), in_words=f"displacement in X of spindle C1 ({effect[5:]})")
+    machine = "Bearbeitungszentrum_ohne_Trennstellen_im_Namen_0815_in_Halle_17"
+    (title,) = re.findall(r"<text[^>]*>(Bearb[^<]*)</text>", trend_picture(machine, long))
+    assert title.startswith("Bearbeitung")
+    assert title.endswith(f"…: {effect} / µrad")
+    assert text_width(title, bold=True) < 1040.0  # 104 mm

@@ -248,9 +248,9 @@ def _page(health: MachineHealth) -> PrintedMachine:
 def _says_more(health: MachineHealth) -> bool:
     """Return whether there is anything to say of a machine beside that it was not measured this week."""
     quality = health.quality
-    found = (health.parameters, health.changes, health.conditions, quality.suspect, quality.refused)
-    told = (quality.refused_imports, quality.remarks, quality.runs, health.model, health.map)
-    return health.state is not State.NOT_MEASURED or any(found) or any(told)
+    results = (health.parameters, health.changes, health.conditions, health.model, health.map)
+    remarks = (quality.runs, quality.suspect, quality.refused, quality.refused_imports, quality.remarks)
+    return health.state is not State.NOT_MEASURED or any(results) or any(remarks)
 
 
 def _reversal(health: MachineHealth) -> str:
@@ -389,7 +389,7 @@ def _beyond_the_slices(error_map: VolumetricMap | None) -> str:
     """What to say where the slices show less than the worst error, so that nobody takes their scale for it."""
     if error_map is None or not error_map.slices:
         return ""
-    shown = max(length for one in error_map.slices for row in one.lengths_um for length in row)
+    shown = max(length for part in error_map.slices for row in part.lengths_um for length in row)
     longest, worst = micrometres(shown), micrometres(error_map.worst_um)
     if longest == worst:
         return ""

@@ -10,13 +10,15 @@ import numpy as np
 from monitor.reporting.health.concern import DRIFT_P
 from monitor.reporting.health.records import Drift, ParameterHealth
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE
-from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, text_width, tick_room, tick_words
+from monitor.reporting.svg.plot import LETTER, SCALE, Drawing, Panel, text_width, tick_room, tick_words
 from monitor.reporting.svg.sparkline import value_range
 from monitor.units import DAYS_PER_YEAR
 
 WIDTH_MM, HEIGHT_MM = 104.0, 45.0
 #: Margins around the panel in tenths of a millimetre: numbers, words above, tolerances at the right, dates.
 _LEFT, _TOP, _RIGHT, _BOTTOM = 92.0, 74.0, 78.0, 52.0
+#: Signs of a machine's name for which a title has room: a parameter whose words leave it less has its symbol alone.
+_NAME_OF_MACHINE = 12
 #: A forecast is drawn at most so many times the history's length ahead.
 _AHEAD = 1.0
 #: A stated U is drawn by itself where it is so many times the bar of its run.
@@ -120,10 +122,7 @@ def _ends(on: Drawing, panel: Panel, at: float, estimate: float, expanded: float
 
 def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
     """Write machine, parameter and unit above the panel, and below them what the line says."""
-    room = int(WIDTH_MM * SCALE / (WIDE * LETTER))
-    name = f"{parameter.in_words} ({parameter.name}) / {parameter.unit}"
-    title = f"{_shortened(machine, room - len(name) - 2)}: {name}"
-    on.text(0.0, 0.9 * LETTER, title, bold=True)
+    on.text(0.0, 0.9 * LETTER, _title(machine, parameter), bold=True)
     half = parameter.history.u[-1] * parameter.expanded / parameter.u
     legend = "bars: U; blue: this week"
     if _stated_apart(parameter, half):
@@ -135,8 +134,17 @@ def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
     on.text(0.0, 2.2 * LETTER, legend, colour=MID)
 
 
-def _shortened(text: str, most: int) -> str:
-    return text if len(text) <= most else text[: max(most - 1, 1)] + "…"
+def _title(machine: str, parameter: ParameterHealth) -> str:
+    """Return machine, parameter and unit; the machine's name is cut where there is no room, before that the words of a
+    parameter that leave it little."""
+    name = f"{parameter.in_words} ({parameter.name}) / {parameter.unit}"
+    if text_width(f"{machine[:_NAME_OF_MACHINE]}…: {name}", bold=True) > WIDTH_MM * SCALE:
+        name = f"{parameter.name} / {parameter.unit}"
+    title, signs = f"{machine}: {name}", len(machine)
+    while text_width(title, bold=True) > WIDTH_MM * SCALE and signs > 1:
+        signs -= 1
+        title = f"{machine[:signs]}…: {name}"
+    return title
 
 
 def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
