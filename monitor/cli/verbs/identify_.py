@@ -1,4 +1,4 @@
-"""Identify the geometric errors of every run and store them. Without a campaign, of all campaigns."""
+"""Identify and store the geometric errors of every run, with u of independent readings. Without a campaign, of all."""
 
 from __future__ import annotations
 

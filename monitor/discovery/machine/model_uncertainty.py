@@ -42,11 +42,14 @@ class ModelUncertainty:
     effects: tuple[tuple[str, float], ...]
 
 
-def model_uncertainty(fit: Fit, run: int, variants: Sequence[ChainVariant]) -> ModelUncertainty | None:
+def model_uncertainty(
+    fit: Fit, run: int, variants: Sequence[ChainVariant], covered: float = 0.0
+) -> ModelUncertainty | None:
     """Evaluate what lack of fit adds to the covariance of the unknowns of a run, counted from 0; None where there is
     none.
 
-    ``variants`` are the effects that may have caused it.
+    ``variants`` are the effects that may have caused it. ``covered`` is the variance of a reading, over the stated one,
+    that the covariance of the readings has already: what no effect explains counts from there.
     """
     lack = _lack(fit)
     if lack is None:
@@ -60,14 +63,14 @@ def model_uncertainty(fit: Fit, run: int, variants: Sequence[ChainVariant]) -> M
     ]
     local = unknowns.covariance(fit.solution.local_covariance[run])
     if not pulls:
-        added = (lack.squares / lack.degrees_of_freedom - lack.pure) / lack.runs
+        added = max(0.0, lack.squares / lack.degrees_of_freedom - max(lack.pure, covered)) / lack.runs
         return ModelUncertainty(added * local, lack.degrees_of_freedom, ())
     explained = [min(pull.explained, 0.999 * lack.squares) for pull in pulls]
     sizes = np.array([pull.size for pull in pulls])
     weights = _probabilities(np.array(explained), sizes, lack)
     # What remains, as noise of one run: its expectation without lack of fit is one pure error a degree of freedom.
     unexplained = (lack.squares - float(weights @ explained)) / lack.degrees_of_freedom
-    remainder = max(0.0, unexplained - lack.pure) / lack.runs
+    remainder = max(0.0, unexplained - max(lack.pure, covered)) / lack.runs
     shifts = np.array([pull.shift for pull in pulls])
     spread = np.einsum("e,ei,ej->ij", weights, shifts, shifts)
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > LEAST_PROBABLE]

@@ -227,7 +227,7 @@ def _propagated(
     )
     causes: tuple[tuple[str, float], ...] = ()
     if request.model_uncertainty:
-        line, causes = _lack_of_fit(campaign, fit, index, names, effects)
+        line, causes = _lack_of_fit(campaign, fit, index, names, effects, _covered(readings, run, source))
         further = () if line is None else (line,)
         propagated = replace(propagated, contributions=(*propagated.contributions, *further))
     if request.linear_axes is not None:
@@ -248,7 +248,12 @@ def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnow
 
 
 def _lack_of_fit(
-    campaign: Campaign, fit: Fit, index: int, names: tuple[str, ...], shared: EffectOutputs | None
+    campaign: Campaign,
+    fit: Fit,
+    index: int,
+    names: tuple[str, ...],
+    shared: EffectOutputs | None,
+    covered: float,
 ) -> tuple[OutputContribution | None, tuple[tuple[str, float], ...]]:
     """What lack of fit leaves over repeatability, as a covariance of the outputs, and its most probable causes."""
     problem = fit.problem
@@ -258,7 +263,7 @@ def _lack_of_fit(
     effects = catalogue(problem.context.chain, in_model, ("run_time",), pitches)
     shown = filter(problem.can_show, effects)
     unexplained = model_uncertainty(
-        fit, index, [variant for effect in shown for variant in variants_of(effect)]
+        fit, index, [variant for effect in shown for variant in variants_of(effect)], covered
     )
     if unexplained is None:
         return None, ()
@@ -270,6 +275,14 @@ def _lack_of_fit(
         covariance = covariance * np.outer(scale, scale)
     covariance = covariance[np.ix_(outputs, outputs)]
     return OutputContribution(LACK_OF_FIT, covariance, dof=unexplained.dof), unexplained.effects
+
+
+def _covered(readings: Inputs, run: MeasuredRun, source: CovarianceSource) -> float:
+    """The mean variance of a reading over the stated one, where all that residuals show is taken for noise that follows
+    itself; else 0."""
+    if source.neighbours is None:
+        return 0.0
+    return float(np.mean(np.diag(readings.covariance) / run.stated**2))
 
 
 def _refuse_too_many(readings: int, method: str) -> None:
