@@ -59,8 +59,8 @@ class _Information:
 
     def u(self) -> dict[str, float]:
         """Standard uncertainties in internal units; NaN where the rows do not determine a coefficient."""
-        known = np.diag([1.0 / self.share.get(name, np.inf) for name in self.names])
-        rows = np.vstack([self.triangle, known])
+        prior = np.diag([1.0 / self.share.get(name, np.inf) for name in self.names])
+        rows = np.vstack([self.triangle, prior])
         scale = np.linalg.norm(rows, axis=0)
         scale[scale == 0.0] = 1.0
         _, strength, vectors = np.linalg.svd(np.linalg.qr(rows / scale, mode="r"), full_matrices=True)
@@ -208,8 +208,8 @@ def _information(problem: InstrumentProblem) -> _Information:
     local = at.local[0].copy()
     # What is known of these counts once, whatever tests there are.
     beforehand = len(local) - len(problem.extra_names)
-    known = np.array([problem.own_names.index(name) in share for name in problem.extra_names], dtype=bool)
-    local[beforehand:][known] = 0.0
+    of_shared = np.array([problem.own_names.index(name) in share for name in problem.extra_names], dtype=bool)
+    local[beforehand:][of_shared] = 0.0
     wanted = np.hstack([local[:, :count], at.common[0], local[:, count:][:, is_shared]])
     by_own = local[:, count:][:, ~is_shared]
     scale = np.linalg.norm(by_own, axis=0)
