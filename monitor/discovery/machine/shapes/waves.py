@@ -32,21 +32,27 @@ def waves_instead(
     effect = free.effect
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free) or not effect.joint.turns:
         return []
-    symbol, context = error_of(free), scene.fit.problem.context
-    waves = {order: _wave(scene, f"{symbol}:harmonic{order}") for order in range(1, HARMONICS + 1)}
-    able = [
-        order
-        for order, wave in waves.items()
-        if wave.family not in taken and wave.visible and part_of_period(wave.effect, context) is None
-    ]
+    waves = _able_waves(scene, error_of(free), taken)
     # Selected part by part a wave may have become a mixture of others: each alone is asked, too.
-    instead = [[waves[order]] for order in able]
-    orders = sorted({(part + 1) // 2 for part in effect.shape.parts if part <= 2 * HARMONICS})
-    if orders and set(orders) <= set(able):
-        rest = [part - 1 for part in effect.shape.parts if part > 2 * HARMONICS]
+    instead = [[wave] for wave in waves.values()]
+    parts = effect.shape.parts
+    orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
+    if orders and set(orders) <= set(waves):
+        rest = [part - 1 for part in parts if part > 2 * HARMONICS]
         instead.append([*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])])
     best = max(instead, key=score, default=[])
     return best if best and score(best) >= score([free]) else []
+
+
+def _able_waves(scene: ChainScene, symbol: str, taken: set[str]) -> dict[int, ChainCandidate]:
+    """The waves of an error by their order that the data see, that repeat over the travel, and that are not taken."""
+    context = scene.fit.problem.context
+    waves = {order: _wave(scene, f"{symbol}:harmonic{order}") for order in range(1, HARMONICS + 1)}
+    return {
+        order: wave
+        for order, wave in waves.items()
+        if wave.family not in taken and wave.visible and part_of_period(wave.effect, context) is None
+    }
 
 
 def _wave(scene: ChainScene, text: str) -> ChainCandidate:
@@ -67,14 +73,14 @@ def worth_keeping(
     Parts are selected one after the other: the first may be a mixture of two that were selected later, and says
     nothing beside them.
     """
-    kept = list(parts)
-    while len(kept) > 1:
-        left = [_left(columns[:, [part for part in kept if part != out]], residual) for out in kept]
-        least = int(np.argmin(left))
-        if freedom * np.log(left[least] / max(_left(columns[:, kept], residual), 1e-300)) >= price:
+    worthy = list(parts)
+    while len(worthy) > 1:
+        remaining = [_left(columns[:, [part for part in worthy if part != out]], residual) for out in worthy]
+        least = int(np.argmin(remaining))
+        if freedom * np.log(remaining[least] / max(_left(columns[:, worthy], residual), 1e-300)) >= price:
             break
-        del kept[least]
-    return kept
+        del worthy[least]
+    return worthy
 
 
 def _left(columns: Array, residual: Array) -> float:
