@@ -21,7 +21,7 @@ from monitor.records import Array
 
 # Runs of a real machine differ by a third; what is less has not spoilt anything.
 LEAST_TIMES = 1.35
-FALSE_ALARM = 1e-3
+FALSE_ALARM = 1e-5
 # Of two runs one is unlike the other, and nobody knows which.
 FEWEST_RUNS = 3
 # Neighbours within so many touches may resemble each other.
