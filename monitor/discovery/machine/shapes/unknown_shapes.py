@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -20,6 +21,7 @@ from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.slight_shapes import slight_shape, slight_wave
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.waves import waves_instead, worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import weigh_beside
@@ -69,11 +71,45 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         selected = alone
         for free in filter(_is_free, alone):
             scene = _with_candidate(scene, free)
+    scene, selected = _with_waves(scene, selected)
     if len(selected) == len(result.findings) and all(
         _is_among(shape, result.candidates) for shape in selected
     ):
         return scene, result
     return scene, ScanResult(findings_of(scene, selected))
+
+
+def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with waves by their names in place of the parts of a free shape."""
+    for free in [shape for shape in selected if _is_free(shape)]:
+        others = [shape for shape in selected if shape is not free]
+        shapes = _shapes_by_error(scene).get(error_of(free), [])
+        if not shapes:
+            continue
+        split = waves_instead(
+            scene,
+            free,
+            {other.family for other in others},
+            partial(_of_parts, scene, error_of(free), shapes=shapes, others=others),
+            partial(_named_or_free, scene, others),
+        )
+        if split and all(_predicts(scene, wave, [*others, *split[:at]]) for at, wave in enumerate(split)):
+            selected = [*others, *split]
+            # The whole it came from is no rival of its parts.
+            without_free = [
+                each for each in scene.candidates if not (_is_free(each) and error_of(each) == error_of(free))
+            ]
+            more = [each for each in split if not _is_among(each, without_free)]
+            scene = replace(scene, candidates=(*without_free, *more))
+    return scene, selected
+
+
+def _named_or_free(
+    scene: ChainScene, others: Sequence[ChainCandidate], effects: Sequence[ChainCandidate]
+) -> float:
+    """The score of effects beside others, at the price of the choice of parts and of waves."""
+    price_of_choices = sum(price_of_parts(effect) or 2.0 * PRICE for effect in effects)
+    return score_beside(scene, effects, others) - price_of_choices
 
 
 def _margin(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float | None:
@@ -299,7 +335,7 @@ def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandi
         direction = (columns[:, best] / length[best])[:, None]
         residual = without(direction, residual[:, None])[:, 0]
         columns = without(direction, columns)
-    return parts
+    return worth_keeping(without(basis, whole.columns), beside.residual, parts, dof, price)
 
 
 def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:

@@ -21,6 +21,8 @@ from monitor.records import Array
 
 # A ball that moved needs this many touches before and after, else it is a bad point.
 TOUCHES_EACH_SIDE = 2
+# Following touches of one target, within which neighbours may resemble each other.
+LAGS = 8
 # Directions that a touch leaves unchecked (the run's own unknowns follow it) have eigenvalues of rounding.
 CHECKED = 1e-6
 
@@ -198,6 +200,12 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
             touches = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
             tests += max(len(touches) - 2 * TOUCHES_EACH_SIDE + 1, 0)
             move = _ball_move(fit, deviations, run, touches)
+            if move is not None:
+                # Where the others drift as well, a mean of touches knows less than their number says.
+                share = _shared_by_neighbours(deviations.vectors[rows], context.target[rows], str(target))
+                chi_square = move.chi_square / share
+                p_value = float(scipy.special.chdtrc(3, chi_square)) if share > 1.0 else move.p_value
+                move = replace(move, chi_square=chi_square, p_value=max(p_value, move.p_value))
             if move is not None and (best is None or move.chi_square > best.chi_square):
                 best = move
         if best is not None:
@@ -207,6 +215,21 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
         for move in moves
         if move.p_value * tests <= alpha
     ]
+
+
+def _shared_by_neighbours(vectors: Array, targets: npt.NDArray[np.str_], suspect: str) -> float:
+    """By how much the variance of a mean of touches exceeds that of independent ones, by the deviations (n, d) of all
+    targets of a run but the suspect: one and twice the correlations of the following touches of the same target, up to
+    the first that no longer goes along."""
+    series = [vectors[targets == target] for target in np.unique(targets) if target != suspect]
+    total = sum(float(np.sum(of_target**2)) for of_target in series)
+    share = 1.0
+    for lag in range(1, LAGS):
+        later = sum(float(np.sum(of_target[lag:] * of_target[:-lag])) for of_target in series)
+        if total <= 0.0 or later <= 0.0:
+            break
+        share += 2.0 * later / total
+    return share
 
 
 def _ball_move(fit: Fit, deviations: Deviations, run: int, touches: npt.NDArray[np.int64]) -> BallMove | None:

@@ -21,7 +21,7 @@ from monitor.records import Array
 
 # Runs of a real machine differ by a third; what is less has not spoilt anything.
 LEAST_TIMES = 1.35
-FALSE_ALARM = 1e-4
+FALSE_ALARM = 1e-5
 # Of two runs one is unlike the other, and nobody knows which.
 FEWEST_RUNS = 3
 # Neighbours within so many touches may resemble each other.
@@ -97,7 +97,9 @@ def _p_value(mine: Array, others: Array) -> float:
     """The probability by ranks that the touches of a run are so much larger by chance."""
     ranks = scipy.stats.rankdata(np.concatenate([mine, others]))
     of_run = ranks[: len(mine)]
-    share = 1.0 + 2.0 * max(_correlations(of_run - of_run.mean()).clip(0.0).sum(), 0.0)
+    correlations = _correlations(of_run - of_run.mean())
+    # Beyond the first touch that no longer goes along they are noise.
+    share = 1.0 + 2.0 * float(correlations[: int(np.argmin([*(correlations > 0.0), False]))].sum())
     excess = float(np.sum(of_run) - len(mine) * (len(ranks) + 1) / 2.0)
     spread = np.sqrt(len(mine) * len(others) * (len(ranks) + 1) / 12.0 * share)
     return float(scipy.stats.norm.sf(excess / spread))

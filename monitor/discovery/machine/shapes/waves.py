@@ -1,0 +1,89 @@
+"""Waves by their names: what of a free shape of a turning axis is a cosine and a sine of some periods a turn.
+
+Two errors of a table together (run-out and a play that builds up) go into one free shape, and so does a gear of five
+teeth: an entry that the catalogue has, or that has a name, is told by it, and what is left keeps its free shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.variants import part_of_period
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes.free import HARMONICS, Free
+from monitor.records import Array
+
+#: The free shape with some parts, from 0, beside others; and the score of effects at their price beside others.
+OfParts = Callable[[Sequence[int]], ChainCandidate]
+Score = Callable[[Sequence[ChainCandidate]], float]
+
+
+def waves_instead(
+    scene: ChainScene, free: ChainCandidate, taken: set[str], of_parts: OfParts, score: Score
+) -> list[ChainCandidate]:
+    """The waves of a free shape by their names, and what is left of it as a free shape; none where it has no waves, or
+    where they say less at their price. ``taken`` are families that are selected already."""
+    effect = free.effect
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free) or not effect.joint.turns:
+        return []
+    waves = _able_waves(scene, error_of(free), taken)
+    # Selected part by part a wave may have become a mixture of others: each alone is asked, too.
+    instead = [[wave] for wave in waves.values()]
+    parts = effect.shape.parts
+    orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
+    if orders and set(orders) <= set(waves):
+        rest = [part - 1 for part in parts if part > 2 * HARMONICS]
+        instead.append([*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])])
+    best = max(instead, key=score, default=[])
+    return best if best and score(best) >= score([free]) else []
+
+
+def _able_waves(scene: ChainScene, symbol: str, taken: set[str]) -> dict[int, ChainCandidate]:
+    """The waves of an error by their order that the data see, that repeat over the travel, and that are not taken."""
+    context = scene.fit.problem.context
+    waves = {order: _wave(scene, f"{symbol}:harmonic{order}") for order in range(1, HARMONICS + 1)}
+    return {
+        order: wave
+        for order, wave in waves.items()
+        if wave.family not in taken and wave.visible and part_of_period(wave.effect, context) is None
+    }
+
+
+def _wave(scene: ChainScene, text: str) -> ChainCandidate:
+    """The wave of that name, as the catalogue has it where it does."""
+    in_catalogue = next((candidate for candidate in scene.candidates if candidate.family == text), None)
+    if in_catalogue is not None:
+        return in_catalogue
+    return scene_of(
+        scene.fit, [Variant(text, parse_effect(text, scene.fit.problem.context.chain))]
+    ).candidates[0]
+
+
+def worth_keeping(
+    columns: Array, residual: Array, parts: Sequence[int], freedom: int, price: float
+) -> list[int]:
+    """Those of some parts of a basis (M, k) that are worth their price beside the others, in their order.
+
+    Parts are selected one after the other: the first may be a mixture of two that were selected later, and says
+    nothing beside them.
+    """
+    worthy = list(parts)
+    while len(worthy) > 1:
+        remaining = [_left(columns[:, [part for part in worthy if part != out]], residual) for out in worthy]
+        least = int(np.argmin(remaining))
+        if freedom * np.log(remaining[least] / max(_left(columns[:, worthy], residual), 1e-300)) >= price:
+            break
+        del worthy[least]
+    return worthy
+
+
+def _left(columns: Array, residual: Array) -> float:
+    """The sum of squares that columns (M, k) leave of a residual (M,)."""
+    remainder = without(orthonormal(columns), residual[:, None])[:, 0]
+    return float(remainder @ remainder)
