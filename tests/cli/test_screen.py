@@ -101,6 +101,7 @@ OTHER = frozenset(
         ),
         *("expansion_coefficient", "node_spacing", "budget", "lag_one", "slow", "independent_share"),
         *("effective_rows", "k_p_of_all", "k_q_of_all", "needed", "position"),
+        *("k_p_of_all_with_degrees_of_freedom", "k_q_of_all_with_degrees_of_freedom"),
         # the errors of linear axes that a request or a source states: asked for, not answered
         *("proportional", "positioning", "straightness", "squareness"),
     }

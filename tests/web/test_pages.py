@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from monitor.documents import from_document
 from monitor.reporting.certificate.laboratory import read_laboratory
@@ -516,9 +517,19 @@ def test_jcgm102_the_cloud_of_a_pair_has_the_regions_of_two_normal_quantities(lo
     assert 1.96 < answer["k_q"] < 2.25
     assert answer["k_p"] < answer["k_p_of_all"]
     assert answer["k_q"] < answer["k_q_of_all"]
+    # Hotelling's law of a covariance of 15 degrees of freedom is the most; part of it is known better.
+    most = np.sqrt(2.0 * 15.0 / 14.0 * scipy.stats.f.ppf(0.95, 2, 14))
+    assert 2.5 < answer["k_p_with_degrees_of_freedom"] < most + 0.02
+    assert answer["k_q"] + 0.1 < answer["k_q_with_degrees_of_freedom"] < scipy.stats.t.ppf(0.9875, 15) + 0.02
+    stated = local.ask("uncertainty", {"campaign": CAMPAIGN, "method": "guf"})[1]["guf"]
+    for factor in ("k_p", "k_q"):
+        assert (
+            answer[f"{factor}_of_all_with_degrees_of_freedom"] == stated[f"{factor}_with_degrees_of_freedom"]
+        )
     assert local.ask("monte carlo cloud", {"campaign": CAMPAIGN, "first": "EB0C", "second": "EB0C"})[0] == 400
     text = looked_at(local, f"/campaign?name={CAMPAIGN}&first=EB0C&second=EA0B&trials=1")
     assert "Monte Carlo trials, seed 1" in text
+    assert f"k_p = {answer['k_p_of_all_with_degrees_of_freedom']:.2f}" in text
 
 
 @pytest.mark.slow

@@ -83,11 +83,26 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
 
 @dataclass(frozen=True)
 class _Region:
-    """An ellipse (k_p) and a rectangle (k_q), and what they hold together."""
+    """An ellipse (k_p) and a rectangle (k_q), and what they hold together; None where so few degrees of freedom bound
+    none."""
 
     holds: str
-    k_p: float
-    k_q: float
+    k_p: float | None
+    k_q: float | None
+
+    def words(self) -> str:
+        """What is drawn, and what is not since nothing bounds it."""
+        ellipse = (
+            f"ellipse with k_p = {self.k_p:.2f}"
+            if self.k_p is not None
+            else "no ellipse, which would need more degrees of freedom than parameters"
+        )
+        rectangle = (
+            f"rectangle with k_q = {self.k_q:.2f}"
+            if self.k_q is not None
+            else "no rectangle, which would need degrees of freedom"
+        )
+        return f"{ellipse}, {rectangle}: what holds {self.holds}"
 
 
 def region_chart(answer: UncertaintyAnswer, first: str, second: str) -> Chart:
@@ -97,8 +112,8 @@ def region_chart(answer: UncertaintyAnswer, first: str, second: str) -> Chart:
     count = len(answer.parameters)
     region = _Region(
         f"all {count}",
-        result.k_p_with_degrees_of_freedom or result.k_p,
-        result.k_q_with_degrees_of_freedom or result.k_q,
+        result.k_p_with_degrees_of_freedom,
+        result.k_q_with_degrees_of_freedom,
     )
     return _regions(
         f"of run {answer.run}", (first, second), (answer.units[first], answer.units[second]),
@@ -116,8 +131,12 @@ def cloud_chart(answer: CloudAnswer) -> Chart:
         "marker": {"size": 3, "color": "@mid", "opacity": 0.5},
     }  # fmt: skip
     regions = [
-        _Region("the pair", answer.k_p, answer.k_q),
-        _Region(f"all {answer.parameters}", answer.k_p_of_all, answer.k_q_of_all),
+        _Region("the pair", answer.k_p_with_degrees_of_freedom, answer.k_q_with_degrees_of_freedom),
+        _Region(
+            f"all {answer.parameters}",
+            answer.k_p_of_all_with_degrees_of_freedom,
+            answer.k_q_of_all_with_degrees_of_freedom,
+        ),
     ]
     return _regions(
         f"of run {answer.run}", answer.names, answer.units, answer.estimate, answer.u, answer.correlation,
@@ -133,40 +152,44 @@ def _regions(
     root = np.array([[u[0], 0.0], [correlation * u[1], math.sqrt(max(1.0 - correlation**2, 0.0)) * u[1]]])
     angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE)
     # Drawn with room around: a line at the edge of the axes is cut in half.
-    reach = 1.08 * max(max(region.k_p, region.k_q) for region in regions) * spread
+    widest = max((k for region in regions for k in (region.k_p, region.k_q) if k is not None), default=2.0)
+    reach = 1.08 * widest * spread
     for trials in (np.array([cloud["x"], cloud["y"]]) for cloud in drawn):
         reach = np.maximum(reach, 1.02 * np.abs(trials - centre[:, None]).max(axis=1))
     ends = [[float(middle - far), float(middle + far)] for middle, far in zip(centre, reach, strict=True)]
     traces = list(drawn)
     for number, region in enumerate(regions):
-        outline = centre[:, None] + region.k_p * root @ np.array([np.cos(angle), np.sin(angle)])
-        low, high = centre - region.k_q * spread, centre + region.k_q * spread
-        width = 2.5 if number == 0 else 1.2
-        traces += [
-            {
-                "type": "scatter", "mode": "lines", "name": f"ellipse of {region.holds}, k_p = {region.k_p:.2f}",
-                "x": outline[0].tolist(), "y": outline[1].tolist(),
-                "line": {"color": "@blue", "width": width, "dash": "solid" if number == 0 else "dot"},
-                "hoverinfo": "name",
-            },
-            {
-                "type": "scatter", "mode": "lines", "name": f"rectangle of {region.holds}, k_q = {region.k_q:.2f}",
-                "x": [low[0], high[0], high[0], low[0], low[0]], "y": [low[1], low[1], high[1], high[1], low[1]],
-                "line": {"color": "@orange", "width": width, "dash": "dash" if number == 0 else "dot"},
-                "hoverinfo": "name",
-            },
-        ]  # fmt: skip
+        width, is_first = (2.5, True) if number == 0 else (1.2, False)
+        if region.k_p is not None:
+            outline = centre[:, None] + region.k_p * root @ np.array([np.cos(angle), np.sin(angle)])
+            traces.append(
+                {
+                    "type": "scatter", "mode": "lines", "name": f"ellipse of {region.holds}, k_p = {region.k_p:.2f}",
+                    "x": outline[0].tolist(), "y": outline[1].tolist(),
+                    "line": {"color": "@blue", "width": width, "dash": "solid" if is_first else "dot"},
+                    "hoverinfo": "name",
+                }
+            )  # fmt: skip
+        if region.k_q is not None:
+            low, high = centre - region.k_q * spread, centre + region.k_q * spread
+            traces.append(
+                {
+                    "type": "scatter", "mode": "lines", "name": f"rectangle of {region.holds}, k_q = {region.k_q:.2f}",
+                    "x": [low[0], high[0], high[0], low[0], low[0]],
+                    "y": [low[1], low[1], high[1], high[1], low[1]],
+                    "line": {"color": "@orange", "width": width, "dash": "dash" if is_first else "dot"},
+                    "hoverinfo": "name",
+                }
+            )  # fmt: skip
     traces.append(
         {
             "type": "scatter", "mode": "markers", "name": "estimate", "x": [estimate[0]], "y": [estimate[1]],
             "marker": {"symbol": "cross", "size": 11, "color": "@ink"},
         }
     )  # fmt: skip
-    first = regions[0]
     return Chart(
         key="region",
-        says=f"{names[0]} and {names[1]} {of}: ellipse with k_p = {first.k_p:.2f}, rectangle with k_q = "
-        f"{first.k_q:.2f}, which hold {first.holds}",
+        says=f"{names[0]} and {names[1]} {of}: {regions[0].words()}",
         traces=traces,
         layout={
             "xaxis": axis(f"{names[0]} / {units[0]}", range=ends[0]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -90,8 +91,8 @@ def _stated(series: Series, stated: UncertaintyAnswer) -> tuple[float, float, fl
     name = series.name
     if name in stated.units:
         return stated.guf.estimate[name], stated.guf.u[name], stated.guf.expanded[name]
-    u = float(series.u[-1])
-    return float(series.values[-1]), u, (stated.guf.k_q_with_degrees_of_freedom or stated.guf.k_q) * u
+    u, k_q = float(series.u[-1]), stated.guf.k_q_with_degrees_of_freedom
+    return float(series.values[-1]), u, math.inf if k_q is None else k_q * u
 
 
 def moment_of(t: float, series: Series) -> datetime:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from monitor.uncertainty.coverage_regions.coverage import (
     mahalanobis_distances,
     quantile_of,
 )
+from monitor.uncertainty.coverage_regions.regions import region_factors
+from monitor.uncertainty.framework import FrameworkResult
+from monitor.uncertainty.parts import BudgetLine, one_of_each_estimate
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import COVERAGE, UncertaintyRequest
 
@@ -47,7 +50,8 @@ class CloudAnswer:
     trials (n, 2).
 
     ``k_p`` of the ellipse and ``k_q`` of the rectangle hold the pair with ``p``, as quantiles of the trials; those
-    ``_of_all`` hold all ``parameters`` of the run together.
+    ``_of_all`` hold all ``parameters`` of the run together. The trials take the covariance as known: those
+    ``with_degrees_of_freedom`` of what was estimated may be claimed, as in ``FrameworkAnswer`` (None: no such region).
     """
 
     campaign: str
@@ -66,6 +70,10 @@ class CloudAnswer:
     trial_count: int
     seed: int
     trials: Array
+    k_p_with_degrees_of_freedom: float | None = None
+    k_q_with_degrees_of_freedom: float | None = None
+    k_p_of_all_with_degrees_of_freedom: float | None = None
+    k_q_of_all_with_degrees_of_freedom: float | None = None
 
 
 def cloud(db: Database, request: CloudRequest) -> CloudAnswer:
@@ -87,6 +95,8 @@ def cloud(db: Database, request: CloudRequest) -> CloudAnswer:
     covariance = sampled.covariance[np.ix_(columns, columns)]
     first, second = (unit.to_display(1.0) for unit in units)
     u = np.sqrt(np.diag(covariance))
+    framework = result.framework
+    of_pair = region_factors(_of_pair(framework, request), request.p)
     return CloudAnswer(
         campaign=request.campaign,
         run=result.run,
@@ -104,4 +114,21 @@ def cloud(db: Database, request: CloudRequest) -> CloudAnswer:
         trial_count=sampled.trials,
         seed=sampled.seed,
         trials=np.round(trials[: request.trials] * np.array([first, second]), 6),
+        k_p_with_degrees_of_freedom=_finite(of_pair.k_p),
+        k_q_with_degrees_of_freedom=_finite(of_pair.k_q),
+        k_p_of_all_with_degrees_of_freedom=_finite(framework.k_p),
+        k_q_of_all_with_degrees_of_freedom=_finite(framework.k_q),
     )
+
+
+def _of_pair(framework: FrameworkResult, request: CloudRequest) -> list[BudgetLine]:
+    """Return the parts of the covariance of the two parameters, with the degrees of freedom of each."""
+    places = [framework.names.index(name) for name in (request.first, request.second)]
+    block = np.ix_(places, places)
+    return [
+        replace(part, covariance=part.covariance[block]) for part in one_of_each_estimate(framework.budget)
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
