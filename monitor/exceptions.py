@@ -8,13 +8,19 @@ from dataclasses import dataclass
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing; case does not count."""
+    """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing."""
+    close = closest(name, names)
+    return "" if close is None else f"did you mean '{close}'? "
+
+
+def closest(name: str, names: Iterable[str]) -> str | None:
+    """Return the one of ``names`` that is nearest to a name, None where none is close; case does not count."""
     # Loaded here, on the way to a refusal: every start of the command waits for this file.
     import difflib
 
     by_folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
-    return f"did you mean '{by_folded[close[0]]}'? " if close else ""
+    return by_folded[close[0]] if close else None
 
 
 class MonitorError(Exception):
