@@ -94,10 +94,10 @@ def _without_empty_columns(lines: list[str]) -> list[str]:
         return lines
     without = []
     for line in lines:
-        kept, *cut = line.rsplit(",", count)
+        named, *cut = line.rsplit(",", count)
         if line.strip() and (len(cut) < count or any(map(str.strip, cut))):
             return lines
-        without.append(kept)
+        without.append(named)
     return without
 
 

@@ -28,9 +28,9 @@ def recorded_columns(
     ``suffixes`` are the units allowed, ``plain`` the columns without a unit that a method allows.
     """
     columns = []
-    told = set(misspelt(table, taken).values())
+    misspellings = set(misspelt(table, taken).values())
     for column in table.columns:
-        if column in taken or (column in told and not has_unit(column, suffixes)):
+        if column in taken or (column in misspellings and not has_unit(column, suffixes)):
             continue
         if has_unit(column, suffixes) or column in plain:
             columns.append(column)
