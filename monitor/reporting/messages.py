@@ -317,6 +317,14 @@ def limits_of_type(machine_type: str) -> str:
     return f"limits are those of {whose}: the latest campaign states none"
 
 
+def limit_of_no_axis(machine_type: str, limit: str, hint: str) -> str:
+    """Return that a limit of a machine type is of an axis that no parameter is of, and what may be meant."""
+    return (
+        f"the limit {limit} of the machine type '{machine_type}' in the configuration is of no parameter of this "
+        f"machine; {hint.strip()}"
+    )
+
+
 def limits_of_others(machine_type: str, limits: Sequence[str], hint: str) -> str:
     """Return that none of the ``limits`` of a machine type is of a parameter of the machine; ``hint`` may be empty."""
     named = ", ".join(limits[:5]) + (f" and {len(limits) - 5} more" if len(limits) > 5 else "")
