@@ -47,6 +47,8 @@ ONE_FAULT = [
     ("EC0Y = 20.0", '"EAA:reversal" = 20.0', 18, "machine.tolerances.EAA:reversal", "the topology has no axis A"),
     ("EC0Y = 20.0", '"EXX:reversal" = 0', 18, "machine.tolerances.EXX:reversal", "0 must be greater than 0"),
     ("EC0Y = 20.0", "EC0A = 20.0", 18, "machine.tolerances.EC0A", "the topology has no axis A"),
+    ("EC0Y = 20.0", "ECOY = 20.0", 18, "machine.tolerances.ECOY", "the topology has no axis OY; did you mean 'EC0Y'? its axes are"),
+    ("EC0Y = 20.0", "EC0y = 20.0", 18, "machine.tolerances.EC0y", "the topology has no axis y; did you mean 'EC0Y'? its axes are"),
     # probe and artefact
     ("standard_uncertainty_um = 0.7", 'standard_uncertainty_um = "0,7"', 24, "probe.standard_uncertainty_um", "'0,7' is not a number; write standard_uncertainty_um = 0.7 (in um)"),
     ("standard_uncertainty_um = 0.7", "standard_uncertainty_um = nan", 24, "probe.standard_uncertainty_um", "nan is not a finite number"),
