@@ -105,7 +105,9 @@ class CampaignError(InputError):
 
     SHOWN_IN_FULL = 20
     #: More faults of a column whose messages differ in quoted texts and numbers alone are listed once, with how many.
+    #: So is any number of one fault in tables of a list (``artefact.balls[1].id``, ``artefact.balls[2].id``).
     ALIKE_IN_FULL = 5
+    _PLACE_IN_LIST = re.compile(r"\[[0-9]+\]")
     _OWN_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[-+]?[0-9][0-9.,]*")
 
     def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
@@ -116,10 +118,11 @@ class CampaignError(InputError):
         alike: dict[tuple[str, str | None, str | None, str], list[Fault]] = {}
         for fault in self.faults:
             kind = self._OWN_WORDS.sub("", fault.message)
-            alike.setdefault((fault.file, fault.sheet, fault.column, kind), []).append(fault)
+            column = fault.column and self._PLACE_IN_LIST.sub("", fault.column)
+            alike.setdefault((fault.file, fault.sheet, column, kind), []).append(fault)
         groups: list[list[Fault]] = []
         for group in alike.values():
-            groups += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]
+            groups += [group] if self._are_one(group) else [[fault] for fault in group]
         positions = {fault: position for position, fault in enumerate(self.faults)}
         shown = sorted(groups, key=lambda group: positions[group[0]])[: self.SHOWN_IN_FULL]
         for first, *more in shown:
@@ -129,6 +132,11 @@ class CampaignError(InputError):
         if remaining:
             lines.append(f"  ... and {remaining} more.")
         super().__init__("\n".join(lines))
+
+    def _are_one(self, alike: Sequence[Fault]) -> bool:
+        """Whether alike faults are listed once."""
+        in_a_list = len({fault.column for fault in alike}) == len(alike)
+        return len(alike) > self.ALIKE_IN_FULL or (in_a_list and len({fault.message for fault in alike}) == 1)
 
 
 class RefusedResultError(DataError):
