@@ -96,6 +96,25 @@ def test_the_version_is_said_without_numpy_and_the_database() -> None:
     assert answer.stdout.splitlines()[1] == "[]"
 
 
+def test_the_help_of_identify_loads_no_solver() -> None:
+    code = (
+        "import sys\nfrom monitor.cli import main\ntry: main(['identify', '--help'])\nexcept SystemExit: pass\n"
+        "print(sorted({'scipy.special', 'monitor.methods', 'monitor.discovery', 'monitor.store'} & set(sys.modules)))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_lists_of_models_load_no_distributions(reading_database: Path) -> None:
+    """What a contrast of instruments asks of scipy is asked when there is one."""
+    code = (
+        f"import sys\nfrom monitor.cli import main\nmain(['--db', {str(reading_database)!r}, 'model', 'list'])\n"
+        "print('scipy.special' in sys.modules)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.splitlines()[-1] == "False"
+
+
 def test_a_verb_that_ends_is_not_looked_through_for_cycles(reading_database: Path) -> None:
     # Registered before the verb's own, so called after it.
     code = (

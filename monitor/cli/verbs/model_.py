@@ -225,6 +225,9 @@ def _history(options: Namespace) -> int:
 
 def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
     """The error of every version, and of a curve its Bayesian information criterion."""
+    # Loaded here, as below: lists of models have no steps, and the answers of `compare` take longer than a list.
+    from monitor.workflow.explain.version_answer import CurveVersion
+
     unit = steps[0].unit
     curve = isinstance(steps[0], CurveVersion)
     columns = [
@@ -245,6 +248,8 @@ def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
 
 
 def _step(step: MachineVersion | CurveVersion) -> list[str]:
+    from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+
     curve = step if isinstance(step, CurveVersion) else None
     number = output.micrometres if curve is None else four_digits
     return [

@@ -38,5 +38,5 @@ def with_discovery_rates(parameters: Mapping[str, ParameterTrend]) -> dict[str, 
 
 def _rates(p_values: Iterable[float | None]) -> Iterator[float | None]:
     """The rates in the order of the p-values; None where there is none."""
-    known = [np.nan if p is None else p for p in p_values]
-    return map(number, control_false_discoveries(known).q_value.tolist())
+    or_nan = [np.nan if p is None else p for p in p_values]
+    return map(number, control_false_discoveries(or_nan).q_value.tolist())
