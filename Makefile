@@ -126,14 +126,14 @@ challenge: setup  ## campaigns with sealed truth, answered by ours and four othe
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) tests/challenge/answer.py $(DIR) $(ARGS)
 	@$(RUN) tests/challenge/score.py $(DIR)
 
-wheel: setup  ## build the wheel and run the tests against it, away from the checkout
+wheel: setup  ## build the wheel and run the whole suite against it (as long as make test); wheel-parts is the quick one
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)
 
 # What a wheel can lack: files of the package (test_wheel compares them one by one), so migrations, templates, fonts and
 # pages; what is imported and not declared; the command. Each is met here once; what the code does, make test has shown.
 WHEEL_PARTS := tests/test_wheel.py tests/cli/test_json.py tests/cli/test_certificates.py tests/cli/test_usage.py \
 	tests/store/test_migrations.py tests/reporting/test_render.py tests/reporting/test_dcc.py tests/web
-wheel-parts: setup
+wheel-parts: setup  ## build the wheel and run the tests of what a wheel can lack
 	@$(RUN) tests/setup/installed_wheel.py $(WHEEL_PARTS) $(PARALLEL) $(ARGS)
 
 supply: setup  ## wheel with its bill of materials in dist/, docs/licences.md, the hashes of all pins

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing; case does not count."""
+    """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing."""
+    close = closest(name, names)
+    return "" if close is None else f"did you mean '{close}'? "
+
+
+def closest(name: str, names: Iterable[str]) -> str | None:
+    """Return the one of ``names`` that is nearest to a name, None where none is close; case does not count."""
     # Loaded here, on the way to a refusal: every start of the command waits for this file.
     import difflib
 
     by_folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
-    return f"did you mean '{by_folded[close[0]]}'? " if close else ""
+    return by_folded[close[0]] if close else None
 
 
 class MonitorError(Exception):
@@ -103,7 +109,9 @@ class CampaignError(InputError):
 
     SHOWN_IN_FULL = 20
     #: More faults of a column whose messages differ in quoted texts and numbers alone are listed once, with how many.
+    #: So is any number of one fault in tables of a list (``artefact.balls[1].id``, ``artefact.balls[2].id``).
     ALIKE_IN_FULL = 5
+    _PLACE_IN_LIST = re.compile(r"\[[0-9]+\]")
     _OWN_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[-+]?[0-9][0-9.,]*")
 
     def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
@@ -114,10 +122,11 @@ class CampaignError(InputError):
         alike: dict[tuple[str, str | None, str | None, str], list[Fault]] = {}
         for fault in self.faults:
             kind = self._OWN_WORDS.sub("", fault.message)
-            alike.setdefault((fault.file, fault.sheet, fault.column, kind), []).append(fault)
+            column = fault.column and self._PLACE_IN_LIST.sub("", fault.column)
+            alike.setdefault((fault.file, fault.sheet, column, kind), []).append(fault)
         groups: list[list[Fault]] = []
         for group in alike.values():
-            groups += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]
+            groups += [group] if self._are_one(group) else [[fault] for fault in group]
         positions = {fault: position for position, fault in enumerate(self.faults)}
         shown = sorted(groups, key=lambda group: positions[group[0]])[: self.SHOWN_IN_FULL]
         for first, *more in shown:
@@ -127,6 +136,11 @@ class CampaignError(InputError):
         if remaining:
             lines.append(f"  ... and {remaining} more.")
         super().__init__("\n".join(lines))
+
+    def _are_one(self, alike: Sequence[Fault]) -> bool:
+        """Whether alike faults are listed once."""
+        in_a_list = len({fault.column for fault in alike}) == len(alike)
+        return len(alike) > self.ALIKE_IN_FULL or (in_a_list and len({fault.message for fault in alike}) == 1)
 
 
 class RefusedResultError(DataError):

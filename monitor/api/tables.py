@@ -140,6 +140,7 @@ def run_table(answer: RunsAnswer) -> pd.DataFrame:
 
     rows = [{**_scalars(run), **run.conditions} for run in answer.runs]
     frame = pd.DataFrame(rows).drop(columns=["ambient_degc"], errors="ignore")
+    frame.attrs["meanings"] = dict(_clocks(answer.runs[0])) if rows else {}
     return _with_units(frame.set_index("run") if rows else frame)
 
 

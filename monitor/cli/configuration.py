@@ -24,6 +24,8 @@ _TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
 _TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*|[A-Za-z0-9]+:\S+")
 _EFFECT_SIGN = ":"
+#: The letter O where a location error has a zero: ``ECOY`` would be of an axis OY.
+_LETTER_FOR_ZERO = re.compile(r"(E[XYZABC])[Oo]([A-Za-z][A-Za-z0-9]*)")
 _AXIS_IN_SMALL_LETTERS = re.compile(r"(E[XYZABC]0?)([xyzabc][0-9]*)")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.
@@ -139,6 +141,8 @@ def _wrong_term(term: str) -> str:
             "no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, as an effect such as EXX:reversal, or "
             "volumetric"
         )
+    if letter := _LETTER_FOR_ZERO.fullmatch(term.partition(_EFFECT_SIGN)[0]):
+        return f"this has the letter O where a zero stands; did you mean '{letter[1]}0{letter[2]}'?"
     if _EFFECT_SIGN in term:
         return _wrong_effect(term)
     if small := _AXIS_IN_SMALL_LETTERS.fullmatch(term):

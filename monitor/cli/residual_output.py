@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from monitor.cli import output
 from monitor.reporting.curve_finding import correlation
-from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
+
+if TYPE_CHECKING:
+    from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 
 
 def four_digits(value: float | None) -> str:
@@ -30,6 +33,9 @@ def with_uncertainty(value: float | None, u: float | None) -> str:
 
 def summary(comparison: MachineComparison | CurveComparison) -> None:
     """The comparison in some sentences."""
+    # Loaded here: `model list`, which prints no comparison, waits twice as long otherwise.
+    from monitor.workflow.explain.compare_answer import CurveComparison
+
     curve = comparison if isinstance(comparison, CurveComparison) else None
     number = output.micrometres if curve is None else four_digits
     unit = comparison.unit

@@ -26,8 +26,8 @@ from monitor.workflow.trend.answer import (
 
 #: From so many runs on it is said why there are no charts.
 FEWEST_RUNS = 10
-#: Below this probability that nothing is there, a dependence, a cycle or a warm-up is stated.
-STATED_P = 0.05
+#: Below this false discovery rate over all parameters a dependence, a cycle or a warm-up is stated.
+STATED_Q = 0.05
 
 
 def say(answer: TrendAnswer) -> None:
@@ -231,13 +231,13 @@ def _event_step(name: str, step: StepAtEvent) -> str:
 def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
     """What the parameter goes with: conditions, cycles, the warm-up of a campaign."""
     for effect in parameter.conditions:
-        if effect.q_value is not None and effect.q_value < STATED_P:
+        if effect.q_value is not None and effect.q_value < STATED_Q:
             yield _condition(name, effect)
     for wave in parameter.cycles:
-        if wave.p_value is not None and wave.p_value < STATED_P:
+        if wave.q_value is not None and wave.q_value < STATED_Q:
             yield _cycle(name, wave)
     warmth = parameter.warm_up
-    if warmth is not None and warmth.q_value is not None and warmth.q_value < STATED_P:
+    if warmth is not None and warmth.q_value is not None and warmth.q_value < STATED_Q:
         yield _warm_up(name, warmth)
 
 

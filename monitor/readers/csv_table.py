@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from monitor.exceptions import did_you_mean
+from monitor.exceptions import closest
 from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.delimited import is_number
 from monitor.readers.faults import Faults, one_of, quoted
@@ -88,14 +88,17 @@ def parse_csv(file: str, text: str, faults: Faults, *, of_workbook: bool = False
 
 def _without_empty_columns(lines: list[str]) -> list[str]:
     """Return the lines without the columns at the right that hold nothing, name included, as spreadsheets save them."""
-    head = lines[0].rstrip("\r") if lines else ""
-    count = len(head) - len(head.rstrip(","))
-    if not count or not head.strip(","):
+    head = lines[0].rstrip(", \t\r") if lines else ""
+    count = lines[0][len(head) :].count(",") if head else 0
+    if not count:
         return lines
-    ends = [line.rstrip("\r") for line in lines]
-    if not all(line.endswith("," * count) for line in ends if line):
-        return lines
-    return [line[:-count] for line in ends]
+    without = []
+    for line in lines:
+        named, *cut = line.rsplit(",", count)
+        if line.strip() and (len(cut) < count or any(map(str.strip, cut))):
+            return lines
+        without.append(named)
+    return without
 
 
 def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
@@ -116,13 +119,20 @@ def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
 
 
 def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> None:
-    """Note every required column that the header lacks."""
+    """Note every required column that the header lacks, and the one that may be it under another name."""
+    other_names = misspelt(table, required)
     for column in required:
         if column not in table.columns:
-            unused = [name for name in table.columns if name not in required]
-            hint = did_you_mean(column, unused).replace("did you mean", "is it")
+            hint = f"is it {quoted(other_names[column])}? " if column in other_names else ""
             message = f"the column is missing; {hint}the header needs {one_of(required)}"
             faults.add(table.file, 1, column, message)
+
+
+def misspelt(table: CsvTable, required: Sequence[str]) -> dict[str, str]:
+    """Return the column that is likely meant for each required one that the header lacks, where a name is close."""
+    unused = [name for name in table.columns if name not in required]
+    missing = [column for column in required if column not in table.columns]
+    return {column: name for column in missing if (name := closest(column, unused)) is not None}
 
 
 def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:

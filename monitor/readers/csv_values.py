@@ -71,12 +71,10 @@ def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
             values[row] = int(cell)
         else:
             fault = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
-            faults.add(
-                table.file,
-                table.lines[row],
-                column,
-                f"{fault}; write digits only, from 0 to {LARGEST_WHOLE}",
-            )
+            right = f"write digits only, from 0 to {LARGEST_WHOLE}"
+            if re.match(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", cell):
+                fault, right = f"{quoted(cell)} is a date", "number them: 1 for the first, 2 for the next"
+            faults.add(table.file, table.lines[row], column, f"{fault}; {right}")
     return Wholes(values, values >= 0)
 
 

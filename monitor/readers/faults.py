@@ -20,9 +20,15 @@ class Faults:
     def __len__(self) -> int:
         return len(self._faults)
 
-    def add(self, file: str, line: int | None, column: str | None, message: str) -> None:
-        """Note one fault."""
-        self._faults.append(Fault(file, line, column, message))
+    def add(self, file: str, line: int | None, column: str | None, message: str) -> Fault:
+        """Note one fault, and return it."""
+        fault = Fault(file, line, column, message)
+        self._faults.append(fault)
+        return fault
+
+    def take_back(self, fault: Fault) -> None:
+        """Forget a fault that another one explains."""
+        self._faults.remove(fault)
 
     def extend(self, faults: Iterable[Fault]) -> None:
         """Note several faults."""

@@ -163,6 +163,19 @@ def not_of_effect(effect: str, parameters: Iterable[str]) -> str:
     return f"is no parameter of the effect {effect}; it has {', '.join(parameters)}"
 
 
+def _meant(name: str, axes: Iterable[Axis]) -> str:
+    """The hint at a term of the axes that differs by a small letter, or by the letter O where the zero stands."""
+    terms = {
+        term.casefold(): term
+        for axis in axes
+        for direction in "XYZABC"
+        for term in (f"E{direction}0{axis.name}", f"E{direction}{axis.name}")
+    }
+    written, sign, effect = name.partition(EFFECT_SIGN)
+    term = terms.get(written.casefold()) or terms.get(written.casefold().replace("o", "0", 1))
+    return "" if term is None else f"did you mean '{term}{sign}{effect}'? "
+
+
 def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, float]:
     table = machine.table("tolerances")
     tolerances: dict[str, float] = {}
@@ -185,7 +198,8 @@ def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, floa
         elif axes is not None and match is not None and match[3] not in {axis.name for axis in axes}:
             table.fault(
                 name,
-                f"the topology has no axis {match[3][:20]}; its axes are {one_of(axis.name for axis in axes)}",
+                f"the topology has no axis {match[3][:20]}; {_meant(name, axes)}"
+                f"its axes are {one_of(axis.name for axis in axes)}",
             )
         else:
             limit = table.number(

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any
 
-from monitor.exceptions import did_you_mean
+from monitor.exceptions import Fault, closest
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.toml_lines import Path, line_of, lines_of_keys
 from monitor.toml_text import toml_fault
@@ -31,11 +31,12 @@ class Table:
         self.path = path
         self._lines = lines
         self._asked_for: list[str] = []
+        self._missing: dict[str, Fault] = {}
 
-    def fault(self, key: str | None, message: str) -> None:
-        """Note a fault of a key, or of the table itself."""
+    def fault(self, key: str | None, message: str) -> Fault:
+        """Note a fault of a key, or of the table itself, and return it."""
         path = self.path if key is None else (*self.path, key)
-        self.faults.add(self.file, line_of(path, self._lines), name_of(path) or None, message)
+        return self.faults.add(self.file, line_of(path, self._lines), name_of(path) or None, message)
 
     def section(self, key: str) -> Table:
         """Return an empty table in the place of one that was read already: for faults of its keys."""
@@ -45,7 +46,8 @@ class Table:
         """Return the value as TOML has it, or None."""
         self._asked_for.append(key)
         if key not in self.data and required:
-            self.fault(key, f"this key is missing; write for example {key} = {example}")
+            message = f"this key is missing; write for example {key} = {example}"
+            self._missing[key] = self.fault(key, message)
         return self.data.get(key)
 
     def text(self, key: str, *, required: bool = False, example: str = '"..."') -> str | None:
@@ -115,7 +117,8 @@ class Table:
         inner = (*self.path, key)
         if value is None:
             if required:
-                self.fault(None if self.path else key, f"the table [{name_of(inner)}] is missing")
+                message = f"the table [{name_of(inner)}] is missing"
+                self._missing[key] = self.fault(None if self.path else key, message)
             return None
         if not isinstance(value, dict):
             self.fault(key, f"{quoted(value)} is not a table; write [{name_of(inner)}] and its keys below")
@@ -136,12 +139,16 @@ class Table:
         ]
 
     def finish(self) -> None:
-        """Refuse every key that was not asked for."""
+        """Refuse every key that was not asked for. One close to a missing key is that key, misspelt: one fault."""
         names = tuple(dict.fromkeys(self._asked_for))
         for key in self.data:
-            if key not in self._asked_for:
-                hint = did_you_mean(key, self._asked_for)
-                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(names)}")
+            if key in self._asked_for:
+                continue
+            meant = closest(key, self._missing) or closest(key, names)
+            if meant in self._missing:
+                self.faults.take_back(self._missing.pop(meant))
+            hint = f"did you mean '{meant}'? " if meant else ""
+            self.fault(key, f"this key is not known; {hint}the keys here are {one_of(names)}")
 
     def _number(
         self, key: str, value: Any, positive: bool, largest: float | None, unit: str, example: str

@@ -303,6 +303,22 @@ def campaign_of_certificate_withdrawn(campaign: str, number: str, why: str) -> s
     return f"the campaign {campaign}, which certificate {number} rests on, was withdrawn: {why}"
 
 
+def conformity_replaced(rule: str, said: str) -> str:
+    """Return that a statement of conformity by a rule stands in place of the laboratory's sentence."""
+    return (
+        f"the statement of conformity by '{rule}' counts; what the laboratory's file states under [statements] "
+        f'conformity is not printed: "{said}"'
+    )
+
+
+def conformity_asked_for_after_all(rule: str, why_none: str) -> str:
+    """Return that conformity is stated by a rule, though the laboratory's file says that it does not apply."""
+    return (
+        f"conformity is stated by '{rule}', though [statements] conformity of the laboratory's file says that it does "
+        f'not apply: "{why_none}"; leave out --conformity, or change the file, if that is right'
+    )
+
+
 def differs_from(number: str, first: int, length: int, genuine: int) -> str:
     """Return where a document differs from the certificate whose number it bears; lengths in bytes."""
     return (
@@ -315,6 +331,14 @@ def limits_of_type(machine_type: str) -> str:
     """Return where the limits of a trend come from, where they are not the campaign's own."""
     whose = f"the machine type '{machine_type}' in the configuration"
     return f"limits are those of {whose}: the latest campaign states none"
+
+
+def limit_of_no_axis(machine_type: str, limit: str, hint: str) -> str:
+    """Return that a limit of a machine type is of an axis that no parameter is of, and what may be meant."""
+    return (
+        f"the limit {limit} of the machine type '{machine_type}' in the configuration is of no parameter of this "
+        f"machine; {hint.strip()}"
+    )
 
 
 def limits_of_others(machine_type: str, limits: Sequence[str], hint: str) -> str:

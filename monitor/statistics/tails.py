@@ -9,34 +9,34 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.records import Array
 
 
 def chi_square_tail(statistic: npt.ArrayLike, dof: npt.ArrayLike) -> Array:
     """Return P(chi² > ``statistic``) with ``dof`` degrees of freedom."""
-    return np.asarray(special.chdtrc(_positive(dof), np.maximum(statistic, 0.0)))
+    return np.asarray(scipy.special.chdtrc(_positive(dof), np.maximum(statistic, 0.0)))
 
 
 def chi_square_quantile(tail: npt.ArrayLike, dof: npt.ArrayLike) -> Array:
     """Return the chi² that is exceeded with probability ``tail``."""
-    return np.asarray(special.chdtri(_positive(dof), tail))
+    return np.asarray(scipy.special.chdtri(_positive(dof), tail))
 
 
 def f_tail(statistic: npt.ArrayLike, dof1: npt.ArrayLike, dof2: npt.ArrayLike) -> Array:
     """Return P(F > ``statistic``) with ``dof1`` and ``dof2`` degrees of freedom."""
-    return np.asarray(special.fdtrc(_positive(dof1), _positive(dof2), np.maximum(statistic, 0.0)))
+    return np.asarray(scipy.special.fdtrc(_positive(dof1), _positive(dof2), np.maximum(statistic, 0.0)))
 
 
 def f_quantile(tail: npt.ArrayLike, dof1: npt.ArrayLike, dof2: npt.ArrayLike) -> Array:
     """Return the F that is exceeded with probability ``tail``."""
-    return np.asarray(special.fdtri(_positive(dof1), _positive(dof2), 1.0 - np.asarray(tail)))
+    return np.asarray(scipy.special.fdtri(_positive(dof1), _positive(dof2), 1.0 - np.asarray(tail)))
 
 
 def student_tail(statistic: npt.ArrayLike, dof: npt.ArrayLike) -> Array:
     """Return P(t > ``statistic``) with ``dof`` degrees of freedom."""
-    return np.asarray(special.stdtr(_positive(dof), np.negative(statistic)))
+    return np.asarray(scipy.special.stdtr(_positive(dof), np.negative(statistic)))
 
 
 def mean_ranks(values: Array) -> Array:

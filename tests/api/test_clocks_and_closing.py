@@ -44,6 +44,11 @@ def test_a_closed_database_does_not_answer(tmp_path: Path) -> None:
         assert "UTC" in db.machines().attrs["meanings"]["latest_run_at"]
         assert db.campaigns().attrs["meanings"]["imported_at"] == "in UTC"
         campaign = db.campaign("cold-cold")
+        runs = campaign.runs()
+        meanings = runs.attrs["meanings"]
+        assert "in UTC" in meanings["started_at"]
+        assert "shop" in meanings["started_at_local"]
+        assert set(meanings) <= {*runs.columns}
     for question in (db.machines, db.campaigns, campaign.runs, campaign.parameters):
         with pytest.raises(
             InputError, match=r"this database is closed; open it again: mm\.open\(.*shop\.duckdb"

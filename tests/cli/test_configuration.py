@@ -145,6 +145,18 @@ def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(
     assert "did you mean 'EB0C'?" in note
 
 
+def test_a_limit_of_an_axis_that_the_machine_has_not_is_said_beside_those_that_hold(
+    typed: Any, db: Path
+) -> None:
+    configured('[tolerances."HU40-T"]\nEA0B = 5\nEB0C9 = 5\n')
+    assert "EB0C9 of the machine type 'HU40-T' in the configuration is of no parameter" in (
+        said := typed("trend", "HU40-T", db=db).out
+    )
+    assert "did you mean 'EB0C'?" in said
+    configured('[tolerances."HU40-T"]\nEA0B = 5\nEXX = 5\n')
+    assert "of no parameter" not in typed("trend", "HU40-T", db=db).out
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -155,6 +167,7 @@ def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(
         ("[tolerances.x]\nEC0Y = inf", "EC0Y = inf: a number above 0"),
         ("[tolerances.x]\nsquareness = 1", "squareness: no name of a term"),
         ('[tolerances."*"]\nEZ0a = 3', "EZ0a: axes are named by capital letters; did you mean EZ0A?"),
+        ("[tolerances.x]\nECOY = 3", "ECOY: this has the letter O where a zero stands; did you mean 'EC0Y'?"),
         ("[tolerance.x]\nEC0Y = 1", "did you mean 'tolerances'?"),
         (
             '[tolerances.x]\n"EXX:reversl" = 5',

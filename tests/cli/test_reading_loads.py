@@ -96,6 +96,27 @@ def test_the_version_is_said_without_numpy_and_the_database() -> None:
     assert answer.stdout.splitlines()[1] == "[]"
 
 
+@pytest.mark.parametrize("verb", ["identify", "explain", "map", "report"])
+def test_a_help_loads_nothing_that_solves_or_draws(verb: str) -> None:
+    code = (
+        f"import sys\nfrom monitor.cli import main\ntry: main([{verb!r}, '--help'])\nexcept SystemExit: pass\n"
+        "watched = {'scipy.special', 'scipy.linalg', 'matplotlib', 'monitor.discovery'}\n"
+        "print(sorted(watched & set(sys.modules)))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_lists_of_models_load_no_distributions(reading_database: Path) -> None:
+    """What a contrast of instruments asks of scipy is asked when there is one."""
+    code = (
+        f"import sys\nfrom monitor.cli import main\nmain(['--db', {str(reading_database)!r}, 'model', 'list'])\n"
+        "print('scipy.special' in sys.modules)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.splitlines()[-1] == "False"
+
+
 def test_a_verb_that_ends_is_not_looked_through_for_cycles(reading_database: Path) -> None:
     # Registered before the verb's own, so called after it.
     code = (

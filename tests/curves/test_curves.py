@@ -148,7 +148,7 @@ def folder(tmp_path: Path) -> Path:
             'response = "deflexion"',
             "did you mean 'deflection_mm'",
         ),
-        ("campaign.toml", "base =", "bass =", "base: this key is missing"),
+        ("campaign.toml", "base =", "bass =", "bass: this key is not known; did you mean 'base'?"),
         (
             "campaign.toml",
             "standard_uncertainty = 0.0001",

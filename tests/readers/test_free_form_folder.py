@@ -67,8 +67,8 @@ def test_conditions_come_back_from_writing(pocket, tmp_path):
         (
             "[artefact.self_calibration.nodes_mm]",
             "[artefact.self_calibration.nodes]",
-            KEY,
-            "nodes_mm] is missing",
+            KEY + ".nodes",
+            "this key is not known; did you mean 'nodes_mm'?",
         ),
         (
             "-110.0, -88.0",

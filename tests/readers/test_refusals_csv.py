@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import pytest
 
+from monitor.readers import read_campaign
+
 R, P = "runs.csv", "probings.csv"
 ROW = "1,3,120.0,1,51.730164,-91.168911,115.032892,0,0,90,\n"
 
@@ -42,6 +44,7 @@ ONE_FAULT = [
     (R, "22.08", "", 2, "ambient_degC", "the cell is empty; a number is needed"),
     (R, "22.08", "inf", 2, "ambient_degC", "'inf' is not a finite number"),
     (R, "08:37:06.421766-05:00,1,", "08:37:06.421766-05:00,-1,", 2, "day", "'-1' is not a whole number"),
+    (R, "08:37:06.421766-05:00,1,", "08:37:06.421766-05:00,2026-03-02,", 2, "day", "is a date; number them: 1 for the first"),
     (R, "false", "FALSE", 2, "warm_up", "'FALSE' is neither; write true or false"),
     # a length beyond the stroke; without a stroke beyond 100 m or 100 turns
     (P, "51.730164", "300.0001", 4, "x_mm", "beyond the stroke of axis X, -300 to 300 mm"),
@@ -117,10 +120,18 @@ def test_format_1_missing_column_of_runs(spoil, faults_of, column):
     assert any("the column is missing" in fault.message for fault in faults)
 
 
-def test_format_1_misspelt_column_is_hinted(spoil, faults_of):
-    messages = [fault.message for fault in faults_of(spoil(P, "x_mm", "X_mm"))]
-    assert any("the column is missing; is it 'X_mm'? " in message for message in messages)
-    assert any("did you mean 'x_mm'? " in message for message in messages)
+@pytest.mark.parametrize(("file", "old", "new"), [(P, "x_mm", "X_mm"), (R, "started_at", "startet_at")])
+def test_format_1_misspelt_column_is_one_fault(spoil, faults_of, file, old, new):
+    (fault,) = faults_of(spoil(file, old, new))
+    assert (fault.line, fault.column) == (1, old)
+    assert f"the column is missing; is it '{new}'? " in fault.message
+
+
+def test_format_1_columns_without_name_and_cells_are_not_there(small):
+    before = read_campaign(small)
+    lines = (small / R).read_text().splitlines()
+    (small / R).write_text("\n".join([lines[0] + ", ,", *(line + ",\t," for line in lines[1:])]) + "\n")
+    assert read_campaign(small).runs == before.runs
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import pytest
 
+from monitor.exceptions import CampaignError
+
 T = "campaign.toml"
 TOPOLOGY = '"w C B X b Z Y (C1) t"'
 
@@ -47,6 +49,8 @@ ONE_FAULT = [
     ("EC0Y = 20.0", '"EAA:reversal" = 20.0', 18, "machine.tolerances.EAA:reversal", "the topology has no axis A"),
     ("EC0Y = 20.0", '"EXX:reversal" = 0', 18, "machine.tolerances.EXX:reversal", "0 must be greater than 0"),
     ("EC0Y = 20.0", "EC0A = 20.0", 18, "machine.tolerances.EC0A", "the topology has no axis A"),
+    ("EC0Y = 20.0", "ECOY = 20.0", 18, "machine.tolerances.ECOY", "the topology has no axis OY; did you mean 'EC0Y'? its axes are"),
+    ("EC0Y = 20.0", "EC0y = 20.0", 18, "machine.tolerances.EC0y", "the topology has no axis y; did you mean 'EC0Y'? its axes are"),
     # probe and artefact
     ("standard_uncertainty_um = 0.7", 'standard_uncertainty_um = "0,7"', 24, "probe.standard_uncertainty_um", "'0,7' is not a number; write standard_uncertainty_um = 0.7 (in um)"),
     ("standard_uncertainty_um = 0.7", "standard_uncertainty_um = nan", 24, "probe.standard_uncertainty_um", "nan is not a finite number"),
@@ -79,9 +83,23 @@ def test_format_1_bad_key_is_named_with_its_line(spoil, faults_of, old, new, lin
         assert words in faults[0].message
 
 
+def test_format_1_a_key_misspelt_in_every_ball_is_one_line(small, faults_of):
+    text = (small / T).read_text()
+    count = text.count("nominal_mm")
+    (small / T).write_text(text.replace("nominal_mm", "nominl_mm"))
+    faults = faults_of(small)
+    assert [fault.column for fault in faults] == [
+        f"artefact.balls[{i}].nominl_mm" for i in range(1, count + 1)
+    ]
+    assert all("this key is not known; did you mean 'nominal_mm'?" in fault.message for fault in faults)
+    said = str(CampaignError("small", faults)).splitlines()
+    assert len(said) == 2
+    assert said[1].endswith(f"(and {count - 1} more like it, to line {faults[-1].line})")
+
+
 @pytest.mark.parametrize("table", ["machine", "probe"])
 def test_format_1_missing_table(small, faults_of, table):
-    text = (small / T).read_text().replace(f"[{table}", f"[no_{table}")
+    text = (small / T).read_text().replace(f"[{table}", f"[left_out_{table}")
     (small / T).write_text(text)
     assert any(f"the table [{table}] is missing" in fault.message for fault in faults_of(small))
 

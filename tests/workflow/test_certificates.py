@@ -86,6 +86,27 @@ def guarded(db: Database, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(made.file)
 
 
+@pytest.mark.parametrize(
+    ("stated", "note"),
+    [
+        ('"Konformität nach vereinbarter Regel"', 'is not printed: "Konformität nach vereinbarter Regel"'),
+        ('{ not_applicable = "keine verlangt" }', 'does not apply: "keine verlangt"'),
+    ],
+)
+def test_what_the_laboratory_says_of_conformity_is_not_left_out_in_silence(
+    db: Database, tmp_path: Path, pdf_unread, stated: str, note: str
+) -> None:
+    text = LABORATORY.read_text(encoding="utf-8")
+    line = next(line for line in text.splitlines() if line.startswith("conformity = "))
+    own = tmp_path / "laboratory.toml"
+    own.write_text(text.replace(line, f"conformity = {stated}"), encoding="utf-8")
+    asked = {"laboratory": own, "out": tmp_path, "issued_on": DAY, "draft": True}
+    with pdf_unread():
+        (said,) = issue(db, CertificateRequest("limited", 20, **asked, conformity="guard")).notes
+        assert note in said
+        assert issue(db, CertificateRequest("limited", 20, **asked)).notes is None
+
+
 @pytest.mark.usefixtures("laid_out_anew")
 def test_an_issued_certificate_is_made_again_byte_for_byte(
     db: Database, guarded: Path, tmp_path: Path

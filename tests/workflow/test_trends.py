@@ -384,6 +384,19 @@ def test_no_run_and_one_run_are_sentences_with_exit_status_0(made: Database, tmp
     assert said == "single: 1 run of 1 campaign, of 2024-01-01 09:00; a history begins with the second run"
 
 
+def test_conditions_are_stated_by_their_rate_over_all_parameters(made: Database) -> None:
+    """Benjamini and Hochberg over the conditions of the machine, as written in their paper: q = min over k >= i of
+    p_k m / k; of one parameter alone q was its p-value."""
+    parameters = trends(made, "M")["parameters"].values()
+    effects = sorted((e for each in parameters for e in each["conditions"]), key=lambda e: e["p_value"])
+    m = len(effects)
+    assert m == 4
+    for i, effect in enumerate(effects):
+        q = min(effects[k]["p_value"] * m / (k + 1) for k in range(i, m))
+        assert effect["q_value"] == pytest.approx(q, rel=1e-12)
+    assert any(effect["q_value"] > 1.1 * effect["p_value"] for effect in effects)
+
+
 def test_findings_beyond_any_doubt_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A q-value of exactly zero is the smallest, not a missing one."""
     rng = np.random.default_rng(3)

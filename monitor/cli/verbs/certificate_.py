@@ -192,6 +192,8 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
     if as_json:
         output.document(answer)
     else:
+        for note in answer.notes or ():
+            output.say(f"note: {note}")
         output.say(f"certificate {answer.certificate.number} ({answer.certificate.state}): {answer.file}")
     return 0
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from monitor.cli import explain_output, output
+from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
-from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import RATE, ExplainRequest
 
 EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
@@ -30,6 +29,10 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    # Loaded here: --help searches nothing.
+    from monitor.cli import explain_output
+    from monitor.workflow.explain.explain import explain
+
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("searching"):
         answer = ask(

@@ -5,16 +5,12 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from monitor.cli import identify_output, output
+from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
-from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
-from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest, StepwiseRequest
-from monitor.workflow.identify.stepwise import identify_stepwise
-from monitor.workflow.intake.campaigns import campaigns
 
 EXAMPLE = "monitor identify five-days"
 
@@ -51,6 +47,10 @@ def run(options: Namespace) -> int:
         )
     if options.stepwise:
         return _stepwise(options)
+    # Loaded here, as below: --help solves nothing, and the solvers take most of a second.
+    from monitor.cli import identify_output
+    from monitor.workflow.identify.identify import identify
+
     with opened(options) as db, output.working("identifying"):
         answer = ask(db, identify, IdentifyRequest(options.campaign, options.model, options.number))
     if options.json:
@@ -64,6 +64,10 @@ def _all(options: Namespace) -> int:
     """Identify every campaign; exit status 2 where one could not be."""
     if options.number is not None:
         raise InputError(f"--run {options.number} is a run of one campaign: name it")
+    from monitor.cli import identify_output
+    from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
+    from monitor.workflow.intake.campaigns import campaigns
+
     request = IdentifyAllRequest(options.model, options.workers, options.cluster)
     with opened(options) as db:
         total = len(ask(db, campaigns).campaigns)
@@ -82,6 +86,9 @@ def _all(options: Namespace) -> int:
 def _stepwise(options: Namespace) -> int:
     if options.campaign is None:
         raise InputError("--stepwise shows one run: name its campaign")
+    from monitor.cli import identify_output
+    from monitor.workflow.identify.stepwise import identify_stepwise
+
     with opened(options) as db, output.working("identifying step by step"):
         answer = ask(db, identify_stepwise, StepwiseRequest(options.campaign, options.model, options.number))
     if options.json:

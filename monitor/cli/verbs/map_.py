@@ -11,7 +11,6 @@ from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.request import COMPENSATION_FORMATS, POINTS, VolumetricRequest
-from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLE = "monitor map five-days --run 20 --figures figures --compensation positioning-csv"
 
@@ -55,6 +54,9 @@ def run(options: Namespace) -> int:
         compensation=options.compensation,
         out=options.out,
     )
+    # Loaded here: --help maps nothing.
+    from monitor.workflow.volumetric.volumetric import volumetric_map
+
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("mapping"):
         answer = ask(db, volumetric_map, request)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common, described
 from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
-from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.model.answer import AffectedAnswer, ChangeModelAnswer
 from monitor.workflow.model.request import (
     AddEffectRequest,
@@ -21,6 +21,9 @@ from monitor.workflow.model.request import (
 )
 from monitor.workflow.model.show import list_all_models, show_model
 from monitor.workflow.model.use import use_model
+
+if TYPE_CHECKING:
+    from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 
 EXAMPLE = 'monitor model add "EXX:reversal" --to samba --as with-reversal --campaign hidden-reversal-x'
 
@@ -222,6 +225,9 @@ def _history(options: Namespace) -> int:
 
 def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
     """The error of every version, and of a curve its Bayesian information criterion."""
+    # Loaded here, as below: lists of models have no steps, and the answers of `compare` take longer than a list.
+    from monitor.workflow.explain.version_answer import CurveVersion
+
     unit = steps[0].unit
     curve = isinstance(steps[0], CurveVersion)
     columns = [
@@ -242,6 +248,8 @@ def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
 
 
 def _step(step: MachineVersion | CurveVersion) -> list[str]:
+    from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+
     curve = step if isinstance(step, CurveVersion) else None
     number = output.micrometres if curve is None else four_digits
     return [

@@ -17,7 +17,6 @@ from monitor.cli.secret_files import warn_of_readers
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import state_in_words
 from monitor.workflow.health.mail import mail_report, read_mail_settings
-from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportAnswer, ReportOptions, ReportRequest
 from monitor.workflow.query import machines
 
@@ -87,6 +86,9 @@ def run(options: Namespace) -> int:
         options.workers,
         cluster=options.cluster,
     )
+    # Loaded here: --help draws nothing, and what draws takes a second.
+    from monitor.workflow.health.report import report
+
     with opened(options, threads=1, judging=True) as db:
         total = 1 if options.machine else len(ask(db, machines).rows)
         with output.stepping("reporting", total, behind=True, afterwards="writing the pages") as progress:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtr, chdtrc, fdtrc
+import scipy
 
 from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -69,7 +69,7 @@ def scatters(problem: ChainProblem, solution: Solution, run: int) -> tuple[Setup
 
 def _least(block: _Block) -> float:
     """How often chance alone leaves so little of readings that scatter as stated."""
-    return float(chdtr(block.numbers, block.remaining))
+    return float(scipy.special.chdtr(block.numbers, block.remaining))
 
 
 def _blocks(at: RunRows) -> dict[str, _Block]:
@@ -190,9 +190,13 @@ def _freedom(ordered: list[_Block], moved: Array) -> float:
 def _p(square: float, directions: int, freedom: float) -> float:
     """How often chance makes a squared distance as large: Hotelling's where scatter is by the readings themselves."""
     if not np.isfinite(freedom):
-        return float(chdtrc(directions, square))
+        return float(scipy.special.chdtrc(directions, square))
     rest = freedom - directions + 1.0
-    return 1.0 if rest <= 0.0 else float(fdtrc(directions, rest, square * rest / (freedom * directions)))
+    return (
+        1.0
+        if rest <= 0.0
+        else float(scipy.special.fdtrc(directions, rest, square * rest / (freedom * directions)))
+    )
 
 
 def _basis(at: RunRows, rows: npt.NDArray[np.int64], deviation: Array) -> Array:

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtrc, stdtr
+import scipy
 
 from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -84,8 +84,8 @@ def _judged(
     score = float(beside @ residual)
     removed = (score / length) ** 2
     remaining = max(float(np.sum(residual[at] ** 2)) - removed, 0.0)
-    if chdtrc(free, remaining) < DOUBTFUL and removed < MOST * (remaining + removed - free):
+    if scipy.special.chdtrc(free, remaining) < DOUBTFUL and removed < MOST * (remaining + removed - free):
         return None
     deviation = np.sqrt(max(1.0, remaining / free))
-    p = 2.0 * float(stdtr(free, -abs(score) / length / deviation))
+    p = 2.0 * float(scipy.special.stdtr(free, -abs(score) / length / deviation))
     return -score / length**2, float(deviation) / length, p

@@ -44,10 +44,11 @@ class CertificatesAnswer:
 
 @dataclass(frozen=True)
 class CertificateFileAnswer:
-    """A certificate's state and the file that was written."""
+    """A certificate's state and the file that was written; ``notes`` name what the laboratory's file says in vain."""
 
     certificate: CertificateState = field(metadata=INLINED)
     file: str
+    notes: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

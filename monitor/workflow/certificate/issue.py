@@ -11,12 +11,13 @@ from typing import Literal
 from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
+from monitor.reporting import messages
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.completeness import RefusedGroundsError, missing_items
 from monitor.reporting.certificate.dcc_elements import NEWEST
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.model_effect import ModelEffect
-from monitor.reporting.certificate.record import CertificateRecord
+from monitor.reporting.certificate.record import CertificateRecord, NotApplicable
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.pdf.beside import certificate_pdf
@@ -105,7 +106,18 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
         raise RefusedGroundsError(
             refused, missing_items(recorded(request.number or next_number(db, day.year)))
         )
-    return _numbered(db, request, recorded, inputs, day.year)
+    written = _numbered(db, request, recorded, inputs, day.year)
+    return dataclasses.replace(written, notes=_not_printed(request, stated))
+
+
+def _not_printed(request: CertificateRequest, stated: LaboratoryFile) -> tuple[str, ...] | None:
+    """What the laboratory says of conformity, where a statement by a rule stands in its place."""
+    said = stated.conformity
+    if request.conformity is None or said is None:
+        return None
+    if isinstance(said, NotApplicable):
+        return (messages.conformity_asked_for_after_all(request.conformity, said.statement),)
+    return (messages.conformity_replaced(request.conformity, said),)
 
 
 def _numbered(

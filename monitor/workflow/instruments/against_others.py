@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri, fdtri
+import scipy
 
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -51,6 +51,6 @@ def _limit(contrast: Contrast, level: float) -> float:
     """The size that chance exceeds as often as ``level``."""
     directions, freedom = contrast.directions, contrast.freedom
     if not np.isfinite(freedom):
-        return float(np.sqrt(chdtri(directions, level) / directions))
+        return float(np.sqrt(scipy.special.chdtri(directions, level) / directions))
     rest = freedom - directions + 1.0
-    return float(np.sqrt(fdtri(directions, rest, 1.0 - level) * freedom / rest))
+    return float(np.sqrt(scipy.special.fdtri(directions, rest, 1.0 - level) * freedom / rest))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
+import scipy
 
 from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
@@ -126,7 +126,7 @@ def _parameters(
 def limit_of(comparisons: int, doubtful: float, degrees_of_freedom: float | None = None) -> float:
     """The E_n that one of so many comparisons exceeds by chance so often at most, as ``_by_chance`` has it."""
     freedom = np.inf if degrees_of_freedom is None else degrees_of_freedom
-    return -float(stdtrit(freedom, 0.5 * doubtful / comparisons)) / K
+    return -float(scipy.special.stdtrit(freedom, 0.5 * doubtful / comparisons)) / K
 
 
 def _by_chance(pairs: list[Agreement]) -> float | None:
@@ -138,7 +138,7 @@ def _by_chance(pairs: list[Agreement]) -> float | None:
 def _p(pair: Agreement) -> float:
     """How often chance makes an E_n as large: a normal difference with U = 2 u, Student's t where u is by scatter."""
     freedom = np.inf if pair.degrees_of_freedom is None else pair.degrees_of_freedom
-    return 2.0 * float(stdtr(freedom, -K * pair.e_n))
+    return 2.0 * float(scipy.special.stdtr(freedom, -K * pair.e_n))
 
 
 def _parameter(

@@ -139,7 +139,8 @@ class StepAtEvent:
 class ConditionEffect:
     """How a parameter goes with a recorded condition, which ran ``from_`` a value ``to`` another.
 
-    ``moves_with`` names conditions (or ``time``) that cannot be told apart from it.
+    ``moves_with`` names conditions (or ``time``) that cannot be told apart from it; ``q_value`` is the false discovery
+    rate over the conditions of all parameters.
     """
 
     channel: str
@@ -157,7 +158,7 @@ class ConditionEffect:
 
 @dataclass(frozen=True)
 class Cycle:
-    """A wave of a day or a year."""
+    """A wave of a day or a year; ``q_value`` is the false discovery rate over the cycles of all parameters."""
 
     cycle: str
     period_days: float
@@ -166,6 +167,7 @@ class Cycle:
     unit: str
     peak_at: str | None
     p_value: float | None
+    q_value: float | None
 
 
 @dataclass(frozen=True)

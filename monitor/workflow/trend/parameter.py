@@ -18,7 +18,6 @@ from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import (
     Change,
     DependenceUnits,
-    control_false_discoveries,
     dependence,
 )
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
@@ -133,10 +132,6 @@ def conditions(
     ]
     if not effects:
         return (), Lack(Part.CONDITIONS, Cause.NOTHING_VARIES)
-    q = control_false_discoveries(
-        [np.nan if effect.p_value is None else effect.p_value for effect in effects]
-    ).q_value
-    effects = [replace(effect, q_value=number(float(rate))) for effect, rate in zip(effects, q, strict=True)]
     return tuple(sorted(effects, key=lambda effect: 2.0 if effect.p_value is None else effect.p_value)), None
 
 
@@ -198,7 +193,7 @@ def cycles(piece: Series) -> tuple[tuple[Cycle, ...], Lack | None]:
     return tuple(
         Cycle(
             wave.name, wave.period, wave.amplitude, wave.u, piece.unit, date(wave.peak_at, piece.offset),
-            number(wave.p_value),
+            number(wave.p_value), None,
         )
         for wave in fit.cycles
     ), None  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -12,7 +12,6 @@ from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.records import VOLUMETRIC, Array
 from monitor.reporting import messages
-from monitor.statistics import control_false_discoveries
 from monitor.store import (
     NOTE,
     Database,
@@ -29,6 +28,7 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
+from monitor.store.type_tolerances import ANY_TYPE
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -45,6 +45,7 @@ from monitor.workflow.trend.answer import (
     TrendAnswer,
 )
 from monitor.workflow.trend.control import Charts, points_of
+from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast
 from monitor.workflow.trend.parameter import (
     conditions,
@@ -52,7 +53,6 @@ from monitor.workflow.trend.parameter import (
     dated_change,
     drift_statement,
     latest_mean,
-    number,
 )
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
@@ -184,7 +184,7 @@ def _answer(
     )
     check = _next_check(history, request)
     page = _Page(request, history, charts, check)
-    parameters = _with_discovery_rates({name: page.parameter(parameter) for name, parameter in past.items()})
+    parameters = with_discovery_rates({name: page.parameter(parameter) for name, parameter in past.items()})
     parameters = _with_event_steps(parameters, event_steps(past, events))
     control = ControlCharts(
         charts.period(), charts.of_vector(history.parameters, np.random.default_rng(SEED))
@@ -213,9 +213,23 @@ def _limits_of_type(db: Database, history: MachineHistory, past: Collection[str]
         return ()
     limits = db.type_tolerances[name]
     if past is None or not {VOLUMETRIC, *past}.isdisjoint(limits):
-        return (messages.limits_of_type(name),)
+        astray = {} if past is None or name == ANY_TYPE else _of_no_axis(limits, past)
+        return (
+            messages.limits_of_type(name),
+            *(messages.limit_of_no_axis(name, limit, hint) for limit, hint in astray.items()),
+        )
     hint = next(filter(None, (did_you_mean(limit, past) for limit in limits)), "")
     return (messages.limits_of_others(name, tuple(limits), hint),)
+
+
+def _of_no_axis(limits: Iterable[str], past: Collection[str]) -> dict[str, str]:
+    """What was meant by each limit of an axis that no parameter of ``past`` is of, where a parameter is close to it."""
+    # Loaded here: most places state no tolerances by type, and have no need of the readers.
+    from monitor.readers.machine_file import TERM
+
+    axes = {term[3] for parameter in past if (term := TERM.fullmatch(parameter))}
+    astray = [limit for limit in limits if (term := TERM.fullmatch(limit)) and term[3] not in axes]
+    return {limit: hint for limit in astray if (hint := did_you_mean(limit, past))}
 
 
 def _simulated(db: Database, history: MachineHistory) -> tuple[str, ...]:
@@ -342,23 +356,3 @@ def _with_event_steps(
         )
         for name, parameter in parameters.items()
     }  # fmt: skip
-
-
-def _with_discovery_rates(parameters: Mapping[str, ParameterTrend]) -> dict[str, ParameterTrend]:
-    """The parameters with the false discovery rates over the drifts of all of them, and over their warm-ups."""
-
-    def rates(p_values: list[float | None]) -> Array:
-        return control_false_discoveries([np.nan if p is None else p for p in p_values]).q_value
-
-    drifts = rates([parameter.drift.p_value for parameter in parameters.values()])
-    warm_ups = rates(
-        [None if (warmth := each.warm_up) is None else warmth.p_value for each in parameters.values()]
-    )
-    return {
-        name: replace(
-            parameter,
-            q_value=number(float(drift)),
-            warm_up=parameter.warm_up and replace(parameter.warm_up, q_value=number(float(warmth))),
-        )
-        for (name, parameter), drift, warmth in zip(parameters.items(), drifts, warm_ups, strict=True)
-    }
