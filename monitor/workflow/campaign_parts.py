@@ -23,15 +23,19 @@ def only_run(campaign: Campaign, run: int) -> Campaign:
 
 
 def runs_before(campaign: Campaign, moment: datetime | None) -> Campaign:
-    """The runs that began before a local time without a zone (all with None).
+    """The runs that began before a moment (all with None): one with an offset, or a time by the clock of the shop.
 
     Raises DataError where there is none.
     """
     if moment is None:
         return campaign
-    part = _part(campaign, lambda run: run.started_at.replace(tzinfo=None) < moment)
+    by_the_shop = moment.tzinfo is None
+    part = _part(
+        campaign,
+        lambda run: (run.started_at.replace(tzinfo=None) if by_the_shop else run.started_at) < moment,
+    )
     if not part.runs:
-        raise DataError(f"campaign {campaign.name} has no run before {moment:%Y-%m-%d %H:%M}")
+        raise DataError(f"campaign {campaign.name} has no run before {moment:%Y-%m-%d %H:%M%z}")
     return part
 
 
@@ -50,4 +54,4 @@ def kind_of(kind: str, before: datetime | None) -> str:
 
 def method_of(method: str, before: datetime | None) -> str:
     """The method under which a result is stored; for a part of a campaign it names the runs."""
-    return method if before is None else f"{method}, runs before {before:%Y-%m-%d %H:%M}"
+    return method if before is None else f"{method}, runs before {before:%Y-%m-%d %H:%M%z}"

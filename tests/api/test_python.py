@@ -198,7 +198,9 @@ def test_wrong_names_are_answered_with_the_right_ones(db: mm.Database, tmp_path:
     with pytest.raises(InputError, match=r"^there is no option 'peak'; did you mean 'peak_um'\? there are "):
         mm.simulate(tmp_path / "rehearsal", effect="EXX:reversal", peak=8.0)
     # Options of the command line are arguments here.
-    with pytest.raises(InputError, match=r"^p 1.5: a coverage probability lies between 0 and 1$"):
+    with pytest.raises(
+        InputError, match=r"^p 1.5: a coverage probability lies between 0.5 and 0.9999; 0.95 is usual$"
+    ):
         db.campaign("five-days").uncertainty(p=1.5)
     with pytest.raises(InputError, match=r"^holds_for week: choose run, day or campaign$"):
         db.campaign("five-days").uncertainty(holds_for="week")

@@ -16,6 +16,7 @@ import duckdb
 import numpy as np
 import pytest
 
+from monitor.discovery import fit
 from monitor.readers import read_campaign
 from monitor.readers.doubts import doubts
 
@@ -137,6 +138,8 @@ def test_a_verb_that_needs_more_memory_than_there_is_says_so(
     """The kernel would end the process without a word."""
     monkeypatch.setattr("monitor.methods.chain.memory.SMALL", 1e6)
     monkeypatch.setattr("monitor.methods.chain.memory.free_memory", lambda: 2e6)
+    # Not what another test fitted (computed_once).
+    monkeypatch.setattr("monitor.workflow.uncertainty.evaluation.fit", fit)
     said = typed(verb, "cold-cold", db=db)
     assert (said.status, said.out) == (2, "")
     assert "1320 rows at once takes some" in said.err

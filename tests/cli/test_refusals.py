@@ -57,7 +57,7 @@ WRONG = [
     ([*RUN, "--digits", "-2"], "--digits -2: choose 1 to 4"),
     ([*RUN, "--seed", "-1"], "--seed -1: a seed is a whole number from 0"),
     ([*RUN, "--seed", str(2**63)], "a seed is a whole number from 0"),
-    ([*RUN, "-p", "nan"], "-p nan: a coverage probability lies between 0 and 1"),
+    ([*RUN, "-p", "nan"], "-p nan: a coverage probability lies between 0.5 and 0.9999"),
     ([*RUN, "-p", "1"], "-p 1.0: a coverage probability"),
     ([*RUN, "-p", "inf"], "-p inf: a coverage probability"),
     ([*RUN, "--run", "77"], "no run 77; there are runs 1, 2, 3"),

@@ -345,6 +345,8 @@ def test_every_state_is_explained_and_weeks_are_iso_8601() -> None:
     assert all(STATES.values())
     assert week_named("2026-w10").first == date(2026, 3, 2)
     assert week_named("2020-W53").name == "2020-W53"
+    with pytest.raises(InputError, match="no week had ended on 0001-01-01; name the week"):
+        week_before(date(1, 1, 1))
     assert week_before(date(2026, 3, 9)).name == "2026-W10"
     assert week_before(date(2026, 3, 15)).name == "2026-W10"
     with pytest.raises(InputError, match="for example 2026-W10"):

@@ -77,7 +77,8 @@ def _sum_of_tails(ratios: Array, p: float) -> Tails:
         return math.log(max(total, 1e-300))
 
     low = float(scipy.special.ndtri(0.5 * (1.0 + p))) ** 2
-    high, wanted = 2.0 * low, math.log(1.0 - p)
+    # Of a tiny p the first is zero, which no factor makes larger.
+    high, wanted = max(2.0 * low, 1e-6), math.log(1.0 - p)
     while logarithm(high) > wanted:
         high *= 1.5
     angles = np.pi * (np.arange(_NODES) + 0.5) / _NODES

@@ -63,5 +63,9 @@ def week_of(day: date) -> Week:
 
 
 def week_before(day: date) -> Week:
-    """The last week that had ended on ``day``: what a timer on Monday morning reports."""
-    return Week(day - timedelta(days=day.isocalendar().weekday - 1 + 7))
+    """The last week that had ended on ``day``: what a timer on Monday morning reports. Raises InputError on the first
+    days of the calendar."""
+    try:
+        return Week(day - timedelta(days=day.isocalendar().weekday - 1 + 7))
+    except OverflowError:
+        raise InputError(f"no week had ended on {day}; name the week, for example 2026-W10") from None

@@ -13,6 +13,8 @@ from monitor.sources import Source
 
 #: Coverage probability of what is certified, and of results where no other is asked for.
 COVERAGE = 0.95
+#: Regions beyond these say nothing that a sample of trials could show, and take the longer the less is in them.
+LEAST_COVERAGE, MOST_COVERAGE = 0.5, 0.9999
 METHODS = ("guf", "mcm", "both")
 #: The words of --holds-for.
 HOLDS_FOR = tuple(word.value for word in HoldsFor)
@@ -78,8 +80,10 @@ class UncertaintyRequest:
             raise InputError(f"--digits {self.digits}: choose 1 to 4 significant digits")
         if not 0 <= self.seed < 2**63:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
-        if not 0.0 < self.p < 1.0:
-            raise InputError(f"-p {self.p}: a coverage probability lies between 0 and 1")
+        if not LEAST_COVERAGE <= self.p <= MOST_COVERAGE:
+            raise InputError(
+                f"-p {self.p}: a coverage probability lies between {LEAST_COVERAGE} and {MOST_COVERAGE}; 0.95 is usual"
+            )
         holds_for(self.holds_for)
 
     @property
