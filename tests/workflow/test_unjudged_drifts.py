@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pytest
 from by_path import load
 from scipy import stats
 
-from monitor.reporting.health.records import State
+from monitor.reporting.health.records import ChangeKind, State
 from monitor.statistics.trend import trend
 from monitor.store import Database
 from monitor.units import DAYS_PER_YEAR
@@ -40,6 +41,18 @@ def test_the_state_is_drifts_since_the_first_run_that_shows_it() -> None:
     assert state is State.DRIFTS
     started = binding.GROWN.history.times[0]
     assert since_when(state, [binding.STILL, binding.GROWN], (), started) == started
+
+
+def test_what_a_drift_makes_due_is_so_since_the_first_run_that_shows_it() -> None:
+    """A step of another parameter is no beginning of a drift."""
+    step = SimpleNamespace(kind=ChangeKind.CHANGE, at=datetime(2026, 8, 10), this_week=False)
+    parameters = [binding.STILL, binding.GROWN]
+    noted = (step,)
+    assert since_when(State.IN_TOLERANCE, parameters, noted, step.at) == step.at
+    drift = binding.GROWN.drift.since
+    assert drift is not None
+    assert drift != step.at
+    assert since_when(State.IN_TOLERANCE, parameters, noted, step.at, binding.GROWN.name) == drift
 
 
 def test_a_drift_with_a_tolerance_is_judged_by_it() -> None:

@@ -200,7 +200,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
         changed=new_this_week(noted, explanation, quality, drifting),
-        since=since_when(state, parameters, noted, measured.span.first), probability_out=judged.any,
+        since=since_when(state, parameters, noted, measured.span.first, due), probability_out=judged.any,
         next_check=check,
         run=_named(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_of(stated),

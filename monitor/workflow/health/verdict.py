@@ -191,10 +191,18 @@ def imports_refused(refused: Sequence[RefusedImport]) -> tuple[ImportsRefused, .
 
 
 def since_when(
-    state: State, parameters: Sequence[ParameterHealth], noted: Sequence[Change], compared: datetime
+    state: State,
+    parameters: Sequence[ParameterHealth],
+    noted: Sequence[Change],
+    compared: datetime,
+    due: str | None = None,
 ) -> datetime | None:
     """Since when the machine is in this state: beyond a tolerance, another one than before, or not explained by the
-    model, which then is so from the first run ``compared`` with it; drifting, from the first run that shows it."""
+    model, which then is so from the first run ``compared`` with it; drifting, or ``due`` by the drift of a parameter,
+    from the first run that shows it."""
+    if due is not None:
+        drift = {each.name: each.drift for each in parameters}.get(due)
+        return None if drift is None else drift.since
     beyond = [parameter.out_since for parameter in parameters if parameter.out_since is not None]
     if state in ALARMS:
         # Of the volumetric error there is no value run by run: no day is better than a wrong one.
