@@ -565,3 +565,17 @@ def test_a_change_that_passes_again_is_said_with_its_size_and_time_constant(
         )
         assert f"with a time constant of about {change['time_constant_days']:.2g} days (a transient" in out
     assert answer["parameters"]["EZ0B"]["drifts"] == []
+
+
+def test_a_drift_has_one_slope_with_one_uncertainty(made: Any) -> None:
+    """The list of drifts had that of the search, which takes days as independent."""
+    document = trends(made, "M")["parameters"]["EX0B"]
+    (drift,) = [change for change in document["drifts"] if change["kind"] == "trend"]
+    stated = document["drift"]
+    assert (drift["size"], drift["u"], drift["p_value"]) == (
+        stated["slope"],
+        stated["u_slope"],
+        stated["p_value"],
+    )
+    # 0.2 µm a week.
+    assert drift["size"] == pytest.approx(0.2 * 365.25 / 7.0, abs=4.0 * drift["u"])

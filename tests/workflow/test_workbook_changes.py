@@ -151,3 +151,25 @@ def test_an_event_that_is_recorded_already_is_not_recorded_again(db: Database) -
     event(db, EventRequest("HU40-T", "belt changed", at, "repair"))
     recorded = event(db, EventRequest("HU40-T", "belt changed", at.replace(hour=8), "repair")).events
     assert len(recorded) == 4
+
+
+def test_the_sheet_has_what_a_parameter_stepped_by_at_an_event(changed: Database, tmp_path: Path) -> None:
+    """The event stood there without a size, and below it that nothing changed: the search looks between events."""
+    for campaign in CAMPAIGNS:
+        identify(changed, IdentifyRequest(campaign))
+    event(changed, EventRequest("HU40-T", "zero of B set", datetime(2026, 3, 5, 4, tzinfo=UTC), "adjustment"))
+    export(changed, ExportRequest(tmp_path / "after.xlsx", "xlsx", ("changes",)))
+    written = rows(tmp_path / "after.xlsx")
+    followed = trend(changed, TrendRequest("HU40-T")).parameters
+    stated = {
+        (name, f"{step.size:.9g}", f"{step.u:.9g}")
+        for name, each in followed.items()
+        for step in each.event_steps
+    }
+    at_event = [row for row in written if row["kind"] == "step at event"]
+    assert "EB0C" in {name for name, *_ in stated}
+    assert {(row["parameter"], f"{row['size']:.9g}", f"{row['u']:.9g}") for row in at_event} == stated
+    assert {row["at / UTC"] for row in at_event} == {datetime(2026, 3, 5, 4)}
+    (of_b,) = [row["what"] for row in at_event if row["parameter"] == "EB0C"]
+    assert "the event 'zero of B set'" in of_b
+    assert not [row for row in written if row["what"].startswith("no change of any")]

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 
 from monitor import progress
 from monitor.reporting import messages
+from monitor.reporting.health.news import SteppedAtEvent
 from monitor.store import (
     ComputedChange,
     Database,
@@ -16,8 +17,9 @@ from monitor.store import (
     machines_with_runs,
     numbered_by,
 )
+from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
-from monitor.workflow.trend.parameter import dated_change
+from monitor.workflow.trend.parameter import dated_change, dated_drift
 
 
 def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange, ...]:
@@ -29,11 +31,13 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
     rows: list[ComputedChange] = []
     for number, name in enumerate(machines):
         history = machine_history(db, name, followed_by=numbered_by(db, name))
-        past = machine_past(history, splitting_events(machine_events(db, name))) if len(history.run) else {}
+        events = machine_events(db, name)
+        past = machine_past(history, splitting_events(events)) if len(history.run) else {}
         changes = [row for parameter in past.values() for row in _changes(name, parameter)]
-        rows += changes
+        steps = [_at_event(name, step) for step in event_steps(past, events)]
+        rows += [*changes, *steps]
         if not changes and (past or not history.unidentified):
-            rows.append(ComputedChange(name, None, "none", what=_why_none(past)))
+            rows.append(ComputedChange(name, None, "none", what=_why_none(past, beside=bool(steps))))
         if history.unidentified:
             rows.append(ComputedChange(name, None, "not searched", what=_not_identified(history)))
         progress.told((number + 1) / len(machines))
@@ -42,8 +46,9 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
 
 def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
     search = past.search
-    for change in (*search.changes, *search.drifts):
-        dated = dated_change(change, past.series)
+    changes = [dated_change(change, past.series) for change in search.changes]
+    drifts = [dated_drift(change, past) for change in search.drifts]
+    for dated in (*changes, *drifts):
         at = (
             None
             if dated.at is None
@@ -55,9 +60,20 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
         )  # fmt: skip
 
 
-def _why_none(past: dict[str, ParameterPast]) -> str:
+def _at_event(machine: str, step: EventStep) -> ComputedChange:
+    """What a parameter stepped by at a recorded event, in the words of the report; its p-value where it is decided."""
+    what = SteppedAtEvent(
+        step.parameter, step.event.description, step.size, step.u, step.unit, step.undecided, step.drift
+    )
+    return ComputedChange(
+        machine, step.event.at.astimezone(UTC).replace(tzinfo=None), "step at event", step.parameter, step.size,
+        step.u, step.unit, step.p_value if step.decided else None, str(what),
+    )  # fmt: skip
+
+
+def _why_none(past: dict[str, ParameterPast], *, beside: bool) -> str:
     whys = {str(parameter.search.why_none) for parameter in past.values() if parameter.search.why_none}
-    return messages.no_change(len(past), whys)
+    return messages.no_change(len(past), whys, beside=beside)
 
 
 def _not_identified(history: MachineHistory) -> str:
