@@ -152,6 +152,7 @@ if TYPE_CHECKING:
         fleet_sums as fleet_sums,
     )
     from monitor.store.past.history import (
+        FEWEST_STEADY as FEWEST_STEADY,
         CampaignFit as CampaignFit,
         MachineHistory as MachineHistory,
         latest_tolerances as latest_tolerances,
@@ -248,7 +249,8 @@ else:
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
             "save_model",
             "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
-            "past.history": "CampaignFit MachineHistory latest_tolerances machine_history tolerance_types",
+            "past.history": "FEWEST_STEADY CampaignFit MachineHistory latest_tolerances machine_history "
+            "tolerance_types",
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.simulated": "simulated_campaigns",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "

@@ -43,10 +43,14 @@ def test_the_right_error_alone_is_named(virtual_campaigns, trial, explained, fam
     campaign, _ = virtual_campaigns.virtual(4, [hidden], days=2)
     (found,) = explained(campaign).missing
     assert found.effect.partition(":")[0] in right
-    assert found.nearest is not None
     assert found.held_out_after == pytest.approx(1e-3, rel=0.05)
     assert found.held_out_poses_after < found.held_out_poses_before
-    assert len(found.curve.at) > 10
+    if family == "fifth harmonic of C":
+        # Of the shapes that have no name in the catalogue the waves have one.
+        assert found.effect == "ECC:harmonic5"
+    else:
+        assert found.nearest is not None
+        assert len(found.curve.at) > 10
     grown = problem_of(campaign, Model("grown", added=(found.effect,)))
     assert explain(campaign, grown, "grown", rng=np.random.default_rng(1)).missing == ()
 

@@ -36,8 +36,10 @@ def keep(
     name: str,
     parameter: str = "EXX",
     factor: float = 1.0,
+    warm: tuple[int, ...] = (),
 ):
-    """A campaign of so many days with these values of one parameter, a run a value, and its identification."""
+    """A campaign of so many days with these values of one parameter, a run a value, and its identification; ``warm``
+    are the runs in which the machine was warming up."""
     if not db.rows("SELECT 1 FROM registered_machine WHERE machine = ?", [machine]):
         db.execute(
             "INSERT INTO registered_machine SELECT count(*) + 1, ?, 'w C B X b Z Y (C1) t', TIMESTAMP '2026-01-01' "
@@ -60,7 +62,9 @@ def keep(
             START.replace(tzinfo=None) + timedelta(days=7 * number)
         ) + pd.to_timedelta(frame["day"] * 1440 + frame["run"], unit="min")
         db.insert(
-            f'INSERT INTO run SELECT {number}, run, run, "at", 0, day, false, MAP {{}} FROM incoming', frame
+            f'INSERT INTO run SELECT {number}, run, run, "at", 0, day, '
+            f"list_contains({list(warm)}::INTEGER[], run), MAP {{}} FROM incoming",
+            frame,
         )
     own = db.next_number("identification", "identification_id")
     flat = [value for values in days for value in values]
@@ -146,6 +150,22 @@ def test_the_same_as_from_the_values_themselves_for_days_and_campaigns_of_any_si
         assert found.sd_pooled[i] == pytest.approx(pooled.u_pooled[0], rel=1e-10)
         assert found.sd_all[i] == pytest.approx(pooled.u_all[0], rel=1e-10)
         assert sums.origin[i] + sums.latest[i] == pytest.approx(np.mean(values[machine][-1]) / 1e-3)
+
+
+def test_runs_while_warming_up_count_where_few_others_remain(db: Database) -> None:
+    """As `monitor trend` takes them: a last run that reads 16 more is no value of the machine."""
+    for number in range(3):
+        keep(db, "enough", [[2.0, 3.0, 18.0]], f"enough-{number}", warm=(3,))
+        keep(db, "days", [[18.0, 1.0, 3.0], [3.0, 5.0]], f"days-{number}", warm=(1,))
+        keep(db, "few", [[3.0, 18.0]], f"few-{number}", warm=(2,))
+    sums = fleet_sums(db, cut=CUT)
+    latest = dict(zip(sums.machine.tolist(), (sums.origin + sums.latest).tolist(), strict=True))
+    assert latest == pytest.approx({"enough": 2.5, "days": 4.0, "few": 10.5})
+    assert dict(zip(sums.machine.tolist(), sums.groups.tolist(), strict=True)) == {
+        "enough": 3,
+        "days": 6,
+        "few": 3,
+    }
 
 
 def test_drift_from_sums_is_the_straight_line_through_the_days(db: Database) -> None:

@@ -23,6 +23,7 @@ from monitor.group_sums import GroupSums
 from monitor.records import Array
 from monitor.store.connection import Database
 from monitor.store.past import fleet_queries as queries
+from monitor.store.past.history import FEWEST_STEADY
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ def _summed(
     for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
         db.execute(statement)
     model, version = of
-    db.set_variables({"model": model, "version": version})
+    db.set_variables({"model": model, "version": version, "steady": FEWEST_STEADY})
     db.execute(queries.CHOSEN)
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
     if epoch_d is None:

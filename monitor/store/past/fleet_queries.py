@@ -58,11 +58,13 @@ WITH latest AS (
     GROUP BY campaign_id
 ), span AS (
     SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d,
-           epoch(max(started_at)) / 86400.0 AS ended_d
+           epoch(max(started_at)) / 86400.0 AS ended_d, bool_or(warm_up) AS warms,
+           count(*) FILTER (NOT warm_up) AS steady
     FROM run GROUP BY campaign_id
 )
 SELECT CAST(l.identification_id AS INTEGER) AS identification_id, l.campaign_id, n.machine_no, h.heading,
-       s.several_days, s.began_d, s.ended_d
+       s.warms AND sum(s.steady) OVER (PARTITION BY n.machine_no) >= getvariable('steady') AS leaves_out,
+       s.several_days OR leaves_out AS by_runs, s.began_d, s.ended_d
 FROM latest AS l
 JOIN campaign AS c ON c.campaign_id = l.campaign_id
 JOIN span AS s ON s.campaign_id = l.campaign_id
@@ -127,11 +129,12 @@ SELECT campaign_id, avg(degc) AS degc FROM fleet_temperature JOIN counted USING 
 GROUP BY campaign_id, runs HAVING count(*) = runs
 """
 
-# A group is a campaign, or a day of a campaign that has several: `places` are then its runs among those identified.
+# A group is a campaign, or a day of a campaign that has several or runs while warming up, which count in no group where
+# enough others remain, as in `monitor trend`: `places` are then its runs among those identified.
 GROUPS = """
 CREATE OR REPLACE TEMP TABLE fleet_group AS
 SELECT identification_id, campaign_id, machine_no, heading, began_d, ended_d, CAST(NULL AS BIGINT[]) AS places, degc
-FROM fleet_chosen LEFT JOIN fleet_campaign_temperature USING (campaign_id) WHERE NOT several_days
+FROM fleet_chosen LEFT JOIN fleet_campaign_temperature USING (campaign_id) WHERE NOT by_runs
 UNION ALL
 SELECT identification_id, campaign_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
        epoch(max(started_at)) / 86400.0,
@@ -142,7 +145,7 @@ FROM (
            list_position(v.runs, r.run) AS place, d.degc
     FROM fleet_chosen AS c JOIN run AS r USING (campaign_id) JOIN identified_values AS v USING (identification_id)
     LEFT JOIN fleet_temperature AS d ON d.campaign_id = c.campaign_id AND d.run = r.run
-    WHERE c.several_days
+    WHERE c.by_runs AND NOT (c.leaves_out AND r.warm_up)
 )
 GROUP BY identification_id, campaign_id, machine_no, heading, day
 """

@@ -24,6 +24,10 @@ from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
 from monitor.store.type_tolerances import types_in_use
 from monitor.units import CONDITION_SUFFIXES
 
+#: So many runs of a machine have to remain for those while it warms up to be left out: fewer are not searched for
+#: changes.
+FEWEST_STEADY = 6
+
 # Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the heads, which are long.
 _IDENTIFICATIONS = """
 SELECT identification_id

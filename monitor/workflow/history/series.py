@@ -10,12 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.store import MachineHistory
+from monitor.store import FEWEST_STEADY, MachineHistory
 from monitor.units import DEGREE_CELSIUS, column_unit
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
-
-#: So many runs have to remain for those of a warming machine to be left out: fewer are not searched for changes.
-FEWEST_STEADY = 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,11 +83,11 @@ class RivalSearch:
 
 
 def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
-    """The free shape of an effect as that of the other errors of its axis: no scan has these, and with one length of
-    the tool a turn of a head and a shift of it move the tip alike."""
+    """The free shape or the wave of an effect as that of the other errors of its axis: no scan has these (of waves not
+    those of many periods), and with one length of the tool a turn of a head and a shift of it move the tip alike."""
     if (
         not isinstance(effect, ChainEffect)
-        or not isinstance(effect.shape, Free)
+        or not isinstance(effect.shape, Free | Harmonic)
         or effect.term.stage != MOTION
     ):
         return []
