@@ -174,3 +174,19 @@ def test_wrong_shapes_are_refused_in_words() -> None:
         error_falling(ErrorSteps(["a", "b"], [1.0], [1.0], 1.0), title="T")
     with pytest.raises(DataError, match="1 effects need as many values and groups"):
         ranked_effects(RankedEffects(["a"], [1.0, 2.0], [1]), title="T", value_name="v")
+
+
+def test_names_of_many_setups_are_broken_into_lines_before_one_is_left_out() -> None:
+    names = [
+        "laser X",
+        "laser Y",
+        "laser Z",
+        "ball bar XY",
+        "ball bar YZ",
+        "ball bar ZX",
+        "r-test C",
+        "level X",
+    ]
+    figure = residual_bars({"setup": (names, [1.0] * 8), "run": (["1", "2"], [1.0, 1.0])})
+    named = [tick.get_text() for tick in figure.axes[0].get_xticklabels()]
+    assert [" ".join(name.split()) for name in named] == names

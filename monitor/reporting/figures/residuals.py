@@ -116,14 +116,24 @@ def _bars(axes: Axes, rms: Array, marked: npt.NDArray[np.bool_]) -> None:
 def _labelled(labels: list[str], panel_mm: float) -> list[str]:
     """Return what stands under each bar of a panel so wide, "" under those that have no room; a letter takes 1.5 mm.
 
-    A few long names are broken into lines instead.
+    Long names are broken into lines instead where they are few, or have places to break at.
     """
     longest = max(map(len, labels), default=1)
     letters = int(panel_mm / max(len(labels), 1) / 1.5) - 1
-    if len(labels) <= 4 and longest > letters:
-        return [textwrap.fill(label, max(letters, 5)) for label in labels]
+    if longest > letters:
+        broken = [
+            textwrap.fill(label, max(letters, 5), break_long_words=len(labels) <= 4) for label in labels
+        ]
+        if len(labels) <= 4 or _has_room(broken, letters):
+            return broken
     step = max(1, math.ceil(len(labels) * (longest + 1.0) * 1.5 / panel_mm))
     return [label if index % step == 0 else "" for index, label in enumerate(labels)]
+
+
+def _has_room(broken: Sequence[str], letters: int) -> bool:
+    """Whether names broken into lines have at most three, each of so many letters at most."""
+    lines = [name.split("\n") for name in broken]
+    return all(len(of_name) <= 3 and max(map(len, of_name)) <= letters for of_name in lines)
 
 
 @dataclass(frozen=True)
