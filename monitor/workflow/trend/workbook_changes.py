@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 
 from monitor import progress
 from monitor.reporting import messages
-from monitor.reporting.health.news import SteppedAtEvent
 from monitor.store import (
     ComputedChange,
     Database,
@@ -62,12 +61,9 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
 
 def _at_event(machine: str, step: EventStep) -> ComputedChange:
     """What a parameter stepped by at a recorded event, in the words of the report; its p-value where it is decided."""
-    what = SteppedAtEvent(
-        step.parameter, step.event.description, step.size, step.u, step.unit, step.undecided, step.drift
-    )
     return ComputedChange(
         machine, step.event.at.astimezone(UTC).replace(tzinfo=None), "step at event", step.parameter, step.size,
-        step.u, step.unit, step.p_value if step.decided else None, str(what),
+        step.u, step.unit, step.p_value if step.decided else None, str(step.in_words),
     )  # fmt: skip
 
 
