@@ -387,7 +387,12 @@ _CHANGES = {
 
 def change_in_words(kind: str) -> str:
     """Return what a kind of change is, and where it was computed."""
-    return f"{_CHANGES[kind]}; computed from the runs, as `monitor trend` does"
+    return as_trend_computes(_CHANGES[kind])
+
+
+def as_trend_computes(what: str) -> str:
+    """Return what a row of a table says, and where that was computed."""
+    return f"{what}; computed from the runs, as `monitor trend` does"
 
 
 def no_change(parameters: int, whys: Collection[str]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.documents import Said
 from monitor.reporting.frames import referred
-from monitor.reporting.health.news import BallMoved, EventNoted, ParameterChanged, SteppedAtEvent
+from monitor.reporting.health.news import BallMoved, EventNoted, ParameterChanged
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -122,7 +122,7 @@ def changes_noted(
         noted += _settling(parameter, week)
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
-        noted.append(Change(ChangeKind.EVENT_STEP, None, at, _stepped(step), step.p_value, week.holds(at)))
+        noted.append(Change(ChangeKind.EVENT_STEP, None, at, step.in_words, step.p_value, week.holds(at)))
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
@@ -148,19 +148,6 @@ def event_noted(event: MachineEvent, week: Week) -> Change:
     at = event.at.replace(tzinfo=None)
     what = EventNoted(event.kind, event.description)
     return Change(ChangeKind.EVENT, None, at, what, None, week.holds(at))
-
-
-def _stepped(step: EventStep) -> SteppedAtEvent:
-    """What a parameter stepped by at an event, and why that may be no step."""
-    return SteppedAtEvent(
-        step.parameter,
-        step.event.description,
-        step.size,
-        step.u,
-        step.unit,
-        step.undecided,
-        step.drift,
-    )
 
 
 def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,9 @@ from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
+
+if TYPE_CHECKING:
+    from monitor.reporting.health.news import SteppedAtEvent
 
 #: Probability of any stated step at an event where there is none, over all parameters and events of a machine. Larger
 #: than that of the search: when to look is known beforehand, and an event that was recorded may well have changed
@@ -71,6 +75,16 @@ class EventStep:
     def decided(self) -> bool:
         """Whether it is a step."""
         return self.undecided is None
+
+    @property
+    def in_words(self) -> SteppedAtEvent:
+        """The sentence of report and workbook: the size, and why that may be no step."""
+        # Loaded here: most machines have no step at an event, and the report has two dozen kinds of sentences.
+        from monitor.reporting.health.news import SteppedAtEvent
+
+        return SteppedAtEvent(
+            self.parameter, self.event.description, self.size, self.u, self.unit, self.undecided, self.drift
+        )
 
 
 @dataclass(frozen=True)

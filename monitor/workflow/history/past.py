@@ -8,7 +8,7 @@ docs/statistics.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,8 @@ from monitor.workflow.history.series import Series, parameter_series
 class ParameterPast:
     """One parameter: its ``series`` of all runs that have it, ``mask`` (n,) of those among the runs of the machine.
 
-    ``search`` has its changes, ``drift`` the steady runs since the last of them, or since the last event.
+    ``search`` has its changes, ``drift`` the steady runs since the last of them, or since the last event. A drift of
+    these that the search found too has the slope, u and p-value of the line that is stated: one slope has one of each.
     """
 
     series: Series
@@ -42,13 +43,31 @@ def machine_past(history: MachineHistory, events: Sequence[float]) -> dict[str, 
     """The past of every parameter that a run has; ``events`` split it (days since 1970)."""
     every = parameter_series(history)
     searches = search_changes([series.steady for series, _ in every.values()], events)
-    return {
-        name: ParameterPast(series, mask, searches[name], _drift(series.steady, searches[name], events))
-        for name, (series, mask) in every.items()
-    }
+    past = {}
+    for name, (series, mask) in every.items():
+        drift = _drift(series.steady, searches[name], events)
+        past[name] = ParameterPast(series, mask, _as_stated(searches[name], drift), drift)
+    return past
 
 
 def _drift(steady: Series, search: ChangeSearch, events: Sequence[float]) -> PieceDrift:
     """The present piece of history: since the last event or change."""
     moments = [at for at in events if at <= steady.t[-1]] + [change.at for change in search.changes]
     return PieceDrift(steady, max(moments, default=-np.inf))
+
+
+def _as_stated(search: ChangeSearch, drift: PieceDrift) -> ChangeSearch:
+    """The search with the stated line of the present piece in place of the slope that it found there.
+
+    Its own u takes days as independent, so that it is too small where they resemble each other.
+    """
+    line = drift.stated
+    if line is None:
+        return search
+    drifts = tuple(
+        replace(found, size=line.slope, u=line.u_slope, p_value=line.p_value)
+        if found.kind == "trend" and found.at >= drift.begins
+        else found
+        for found in search.drifts
+    )
+    return replace(search, drifts=drifts)

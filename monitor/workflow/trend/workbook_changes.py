@@ -1,4 +1,7 @@
-"""The changes of machines for the sheet `changes` of a workbook: the search of `trend`, whether it was asked or not."""
+"""The changes of machines for the sheet `changes` of a workbook: what `trend` states, whether it was asked or not.
+
+Changes and drifts of the search, and the steps at recorded events, at which the search never looks.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from monitor.store import (
     machines_with_runs,
     numbered_by,
 )
+from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.trend.parameter import dated_change
 
@@ -29,8 +33,10 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
     rows: list[ComputedChange] = []
     for number, name in enumerate(machines):
         history = machine_history(db, name, followed_by=numbered_by(db, name))
-        past = machine_past(history, splitting_events(machine_events(db, name))) if len(history.run) else {}
+        events = machine_events(db, name)
+        past = machine_past(history, splitting_events(events)) if len(history.run) else {}
         changes = [row for parameter in past.values() for row in _changes(name, parameter)]
+        changes += [_at_event(name, step) for step in event_steps(past, events)]
         rows += changes
         if not changes and (past or not history.unidentified):
             rows.append(ComputedChange(name, None, "none", what=_why_none(past)))
@@ -53,6 +59,15 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
             machine, at, dated.kind, past.series.name, dated.size, dated.u, dated.unit, dated.p_value,
             messages.change_in_words(dated.kind),
         )  # fmt: skip
+
+
+def _at_event(machine: str, step: EventStep) -> ComputedChange:
+    """The step at an event; without a p-value where it is not decided, as `trend` says it in words."""
+    return ComputedChange(
+        machine, step.event.at.astimezone(UTC).replace(tzinfo=None), f"step at event: {step.event.kind}",
+        step.parameter, step.size, step.u, step.unit, step.p_value if step.decided else None,
+        messages.as_trend_computes(str(step.in_words)),
+    )  # fmt: skip
 
 
 def _why_none(past: dict[str, ParameterPast]) -> str:
