@@ -385,9 +385,10 @@ _CHANGES = {
 }
 
 
-def change_in_words(kind: str) -> str:
-    """Return what a kind of change is, and where it was computed."""
-    return as_trend_computes(_CHANGES[kind])
+def change_in_words(kind: str, season_not_told: bool) -> str:
+    """Return what a kind of change is, whether a season can be all of a slope, and where it was computed."""
+    what = _CHANGES[kind]
+    return as_trend_computes(f"{what}; {DRIFT_OR_SEASON}" if season_not_told else what)
 
 
 def as_trend_computes(what: str) -> str:

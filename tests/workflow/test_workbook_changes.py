@@ -193,3 +193,6 @@ def test_a_step_at_an_event_and_a_slope_are_those_of_trend(tmp_path: Path) -> No
     assert (found.size, found.u, found.p_value) == stated
     (row,) = [row for row in written if row["machine"] == "DRIFTS"]
     assert (row["kind"], row["size"], row["u"], row["p"]) == ("trend", *map(pytest.approx, stated))
+    assert row["what"] == (
+        "the values drift from here on: size is the slope; computed from the runs, as `monitor trend` does"
+    )

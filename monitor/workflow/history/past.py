@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from monitor.statistics import Change
 from monitor.store import NOTE, MachineEvent, MachineHistory
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.changes import ChangeSearch, search_changes
 from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.history.series import Series, parameter_series
 
 
@@ -32,6 +34,10 @@ class ParameterPast:
     mask: npt.NDArray[np.bool_]
     search: ChangeSearch
     drift: PieceDrift
+
+    def is_maybe_season(self, change: Change) -> bool:
+        """Whether a drift of the present piece that the search found may be a season."""
+        return change.at >= self.drift.begins and self.drift.verdict is SlopeVerdict.DRIFT_OR_SEASON
 
 
 def splitting_events(events: Sequence[MachineEvent]) -> list[float]:
@@ -65,9 +71,9 @@ def _as_stated(search: ChangeSearch, drift: PieceDrift) -> ChangeSearch:
     if line is None:
         return search
     drifts = tuple(
-        replace(found, size=line.slope, u=line.u_slope, p_value=line.p_value)
-        if found.kind == "trend" and found.at >= drift.begins
-        else found
-        for found in search.drifts
+        replace(change, size=line.slope, u=line.u_slope, p_value=line.p_value)
+        if change.kind == "trend" and change.at >= drift.begins
+        else change
+        for change in search.drifts
     )
     return replace(search, drifts=drifts)

@@ -57,7 +57,7 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
         )
         yield ComputedChange(
             machine, at, dated.kind, past.series.name, dated.size, dated.u, dated.unit, dated.p_value,
-            messages.change_in_words(dated.kind),
+            messages.change_in_words(dated.kind, change.kind == "trend" and past.is_maybe_season(change)),
         )  # fmt: skip
 
 
