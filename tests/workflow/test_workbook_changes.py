@@ -196,3 +196,19 @@ def test_a_step_at_an_event_and_a_slope_are_those_of_trend(tmp_path: Path) -> No
     assert row["what"] == (
         "the values drift from here on: size is the slope; computed from the runs, as `monitor trend` does"
     )
+
+
+def test_a_slope_that_may_be_a_season_is_called_so(tmp_path: Path) -> None:
+    """Four months of a wave of a year: `trend` says that drift or season cannot be told apart, the sheet said drift."""
+    rng = np.random.default_rng(3)
+    week = np.arange(18)[:, np.newaxis]
+    wave = -6.0 * np.cos(2.0 * np.pi * week / 52.18) + 0.3 * rng.normal(size=(18, histories.RUNS))
+    with Database(tmp_path / "m.duckdb", threads=1) as db:
+        histories.add_machine(db, "SEASON", {"EXX": wave})
+        export(db, ExportRequest(tmp_path / "m.xlsx", "xlsx", ("changes",)))
+        drift = trend(db, TrendRequest("SEASON")).parameters["EXX"].drift
+    (row,) = rows(tmp_path / "m.xlsx")
+    assert row["what"].startswith(
+        "the values drift from here on: size is the slope; drift or season cannot be told"
+    )
+    assert (row["size"], row["u"]) == pytest.approx((drift.slope_per_year, drift.u_slope), rel=1e-14)
