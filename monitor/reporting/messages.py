@@ -409,9 +409,15 @@ _CHANGES = {
 }
 
 
-def change_in_words(kind: str) -> str:
-    """Return what a kind of change is, and where it was computed."""
-    return f"{_CHANGES[kind]}; computed from the runs, as `monitor trend` does"
+def change_in_words(kind: str, season_not_told: bool) -> str:
+    """Return what a kind of change is, whether a season can be all of a slope, and where it was computed."""
+    what = _CHANGES[kind]
+    return as_trend_computes(f"{what}; {DRIFT_OR_SEASON}" if season_not_told else what)
+
+
+def as_trend_computes(what: str) -> str:
+    """Return what a row of a table says, and where that was computed."""
+    return f"{what}; computed from the runs, as `monitor trend` does"
 
 
 def no_change(parameters: int, whys: Collection[str], *, beside: bool = False) -> str:

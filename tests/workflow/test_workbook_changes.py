@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import openpyxl
 import pytest
+from by_path import load
 
 from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
@@ -21,6 +23,7 @@ from monitor.workflow.keeping import ExportRequest, export
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 
+histories = load("test_trends", Path(__file__).with_name("test_trends.py"))
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 HEAD = ("machine", "at / UTC", "kind", "parameter", "size", "u", "unit of size and u", "p", "what")
 
@@ -153,23 +156,59 @@ def test_an_event_that_is_recorded_already_is_not_recorded_again(db: Database) -
     assert len(recorded) == 4
 
 
-def test_the_sheet_has_what_a_parameter_stepped_by_at_an_event(changed: Database, tmp_path: Path) -> None:
-    """The event stood there without a size, and below it that nothing changed: the search looks between events."""
-    for campaign in CAMPAIGNS:
-        identify(changed, IdentifyRequest(campaign))
-    event(changed, EventRequest("HU40-T", "zero of B set", datetime(2026, 3, 5, 4, tzinfo=UTC), "adjustment"))
-    export(changed, ExportRequest(tmp_path / "after.xlsx", "xlsx", ("changes",)))
-    written = rows(tmp_path / "after.xlsx")
-    followed = trend(changed, TrendRequest("HU40-T")).parameters
-    stated = {
-        (name, f"{step.size:.9g}", f"{step.u:.9g}")
-        for name, each in followed.items()
-        for step in each.event_steps
-    }
-    at_event = [row for row in written if row["kind"] == "step at event"]
-    assert "EB0C" in {name for name, *_ in stated}
-    assert {(row["parameter"], f"{row['size']:.9g}", f"{row['u']:.9g}") for row in at_event} == stated
-    assert {row["at / UTC"] for row in at_event} == {datetime(2026, 3, 5, 4)}
-    (of_b,) = [row["what"] for row in at_event if row["parameter"] == "EB0C"]
-    assert "the event 'zero of B set'" in of_b
-    assert not [row for row in written if row["what"].startswith("no change of any")]
+def test_a_step_at_an_event_and_a_slope_are_those_of_trend(tmp_path: Path) -> None:
+    """The sheet had the event without a size and denied any change, and a slope with a u as of independent days."""
+    rng = np.random.default_rng(7)
+    week = np.arange(histories.WEEKS)[:, np.newaxis]
+    at = histories.START + timedelta(weeks=30, days=-3)
+    runs = (histories.WEEKS, histories.RUNS)
+    # Weeks resemble each other: a random walk that forgets, whose slope is less certain than by independent weeks.
+    days = np.zeros(histories.WEEKS)
+    for index in range(1, histories.WEEKS):
+        days[index] = 0.6 * days[index - 1] + 0.5 * rng.normal()
+    noise = 0.3 * rng.normal(size=runs)
+    with Database(tmp_path / "m.duckdb", threads=1) as db:
+        histories.add_machine(db, "STEPPED", {"EX0C": 12.0 * (week >= 30) + noise})
+        histories.add_machine(db, "DRIFTS", {"EXX": 1.0 * week + days[:, np.newaxis] + noise})
+        event(db, EventRequest("STEPPED", "ran into the vice", at.replace(tzinfo=UTC), "crash"))
+        export(db, ExportRequest(tmp_path / "m.xlsx", "xlsx", ("changes",)))
+        (step,) = trend(db, TrendRequest("STEPPED")).parameters["EX0C"].event_steps
+        drifting = trend(db, TrendRequest("DRIFTS")).parameters["EXX"]
+    written = rows(tmp_path / "m.xlsx")
+    stepped = [row for row in written if row["machine"] == "STEPPED"]
+    assert {row["kind"] for row in stepped} == {"event: crash", "step at event: crash"}
+    (row,) = [row for row in stepped if row["parameter"] == "EX0C"]
+    assert row["at / UTC"] == at
+    assert (row["size"], row["u"], row["p"]) == pytest.approx((step.size, step.u, step.p_value), rel=1e-14)
+    assert step.decided
+    assert abs(row["size"] - 12.0) < 4.0 * row["u"]
+    assert row["what"].startswith("EX0C stepped by +1")
+    assert "at the event 'ran into the vice'" in row["what"]
+
+    (found,) = drifting.drifts
+    stated = (drifting.drift.slope_per_year, drifting.drift.u_slope, drifting.drift.p_value)
+    assert drifting.drift.resemblance is not None
+    assert drifting.drift.resemblance.widening > 1.1
+    assert (found.kind, found.unit, found.p_at_most) == ("trend", "µm/year", None)
+    assert (found.size, found.u, found.p_value) == stated
+    (row,) = [row for row in written if row["machine"] == "DRIFTS"]
+    assert (row["kind"], row["size"], row["u"], row["p"]) == ("trend", *map(pytest.approx, stated))
+    assert row["what"] == (
+        "the values drift from here on: size is the slope; computed from the runs, as `monitor trend` does"
+    )
+
+
+def test_a_slope_that_may_be_a_season_is_called_so(tmp_path: Path) -> None:
+    """Four months of a wave of a year: `trend` says that drift or season cannot be told apart, the sheet said drift."""
+    rng = np.random.default_rng(3)
+    week = np.arange(18)[:, np.newaxis]
+    wave = -6.0 * np.cos(2.0 * np.pi * week / 52.18) + 0.3 * rng.normal(size=(18, histories.RUNS))
+    with Database(tmp_path / "m.duckdb", threads=1) as db:
+        histories.add_machine(db, "SEASON", {"EXX": wave})
+        export(db, ExportRequest(tmp_path / "m.xlsx", "xlsx", ("changes",)))
+        drift = trend(db, TrendRequest("SEASON")).parameters["EXX"].drift
+    (row,) = rows(tmp_path / "m.xlsx")
+    assert row["what"].startswith(
+        "the values drift from here on: size is the slope; drift or season cannot be told"
+    )
+    assert (row["size"], row["u"]) == pytest.approx((drift.slope_per_year, drift.u_slope), rel=1e-14)

@@ -99,7 +99,7 @@ def latest_mean(steady: Series) -> LatestMean:
 def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedChange:
     """A change with its dates; a slope of a short history is stated a day, as ``SHORTEST_DAYS`` says why.
 
-    ``least_p`` is the smallest p-value that the search can say.
+    ``least_p`` is the smallest p-value that the search can say; that of a line may be any.
     """
     slope = change.kind in ("slope", "trend")
     period, days = ("day", 1.0) if np.ptp(series.t) < SHORTEST_DAYS else ("year", DAYS_PER_YEAR)
@@ -113,7 +113,7 @@ def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedC
         p_value=change.p_value,
         days=series.steady.day_count,
         time_constant_days=change.time_constant,
-        p_at_most=True if change.p_value <= least_p else None,
+        p_at_most=True if np.isclose(change.p_value, least_p, rtol=1e-9, atol=0.0) else None,
     )
 
 

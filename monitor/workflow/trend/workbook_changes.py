@@ -1,4 +1,7 @@
-"""The changes of machines for the sheet `changes` of a workbook: the search of `trend`, whether it was asked or not."""
+"""The changes of machines for the sheet `changes` of a workbook: what `trend` states, whether it was asked or not.
+
+Changes and drifts of the search, and the steps at recorded events, at which the search never looks.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +36,8 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         events = machine_events(db, name)
         past = machine_past(history, splitting_events(events)) if len(history.run) else {}
         changes = [row for parameter in past.values() for row in _changes(name, parameter)]
-        steps = [_at_event(name, step) for step in event_steps(past, events)]
-        rows += [*changes, *steps]
+        changes += [_at_event(name, step) for step in event_steps(past, events)]
+        rows += changes
         if not changes and (past or not history.unidentified):
             rows.append(ComputedChange(name, None, "none", what=_why_none(past, beside=bool(steps))))
         if history.unidentified:
@@ -55,19 +58,20 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
         )
         yield ComputedChange(
             machine, at, dated.kind, past.series.name, dated.size, dated.u, dated.unit, dated.p_value,
-            messages.change_in_words(dated.kind),
+            messages.change_in_words(dated.kind, change.kind == "trend" and past.is_maybe_season(change)),
         )  # fmt: skip
 
 
 def _at_event(machine: str, step: EventStep) -> ComputedChange:
-    """What a parameter stepped by at a recorded event, in the words of the report; its p-value where it is decided."""
+    """The step at an event; without a p-value where it is not decided, as `trend` says it in words."""
     return ComputedChange(
-        machine, step.event.at.astimezone(UTC).replace(tzinfo=None), "step at event", step.parameter, step.size,
-        step.u, step.unit, step.p_value if step.decided else None, str(step.in_words),
+        machine, step.event.at.astimezone(UTC).replace(tzinfo=None), f"step at event: {step.event.kind}",
+        step.parameter, step.size, step.u, step.unit, step.p_value if step.decided else None,
+        messages.as_trend_computes(str(step.in_words)),
     )  # fmt: skip
 
 
-def _why_none(past: dict[str, ParameterPast], *, beside: bool) -> str:
+def _why_none(past: dict[str, ParameterPast]) -> str:
     whys = {str(parameter.search.why_none) for parameter in past.values() if parameter.search.why_none}
     return messages.no_change(len(past), whys, beside=beside)
 
