@@ -420,11 +420,10 @@ def as_trend_computes(what: str) -> str:
     return f"{what}; computed from the runs, as `monitor trend` does"
 
 
-def no_change(parameters: int, whys: Collection[str], *, beside: bool = False) -> str:
-    """Return that a search of so many parameters has no change (``beside`` steps at events: no other one), or the
-    reasons why nothing was searched."""
+def no_change(parameters: int, whys: Collection[str]) -> str:
+    """Return that a search of so many parameters has no change, or the reasons why nothing was searched."""
     if not parameters:
         return "no run of this machine has parameters"
     if whys:
         return "; ".join(sorted(whys))
-    return f"no {'other ' if beside else ''}change of any of {parameters} parameters beyond chance"
+    return f"no change of any of {parameters} parameters beyond chance"

@@ -23,7 +23,6 @@ from monitor.statistics import (
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
-from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import (
     ConditionEffect,
@@ -115,17 +114,6 @@ def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedC
         time_constant_days=change.time_constant,
         p_at_most=True if np.isclose(change.p_value, least_p, rtol=1e-9, atol=0.0) else None,
     )
-
-
-def dated_drift(change: Change, past: ParameterPast) -> DatedChange:
-    """A drift with its dates; of the present piece of history with the slope, u and p of the line that is stated of it,
-    which allows for days that resemble each other (the search takes runs or days as they come)."""
-    dated = dated_change(change, past.series, past.search.least_p)
-    line = past.drift.line
-    if change.kind != "trend" or line is None or change.at < past.drift.begins:
-        return dated
-    days = DAYS_PER_YEAR if dated.unit.endswith("/year") else 1.0
-    return replace(dated, size=line.slope * days, u=line.u_slope * days, p_value=line.p_value, p_at_most=None)
 
 
 def conditions(

@@ -51,7 +51,6 @@ from monitor.workflow.trend.parameter import (
     conditions,
     cycles,
     dated_change,
-    dated_drift,
     drift_statement,
     latest_mean,
 )
@@ -311,7 +310,7 @@ class _Page:
             drift=drift_statement(drift),
             mean=latest_mean(drift.whole),
             changes=tuple(dated_change(change, series, search.least_p) for change in search.changes),
-            drifts=tuple(dated_drift(change, past) for change in search.drifts),
+            drifts=tuple(dated_change(change, series, search.least_p) for change in search.drifts),
             why_no_changes=search.why_none,
             conditions=effects,
             why_no_conditions=why_no_effects,

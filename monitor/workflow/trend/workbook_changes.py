@@ -21,7 +21,7 @@ from monitor.store import (
 )
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
-from monitor.workflow.trend.parameter import dated_change, dated_drift
+from monitor.workflow.trend.parameter import dated_change
 
 
 def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange, ...]:
@@ -39,7 +39,7 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         changes += [_at_event(name, step) for step in event_steps(past, events)]
         rows += changes
         if not changes and (past or not history.unidentified):
-            rows.append(ComputedChange(name, None, "none", what=_why_none(past, beside=bool(steps))))
+            rows.append(ComputedChange(name, None, "none", what=_why_none(past)))
         if history.unidentified:
             rows.append(ComputedChange(name, None, "not searched", what=_not_identified(history)))
         progress.told((number + 1) / len(machines))
@@ -48,9 +48,8 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
 
 def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
     search = past.search
-    changes = [dated_change(change, past.series) for change in search.changes]
-    drifts = [dated_drift(change, past) for change in search.drifts]
-    for dated in (*changes, *drifts):
+    for change in (*search.changes, *search.drifts):
+        dated = dated_change(change, past.series)
         at = (
             None
             if dated.at is None
@@ -73,7 +72,7 @@ def _at_event(machine: str, step: EventStep) -> ComputedChange:
 
 def _why_none(past: dict[str, ParameterPast]) -> str:
     whys = {str(parameter.search.why_none) for parameter in past.values() if parameter.search.why_none}
-    return messages.no_change(len(past), whys, beside=beside)
+    return messages.no_change(len(past), whys)
 
 
 def _not_identified(history: MachineHistory) -> str:
