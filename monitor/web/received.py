@@ -94,6 +94,9 @@ def received(question: str, body: Body, folder: Path) -> ReceivedQuestion:
     for room in (asked.incoming, asked.outgoing):
         room.mkdir()
         asked.label(room, ".")
+    if not asked.is_parcel:
+        # Whoever sends files has no folder of that name, and reads who was refused.
+        asked.labels[str(asked.incoming)] = "the upload"
     body.content.seek(0)
     if asked.is_parcel:
         unpack_zip("the parcel", body.content, asked.incoming)

@@ -244,6 +244,7 @@ def test_a_folder_is_imported_as_a_zip_and_a_bad_one_is_refused_with_every_fault
     answer = local.client.post("/api/v1/import", files={"file": ("bad.zip", bad)})
     assert answer.status_code == 422
     assert "nothing of it was kept" in answer.json()["error"]
+    assert not answer.json()["error"].startswith(".")
     assert all("runs.csv" in fault or "probings.csv" in fault for fault in answer.json()["faults"])
     assert "/served" not in answer.text  # no path of the server
     good = local.client.post(
