@@ -53,7 +53,9 @@ class ReceivedQuestion:
 
     def label(self, path: Path, label: str) -> None:
         """Let texts say ``label`` instead of a path, joined as pathlib does: what is in "." is named without it."""
-        self.labels |= {f"{path}/": "" if label == "." else f"{label.rstrip('/')}/", str(path): label}
+        # Whoever sends files has no folder of that name, and reads who was refused.
+        itself = "the upload" if path == self.incoming and not self.is_parcel else label
+        self.labels |= {f"{path}/": "" if label == "." else f"{label.rstrip('/')}/", str(path): itself}
 
     def written(self) -> list[Path]:
         """Return the files that the question wrote."""
@@ -94,9 +96,6 @@ def received(question: str, body: Body, folder: Path) -> ReceivedQuestion:
     for room in (asked.incoming, asked.outgoing):
         room.mkdir()
         asked.label(room, ".")
-    if not asked.is_parcel:
-        # Whoever sends files has no folder of that name, and reads who was refused.
-        asked.labels[str(asked.incoming)] = "the upload"
     body.content.seek(0)
     if asked.is_parcel:
         unpack_zip("the parcel", body.content, asked.incoming)

@@ -10,6 +10,7 @@ import pytest
 from monitor.exceptions import DataError, InputError
 from monitor.readers import read_campaign
 from monitor.workflow.campaign_parts import method_of, runs_before
+from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -37,3 +38,5 @@ def test_a_result_says_whose_clock_decided_its_runs() -> None:
 def test_a_probability_that_no_region_is_stated_for_is_refused(p: float) -> None:
     with pytest.raises(InputError, match=r"a coverage probability lies between 0\.5 and 0\.9999"):
         UncertaintyRequest("five-days", p=p)
+    with pytest.raises(InputError, match=r"a coverage probability lies between 0\.5 and 0\.9999"):
+        PlanRequest("five-days", p=p)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.methods.planning.search import MOST_BALLS
+from monitor.workflow.uncertainty.request import COVERAGE, check_coverage
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,13 @@ class PlanRequest:
     poses: int | None = None
     wanted: Mapping[str, float] = field(default_factory=dict)
     separate: tuple[str, str] | None = None
-    p: float = 0.95
+    p: float = COVERAGE
     figures: Path | None = None
     keep: tuple[int, ...] = ()
     parameters: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_coverage(self.p)
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
         if self.wanted and (self.balls is not None or self.poses is not None):

@@ -27,6 +27,14 @@ def holds_for(word: str | None) -> HoldsFor | None:
     return None if word is None else HoldsFor(word)
 
 
+def check_coverage(p: float) -> None:
+    """Raise InputError for a coverage probability that no region is stated for."""
+    if not LEAST_COVERAGE <= p <= MOST_COVERAGE:
+        raise InputError(
+            f"-p {p}: a coverage probability lies between {LEAST_COVERAGE} and {MOST_COVERAGE}; 0.95 is usual"
+        )
+
+
 @dataclass(frozen=True)
 class Asked:
     """What decides the numbers of an evaluation by the GUM framework besides run and model; stored with its answer.
@@ -80,10 +88,7 @@ class UncertaintyRequest:
             raise InputError(f"--digits {self.digits}: choose 1 to 4 significant digits")
         if not 0 <= self.seed < 2**63:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
-        if not LEAST_COVERAGE <= self.p <= MOST_COVERAGE:
-            raise InputError(
-                f"-p {self.p}: a coverage probability lies between {LEAST_COVERAGE} and {MOST_COVERAGE}; 0.95 is usual"
-            )
+        check_coverage(self.p)
         holds_for(self.holds_for)
 
     @property

@@ -20,8 +20,8 @@ class VolumetricRequest:
     """The volumetric error of one ``run`` (the last by default) on a grid of ``points`` along every linear axis.
 
     The workpiece's zero is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``. Runs
-    that began at or after ``before`` (local time without a zone) take no part. Slices are drawn into the folder
-    ``figures``; tables of the format ``compensation`` are written into the folder ``out``.
+    that began at or after ``before`` (with an offset, or by the clock of the shop) take no part. Slices are drawn into
+    the folder ``figures``; tables of the format ``compensation`` are written into the folder ``out``.
 
     Raises InputError for a number of points or a format that there is not.
     """
