@@ -22,7 +22,14 @@ import pytest
 CHECKOUT = Path(__file__).resolve().parents[2]
 HERE = "--here"  # run pytest in this process, which has the other version
 
-OF_THE_LAKE = ("tests/store/test_lake.py", "tests/store/test_torn_catalogue.py", "tests/store/lake")
+OF_THE_LAKE = (
+    "tests/store/test_lake.py",
+    "tests/store/test_torn_catalogue.py",
+    "tests/store/test_object_store.py",
+    "tests/store/lake",
+)
+# What a wheel holds is no matter of the engine, and the checkout is found here by its path alone.
+OF_THE_WHEEL = ("tests/test_wheel.py",)
 
 # Tests that fail with DuckDB 2.0, by their beginnings, and why (docs/reliability.md).
 DIFFERENT = {
@@ -82,7 +89,13 @@ def run_here(arguments: list[str]) -> int:
     """Run pytest with the DuckDB of this process; return the status."""
     watch = AtOnce()
     status = pytest.main(
-        ["-p", "no:cacheprovider", "--tb=short", *(f"--ignore={file}" for file in OF_THE_LAKE), *arguments],
+        [
+            "-p",
+            "no:cacheprovider",
+            "--tb=short",
+            *(f"--ignore={file}" for file in (*OF_THE_LAKE, *OF_THE_WHEEL)),
+            *arguments,
+        ],
         plugins=[watch],
     )
     listed = {name for name in watch.ran if name.startswith(tuple(DIFFERENT))}
@@ -101,7 +114,8 @@ def main() -> int:
     version, arguments = (sys.argv[1], sys.argv[2:]) if len(sys.argv) > 1 else ("", [])
     with tempfile.TemporaryDirectory() as folder:
         python = environment(Path(folder), f"duckdb=={version}" if version else "duckdb")
-        command = [python, "-u", __file__, HERE, "-n", "0", *arguments]
+        at_once = ["-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
+        command = [python, "-u", __file__, HERE, *at_once, *arguments]
         return subprocess.run(command, cwd=CHECKOUT, check=False).returncode
 
 
