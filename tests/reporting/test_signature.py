@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import pypdf
 import pytest
 from by_path import load
+from weasyprint import HTML
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import CertificateRecord
@@ -154,6 +156,40 @@ def _dark_dots(file: Path, page: str) -> int:
     run = ["pdftoppm", "-r", "72", "-gray", "-f", page, "-l", page, str(file)]
     picture = subprocess.run(run, capture_output=True, check=True).stdout
     return sum(value < 200 for value in picture[15:])
+
+
+def _container(signed: bytes) -> tuple[int, str]:
+    """Where the hexadecimal digits of the signature's container begin in a file, and all of them but its zeros."""
+    (room,) = re.finditer(rb"/Contents <([0-9a-fA-F]{1000,})>", signed)
+    return room.start(1), room[1].rstrip(b"0").decode("ascii").lower()
+
+
+def _digits_that_stay(signed: bytes, start: int, digits: Iterable[int]) -> list[int]:
+    """The digits whose change by one bit is not seen."""
+    unseen = []
+    for digit in digits:
+        altered = bytearray(signed)
+        altered[start + digit] ^= 1
+        if check_signature(bytes(altered)).good:
+            unseen.append(digit)
+    return unseen
+
+
+def test_rfc_5652_labels_of_the_container_that_no_signature_covers_are_seen_when_they_change(
+    keys: dict[str, Path],
+) -> None:
+    signed = sign(HTML(string="<p>A page.</p>").write_pdf(), FileKey(keys["lab"], "words"))
+    start, container = _container(signed)
+    # SHA-256 with its parameter NULL: in the set of digests, behind its version; in the signer's own record, behind
+    # the name and the serial number (7) of his certificate.
+    algorithm = "300d06096086480165030402010500"
+    of_set, of_signer = (found.start() for found in re.finditer(algorithm, container))
+    last = len(algorithm) - 1
+    assert container[of_set - 5] == "1"
+    assert container[of_signer - 6 : of_signer] == "020107"
+    labels = [4, 6, of_set - 5, of_set - 3, of_set + 8, of_set + last - 2, of_set + last]
+    labels += [of_signer - 1, of_signer - 8, of_signer - 9, of_signer + last - 2, of_signer + last]
+    assert _digits_that_stay(signed, start, labels) == []
 
 
 def test_an_altered_attachment_is_seen_and_named_as_altered(plain: bytes, signed: bytes) -> None:

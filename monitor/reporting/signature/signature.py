@@ -16,6 +16,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.signature.long_term import LongTermMaterial, material_in
 from monitor.reporting.signature.signer import Signer
 from monitor.reporting.signature.trust import TrustedSigners, read_trusted
+from monitor.reporting.signature.uncovered import uncovered_is_exact
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.
 _MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Sig")
@@ -79,13 +80,13 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
             signature.signer_cert.not_valid_before,
             signature.signer_cert.not_valid_after,
         )
-        clean = _room_is_clean(pdf, [int(number) for number in signature.byte_range])
+        exact = uncovered_is_exact(pdf, signature)
         stamped_at = _time_of_stamp(status)
         material = material_in(reader, signature, signers, stamped_at)
     except Exception as error:  # an altered file breaks the reader in as many ways as there are bytes
         message = f"the file's signature cannot be read: {_message(error)}: altered"
         return SignatureFinding(False, None, (message,))
-    faults = _faults_of_file(status, clean)
+    faults = _faults_of_file(status, exact)
     proven_at = _proven_at(material, stamped_at, moment)
     is_trusted = status.trusted or certificate.signer.sha256 in signers.fingerprints or proven_at is not None
     if trusted is not None:
@@ -144,13 +145,13 @@ def _without_signature(pdf: bytes) -> SignatureFinding:
     return SignatureFinding(False, None, (message,))
 
 
-def _faults_of_file(status: Any, clean: bool) -> list[str]:
+def _faults_of_file(status: Any, exact: bool) -> list[str]:
     from pyhanko.sign.validation.status import SignatureCoverageLevel
 
     whole = status.coverage == SignatureCoverageLevel.ENTIRE_FILE and status.docmdp_ok
     checks = (
         (status.intact, "the file was altered after it was signed"),
-        (clean, "the room that the signature leaves unsigned was altered"),
+        (exact, "the room that the signature leaves unsigned was altered"),
         (status.valid, "the signature does not fit its certificate"),
         (whole, "the signature does not cover the whole file: something was added afterwards"),
     )
@@ -164,22 +165,6 @@ def _faults_of_signer(is_trusted: bool, certificate: _Certificate, moment: datet
             f"the certificate of {signer} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
         ]
     return [] if is_trusted else [f"the certificate of {signer} does not lead to a trusted one"]
-
-
-def _room_is_clean(pdf: bytes, covered: list[int]) -> bool:
-    """Return whether the part that no signature can cover, its own, holds it and zeros alone (ISO 32000-2, 12.8.1).
-
-    Without this a byte behind the signature, or the case of one of its hexadecimal digits, could be changed unseen.
-    """
-    start, length, after, _ = covered
-    room = pdf[start + length : after]
-    digits = room[1:-1]
-    content = bytes.fromhex(digits.decode("ascii"))
-    # DER: the length of the outermost SEQUENCE, in the short form or with so many octets (ITU-T X.690, 8.1.3).
-    octets = content[1] & 0x7F if content[1] & 0x80 else 0
-    size = int.from_bytes(content[2 : 2 + octets], "big") if octets else content[1]
-    exact = content[: 2 + octets + size].hex().ljust(len(digits), "0").encode("ascii")
-    return room[:1] == b"<" and room[-1:] == b">" and digits in (exact, exact.upper())
 
 
 def signer_in(certificate: Any) -> Signer:
