@@ -153,8 +153,10 @@ def test_a_limit_of_an_axis_that_the_machine_has_not_is_said_beside_those_that_h
         said := typed("trend", "HU40-T", db=db).out
     )
     assert "did you mean 'EB0C'?" in said
+    assert "HU40-T: the limit EB0C9 of the machine type 'HU40-T' in the" in typed("fleet", db=db).out
     configured('[tolerances."HU40-T"]\nEA0B = 5\nEXX = 5\n')
     assert "of no parameter" not in typed("trend", "HU40-T", db=db).out
+    assert "limits_without_parameter" not in typed("fleet", "--json", db=db).document
 
 
 @pytest.mark.parametrize(

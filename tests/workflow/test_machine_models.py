@@ -187,6 +187,26 @@ def test_a_limit_of_an_effect_is_read_kept_and_refused_where_there_is_no_such_ef
         assert dict(load_campaign(db, "five-days").machine.tolerances) == limits
 
 
+def test_limits_of_a_type_that_hold_for_no_parameter_are_named_by_fleet_and_report(worn: Database) -> None:
+    use_model(worn, UseModelRequest("with-backlash", "V", WHY))
+    worn.type_tolerances = {"*": {"EB0C9": 5.0}}
+    try:
+        said = fleet(worn, FleetRequest()).limits_without_parameter
+        (name,) = [machine for machine in named_machines(worn) if machine.machine == "V"]
+        last = machine_runs(worn, "V")[-1]
+        past = read_week(worn, name, week_of(last.local_start.date()), ReportOptions())
+        health = machine_health(worn, past, computed(past.task))
+    finally:
+        worn.type_tolerances = {}
+    assert said is not None
+    assert "W" not in said  # its campaign states its own
+    (sentence,) = said["V"]
+    assert sentence.startswith(
+        "no limit holds: the machine type '*' in the configuration limits EB0C9, of which"
+    )
+    assert sentence in [str(remark) for remark in health.quality.remarks]
+
+
 def test_an_effect_beyond_its_limit_alarms_in_trend_fleet_and_report(worn: Database) -> None:
     """The last month has 2.0 + 8 * 0.8 = 8.4 µm of 7; the probability is that of a normal law, by scipy."""
     use_model(worn, UseModelRequest("with-backlash", "V", WHY))

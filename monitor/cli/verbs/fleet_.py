@@ -117,8 +117,7 @@ def _say_of_machines(answer: FleetAnswer) -> None:
     for machine, groups in list((answer.same_hours or {}).items())[:MOST_NAMED]:
         for campaigns in groups:
             output.say(campaigns_of_same_hours(machine, campaigns))
-    for machine, name in (answer.tolerances_of_type or {}).items():
-        output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
+    _say_of_limits(answer)
     if answer.simulated:
         output.say(machines_simulated(answer.simulated, MOST_NAMED))
     if answer.models_refuted:
@@ -126,6 +125,15 @@ def _say_of_machines(answer: FleetAnswer) -> None:
         output.say(machines_refuted(latest, MOST_NAMED))
     if answer.models_lacking:
         output.say(machines_lacking(answer.models_lacking, MOST_NAMED))
+
+
+def _say_of_limits(answer: FleetAnswer) -> None:
+    """Say of which machine type the limits of machines are, and which of them hold for none of their parameters."""
+    for machine, name in (answer.tolerances_of_type or {}).items():
+        output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
+    for machine, sentences in list((answer.limits_without_parameter or {}).items())[:MOST_NAMED]:
+        for sentence in sentences:
+            output.say(f"{machine}: {sentence}")
 
 
 def _cells(row: FleetTableRow, same_hours: Container[str]) -> list[str]:

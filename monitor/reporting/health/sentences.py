@@ -112,6 +112,16 @@ class TolerancesOfType(Sentence):
 
 
 @dataclass(frozen=True)
+class LimitsWithoutParameter(Sentence):
+    """Limits of the type of a machine are of none of its parameters: ``sentence`` says which."""
+
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+@dataclass(frozen=True)
 class LimitWithoutMap(Sentence):
     """The volumetric error has a limit and no map that it could be judged by."""
 

@@ -30,7 +30,7 @@ def _container(signature: Any) -> bytes:
     """Return the DER encoding of a signature's container with all labels as they follow from what is signed."""
     from asn1crypto import cms
 
-    data, signer, certificate = signature.signed_data, signature.signer_info, signature.signer_cert
+    signed, signer, certificate = signature.signed_data, signature.signer_info, signature.signer_cert
     digest = {"algorithm": signer["digest_algorithm"]["algorithm"].native}
     named = {"issuer": certificate.issuer, "serial_number": certificate.serial_number}
     record = cms.SignerInfo(
@@ -46,7 +46,7 @@ def _container(signature: Any) -> bytes:
             "version": "v1",
             "digest_algorithms": [digest],
             "signer_infos": [record],
-            **_present(data, _OF_CONTAINER),
+            **_present(signed, _OF_CONTAINER),
         }
     )
     container: bytes = cms.ContentInfo({"content_type": "signed_data", "content": content}).dump()

@@ -267,6 +267,7 @@ def routes() -> APIRouter:
             not_identified=() if answer is None else answer.not_identified,
             older=_older(answer),
             simulated=() if answer is None else answer.simulated or (),
+            without_parameter=() if answer is None else list((answer.limits_without_parameter or {}).items())[:10],
         )  # fmt: skip
 
     @router.post("/fleet/identify")

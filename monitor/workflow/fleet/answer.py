@@ -79,7 +79,8 @@ class FleetAnswer:
     have no part in it. ``older_versions`` by machine say where these are of an older version than the newest of the
     method's own model, as not all of its campaigns were identified by that yet. ``left_out`` names by machine with
     numbers the campaigns that have no part in them. ``tolerances_of_type`` names the machine
-    type by machine, where its campaign states no tolerances.
+    type by machine, where its campaign states no tolerances; ``limits_without_parameter`` says by machine which of that
+    type's limits are of none of its parameters.
     ``without_numbers`` are machines of which no run has numbers, which no row stands for; not said of a model that was
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
@@ -97,6 +98,7 @@ class FleetAnswer:
     table: tuple[FleetTableRow, ...]
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
+    limits_without_parameter: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     models_refuted: Mapping[str, RefutedCampaign] | None = field(default=None, metadata=OMITTED)
     models_lacking: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
     without_numbers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -47,6 +47,7 @@ from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.steps import split_times
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.forecast import NEXT_CHECK_D
+from monitor.workflow.history.limits_of_type import limits_without_parameter_by_machine
 from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
 from monitor.workflow.history.runs import overlapping
 from monitor.workflow.models import label_of, resolve
@@ -167,6 +168,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         table=_shown(db, [row for _, _, row in measured[:most]]),
         weekly_looks=noticed,
         tolerances_of_type=tolerance_types(db) or None,
+        limits_without_parameter=_limits_without_parameter(db, sums) or None,
         models_refuted=_refuted(db, request.model) or None,
         simulated=simulated_campaigns(db) or None,
         same_hours=_same_hours(sums.same_hours) or None,
@@ -194,6 +196,16 @@ def _by_their_own_models(db: Database, model: str | None, numbered: Container[st
         "without_numbers": _without_numbers(db, numbered) or None,
         "older_versions": _older_versions(db) or None,
     }
+
+
+def _limits_without_parameter(db: Database, sums: FleetSums) -> dict[str, tuple[str, ...]]:
+    """Return by machine what is said of limits of its type that are of none of its parameters."""
+    if not db.type_tolerances:
+        return {}
+    parameters: dict[str, list[str]] = {}
+    for machine, parameter in zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True):
+        parameters.setdefault(machine, []).append(parameter)
+    return limits_without_parameter_by_machine(db, parameters)
 
 
 def _older_versions(db: Database) -> dict[str, tuple[OlderVersion, ...]]:

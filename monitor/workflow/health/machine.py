@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 
@@ -11,7 +11,13 @@ from monitor.methods import Unable, method_named
 from monitor.records import VOLUMETRIC
 from monitor.reporting.health.news import CheckKind, NextCheck, NotMeasured
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
-from monitor.reporting.health.sentences import LimitWithoutMap, MachineNamed, RunNamed, TolerancesOfType
+from monitor.reporting.health.sentences import (
+    LimitsWithoutParameter,
+    LimitWithoutMap,
+    MachineNamed,
+    RunNamed,
+    TolerancesOfType,
+)
 from monitor.reporting.plain_names import plain_name
 from monitor.reporting.run_notes import SimulatedNoted
 from monitor.store import (
@@ -61,6 +67,7 @@ from monitor.workflow.health.verdict import (
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.forecast import drift_forecast
+from monitor.workflow.history.limits_of_type import limits_without_parameter
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.refuted import is_refuted
 from monitor.workflow.history.runs import only_runs
@@ -157,7 +164,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     history = machine_history(db, past.name.machine, model=model.name, version=model.version)
     history = only_runs(history, past.runs)
     parameter_pasts = machine_past(history, splitting_events(past.events))
-    limits = _limits(db, last.campaign, remarks)
+    limits = _limits(db, last.campaign, parameter_pasts, remarks)
     limit_um = limits.get(VOLUMETRIC)
     beyond = None if limit_um is None else _beyond(results, limit_um, remarks)
     added = [name for name in parameter_pasts if name.startswith(model.effects)]
@@ -229,11 +236,15 @@ def _refuted_p(history: MachineHistory, measured: MeasuredWeek) -> float | None:
     return fit.lack_of_fit_p
 
 
-def _limits(db: Database, campaign: str, remarks: list[Said]) -> dict[str, float]:
-    """The tolerances by which a machine is judged; a remark where they are those of its type."""
+def _limits(
+    db: Database, campaign: str, parameters: Collection[str], remarks: list[Said]
+) -> dict[str, float]:
+    """The tolerances by which a machine is judged; with remarks on those of its type."""
     of_type = type_in_use(db, campaign)
     if of_type is not None:
         remarks.append(TolerancesOfType(of_type.name, campaign))
+        without = limits_without_parameter(of_type.name, of_type.limits, parameters)
+        remarks += [LimitsWithoutParameter(sentence) for sentence in without]
     return campaign_tolerances(db, campaign)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -28,12 +28,12 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
-from monitor.store.type_tolerances import ANY_TYPE
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.forecast import NEXT_CHECK_D
+from monitor.workflow.history.limits_of_type import limits_without_parameter
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
@@ -211,25 +211,10 @@ def _limits_of_type(db: Database, history: MachineHistory, past: Collection[str]
     name = tolerance_types(db).get(history.machine)
     if name is None:
         return ()
-    limits = db.type_tolerances[name]
-    if past is None or not {VOLUMETRIC, *past}.isdisjoint(limits):
-        astray = {} if past is None or name == ANY_TYPE else _of_no_axis(limits, past)
-        return (
-            messages.limits_of_type(name),
-            *(messages.limit_of_no_axis(name, limit, hint) for limit, hint in astray.items()),
-        )
-    hint = next(filter(None, (did_you_mean(limit, past) for limit in limits)), "")
-    return (messages.limits_of_others(name, tuple(limits), hint),)
-
-
-def _of_no_axis(limits: Iterable[str], past: Collection[str]) -> dict[str, str]:
-    """What was meant by each limit of an axis that no parameter of ``past`` is of, where a parameter is close to it."""
-    # Loaded here: most places state no tolerances by type, and have no need of the readers.
-    from monitor.readers.machine_file import TERM
-
-    axes = {term[3] for parameter in past if (term := TERM.fullmatch(parameter))}
-    astray = [limit for limit in limits if (term := TERM.fullmatch(limit)) and term[3] not in axes]
-    return {limit: hint for limit in astray if (hint := did_you_mean(limit, past))}
+    without = () if past is None else limits_without_parameter(name, db.type_tolerances[name], past)
+    if past is not None and {VOLUMETRIC, *past}.isdisjoint(db.type_tolerances[name]):
+        return without
+    return (messages.limits_of_type(name), *without)
 
 
 def _simulated(db: Database, history: MachineHistory) -> tuple[str, ...]:
