@@ -90,6 +90,15 @@ def test_a_unidirectional_test_begins_each_run_in_its_direction() -> None:
     assert np.isnan([answer.figures.reversal, answer.figures.repeatability_backward]).all()
 
 
+@pytest.mark.parametrize(
+    "position",
+    [[0, 300, 60, 240, 120, 180, 0, 300], [0, 2, 0, 2, 1], [0, 500, 1000, 0, 1000, 0, 1000, 500, 0]],
+)
+def test_a_jump_that_is_no_return_between_runs_is_an_approach(position: list[int]) -> None:
+    approached = directions_of_approach(np.array(position, dtype=float))
+    np.testing.assert_array_equal(approached[1:], np.sign(np.diff(position)))
+
+
 def test_a_reading_that_is_missing_turns_no_direction() -> None:
     """Forward to 4 and back, with 2 missing on the way back, then with the far end read once."""
     np.testing.assert_array_equal(
@@ -173,6 +182,20 @@ def test_hysteresis_is_of_what_both_senses_passed() -> None:
     angles = np.deg2rad(np.concatenate([there, back]))
     answer = evaluated(10.0 * np.cos(2.0 * angles), angles)
     assert answer.hysteresis == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("points", [720, 730, 1080])
+def test_hysteresis_of_turns_that_overlap_does_not_hang_on_the_jitter_of_their_angles(points: int) -> None:
+    """Two to three turns in each sense, whose stops lie 0.01 degrees beside each other, and 4 um up and down between
+    the senses over 20 degrees."""
+    rng = np.random.default_rng(points)
+    there = np.deg2rad(np.arange(points))
+    angles = np.concatenate([there, there[-1] + np.deg2rad(0.5) - there])
+    angles += np.deg2rad(0.01) * rng.standard_normal(2 * points)
+    sense = np.repeat([1.0, -1.0], points)
+    apart = np.where(np.abs(np.degrees(angles) % 360.0 - 100.0) < 10.0, 4.0 * sense, 0.0)
+    answer = evaluated(apart + 0.01 * rng.standard_normal(2 * points), angles)
+    assert answer.hysteresis == pytest.approx(8.0, abs=0.1)
 
 
 def test_the_minimum_zone_is_no_wider_than_the_least_squares_zone_and_both_hold_the_path() -> None:

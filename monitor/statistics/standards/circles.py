@@ -134,7 +134,8 @@ def _difference(angle: Array, centred: Array, sense: Array) -> Array:
     order = np.argsort(angle[second] % (2.0 * np.pi), kind="stable")
     places = (angle[second] % (2.0 * np.pi))[order]
     values = centred[:, second][:, order]
-    usual = float(np.median(np.diff(np.unique(np.round(places, 6)))))
+    # By the order of measuring: turns that overlap have neighbours no further apart than their jitter.
+    usual = float(np.median(np.abs(np.diff(np.unwrap(angle[second])))))
     places = np.concatenate([places[-1:] - 2.0 * np.pi, places, places[:1] + 2.0 * np.pi])
     values = np.concatenate([values[:, -1:], values, values[:, :1]], axis=1)
     right = np.clip(np.searchsorted(places, at), 1, len(places) - 1)

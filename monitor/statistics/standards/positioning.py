@@ -63,15 +63,18 @@ def directions_of_approach(position: Array) -> npt.NDArray[np.int64]:
 
     A position that repeats the one before was left and approached again from beyond, in the direction of the next
     move (ISO 230-2, figure 1: bi-directional runs turn beyond the end); so is the first, and one to which the axis
-    returned across half of the targets without a reading, before it went the other way: there a run of a
-    unidirectional test begins. Raises InputError where nothing moves.
+    returned across half of the targets without a reading, between runs of shorter steps the other way: there a run of
+    a unidirectional test begins. Raises InputError where nothing moves.
     """
     move = np.sign(np.diff(position))
     if not np.any(move):
         raise InputError("all positions are the same; a test of positioning needs two or more")
     targets, number = np.unique(position, return_inverse=True)
     across = np.abs(np.diff(number))
-    is_return = (across > len(targets) / 2.0) & (across > 1) & (move * np.append(move[1:], 0.0) < 0.0)
+    is_jump = (across > len(targets) / 2.0) & (across > 1)
+    step = np.where(is_jump, 0.0, move)
+    before, behind = np.concatenate([-move[:1], step[:-1]]), np.append(step[1:], 0.0)
+    is_return = is_jump & (move * before < 0.0) & (move * behind < 0.0)
     direction = np.concatenate([[0.0], np.where(is_return, 0.0, move)])
     following = 0.0
     for index in range(len(direction) - 1, -1, -1):
