@@ -168,6 +168,16 @@ def test_runs_while_warming_up_count_where_few_others_remain(db: Database) -> No
     }
 
 
+def test_steady_runs_of_another_parameter_do_not_count(db: Database) -> None:
+    """Of EXX two runs in four are steady, too few to leave the others out, whatever was measured of EYY."""
+    for number in range(2):
+        keep(db, "M", [[1.0, 1.0, 1.0]], f"y-{number}", parameter="EYY")
+        keep(db, "M", [[2.0, 18.0]], f"x-{number}", warm=(2,))
+    sums = fleet_sums(db, cut=CUT)
+    latest = dict(zip(sums.parameter.tolist(), (sums.origin + sums.latest).tolist(), strict=True))
+    assert latest["EXX"] == pytest.approx(10.0)
+
+
 def test_drift_from_sums_is_the_straight_line_through_the_days(db: Database) -> None:
     rng = np.random.default_rng(5)
     means = 3.0 + rng.normal(size=8)

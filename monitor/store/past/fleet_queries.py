@@ -61,15 +61,27 @@ WITH latest AS (
            epoch(max(started_at)) / 86400.0 AS ended_d, bool_or(warm_up) AS warms,
            count(*) FILTER (NOT warm_up) AS steady
     FROM run GROUP BY campaign_id
+), own AS (
+    SELECT CAST(l.identification_id AS INTEGER) AS identification_id, n.machine_no, h.heading, s.*
+    FROM latest AS l
+    JOIN campaign AS c ON c.campaign_id = l.campaign_id
+    JOIN span AS s ON s.campaign_id = l.campaign_id
+    JOIN fleet_machine AS n USING (machine)
+    JOIN (SELECT heading, unnest(identifications) AS identification_id FROM fleet_heading) AS h
+      USING (identification_id)
+), member AS (
+    SELECT machine_no, heading, steady, unnest(numbers) AS k
+    FROM (SELECT machine_no, heading, sum(steady) AS steady FROM own GROUP BY ALL) JOIN fleet_heading USING (heading)
+), least AS (
+    -- Runs that are steady are counted by parameter, as in `monitor trend`; a group holds all of a heading, so that the
+    -- parameter with the fewest decides.
+    SELECT machine_no, heading, min(steady) AS steady
+    FROM (SELECT machine_no, heading, sum(steady) OVER (PARTITION BY machine_no, k) AS steady FROM member) GROUP BY ALL
 )
-SELECT CAST(l.identification_id AS INTEGER) AS identification_id, l.campaign_id, n.machine_no, h.heading,
-       s.warms AND sum(s.steady) OVER (PARTITION BY n.machine_no) >= getvariable('steady') AS leaves_out,
-       s.several_days OR leaves_out AS by_runs, s.began_d, s.ended_d
-FROM latest AS l
-JOIN campaign AS c ON c.campaign_id = l.campaign_id
-JOIN span AS s ON s.campaign_id = l.campaign_id
-JOIN fleet_machine AS n USING (machine)
-JOIN (SELECT heading, unnest(identifications) AS identification_id FROM fleet_heading) AS h USING (identification_id)
+SELECT identification_id, campaign_id, machine_no, heading,
+       warms AND least.steady >= getvariable('steady') AS leaves_out,
+       several_days OR leaves_out AS by_runs, began_d, ended_d
+FROM own JOIN least USING (machine_no, heading)
 """
 
 # The temperature of each run, by the rule of the history of one machine: of the recorded ones that which most of its
