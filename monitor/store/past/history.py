@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
+from monitor.store.past.common_parts import parts_of
 from monitor.store.past.identified_values import IdentifiedValues, values_of
 from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
 from monitor.store.type_tolerances import types_in_use
@@ -112,8 +114,9 @@ class MachineHistory:
     the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
     are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
     of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
-    in the same order. ``fits`` by campaign say whether its readings refute the model, where that was looked for: none
-    for identifications of older versions.
+    in the same order. ``common_parts`` are what values (n, p) have of each calibrated quantity that outlasts a
+    campaign, 0 for runs that do not rest on it. ``fits`` by campaign say whether its readings refute the model, where
+    that was looked for: none for identifications of older versions.
     """
 
     machine: str
@@ -134,6 +137,7 @@ class MachineHistory:
     unidentified: tuple[str, ...]
     channels: frozenset[str] = frozenset()
     fits: Mapping[str, CampaignFit] = field(default_factory=dict)
+    common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
 
     @cached_property
     def seconds(self) -> Array:
@@ -160,6 +164,10 @@ class MachineHistory:
             values=np.array(self.values[:, columns], order="C"),
             u=np.array(self.u[:, columns], order="C"),
             conditions={name: values.copy() for name, values in self.conditions.items()},
+            common_parts={
+                quantity: np.array(parts[:, columns], order="C")
+                for quantity, parts in self.common_parts.items()
+            },
         )
 
     def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
@@ -178,6 +186,7 @@ class MachineHistory:
             values=self.values[mask],
             u=self.u[mask],
             conditions={name: values[mask] for name, values in self.conditions.items()},
+            common_parts={quantity: parts[mask] for quantity, parts in self.common_parts.items()},
         )
 
 
@@ -243,7 +252,30 @@ def _read(
         unidentified=_unidentified(campaigns, recorded, identified),
         channels=channels,
         fits=_fits(db, campaigns, identified),
+        common_parts=_common_parts(db, identified.values(), rows, names),
     )
+
+
+def _common_parts(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    names: tuple[str, ...],
+) -> dict[CommonQuantity, Array]:
+    """What the values (n, p) of the history have of each calibrated quantity, in display units."""
+    heads = {head.number: head for head in identified}
+    parts: dict[CommonQuantity, Array] = {}
+    for (number, run), of_run in parts_of(db, list(heads)).items():
+        row, head = rows.get((number, run)), heads[number]
+        if row is None:
+            continue
+        at = {name: column for column, name in enumerate(names)}
+        read = [index for index, name in enumerate(head.parameters) if name in at]
+        columns = [at[head.parameters[index]] for index in read]
+        for quantity, part in of_run.items():
+            whole = parts.setdefault(quantity, np.zeros((len(rows), len(names))))
+            whole[row, columns] = np.nan_to_num(part[read] / np.array(head.factors)[read])
+    return parts
 
 
 def _fits(
