@@ -136,6 +136,10 @@ class Source:
         return MICRORADIAN if turns else MICROMETRE
 
 
+#: The calibrated quantity by which all lengths of an instrument are off in proportion to themselves.
+SCALE = "scale"
+
+
 @dataclass(frozen=True, order=True)
 class CommonQuantity:
     """A calibrated quantity that outlasts a campaign: the ``quantity`` (scale, a length) of the instrument or artefact

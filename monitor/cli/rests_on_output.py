@@ -17,8 +17,8 @@ def named(each: RestsOn) -> str:
 
 def left_out(rested_on: Iterable[RestsOn]) -> str:
     """What two compared results have in common, as the end of a sentence."""
-    words = " and ".join(named(each) for each in rested_on)
-    return f"; {words} is in both and no part of the difference" if words else ""
+    quantities = " and ".join(named(each) for each in rested_on)
+    return f"; {quantities} is in both and no part of the difference" if quantities else ""
 
 
 def levels(answer: TrendAnswer) -> Iterator[str]:

@@ -49,21 +49,11 @@ def normalised_error(
     uncertainties that are negative or both zero, or a covariance that leaves the difference none. Of independent normal
     results with right uncertainties 4.6 % have |E_n| > 1.
     """
-    given = (
-        first,
-        u_first,
-        second,
-        u_second,
-        np.zeros(np.shape(first)) if covariance is None else covariance,
-    )
-    given = (
-        first,
-        u_first,
-        second,
-        u_second,
-        np.zeros(np.shape(first)) if covariance is None else covariance,
-    )
-    columns = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in given]
+    shared = np.zeros(np.shape(first)) if covariance is None else covariance
+    columns = [
+        np.atleast_1d(np.asarray(column, dtype=np.float64))
+        for column in (first, u_first, second, u_second, shared)
+    ]
     x1, u1, x2, u2, both = columns
     if len({column.shape for column in columns}) != 1:
         raise DataError(

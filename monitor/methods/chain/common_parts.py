@@ -23,9 +23,9 @@ def common_parts(problem: ChainProblem, solution: Solution) -> dict[CommonQuanti
     quantities = problem.common_quantities
     if not any(quantities):
         return {}
-    own, count = problem.own_of(solution.local), len(problem.base_names)
-    _, by_own = problem.extras(own)
-    covariance = solution.local_covariance[:, :count, count : count + own.shape[1]]
+    count = len(problem.base_names)
+    _, by_own = problem.extras(problem.own_of(solution.local))
+    covariance = solution.local_covariance[:, :count, count : count + by_own.shape[2]]
     changes = np.einsum("rkq,req->rek", covariance, by_own)
     changes = np.where(solution.local_free[:, None, :count], changes, np.nan)
     return {quantity: changes[:, index] for index, quantity in enumerate(quantities) if quantity is not None}

@@ -23,9 +23,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.instruments.reading import SCALE, Reading, Rows, Shown, Stance, mean_of_runs
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, mean_of_runs
 from monitor.records import Array, Setup
-from monitor.sources import CommonQuantity
+from monitor.sources import SCALE, CommonQuantity
 
 #: What the tool point is off where it is stated with an uncertainty.
 TOOL_POINT = ("tool point x", "tool point y", "tool point z")

@@ -352,12 +352,12 @@ class InstrumentProblem(ChainProblem):
     @property
     def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
         """The lengths of bars and scales of instruments that have a name."""
-        known = {
-            int(columns[index]): part.common_quantity(part.unknowns[index], setup, u)
+        quantity_of = {
+            int(columns[index]): part.common_quantity(part.unquantity_ofs[index], setup, u)
             for part, setup, columns in zip(self.parts, self.setups, self.own_columns, strict=True)
             for index, u in part.prior()
         }
-        return tuple(known[index] for index, _ in self._priors)
+        return tuple(quantity_of[index] for index, _ in self._priors)
 
     def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """What the unknowns are off what is known of them, in standard uncertainties."""
