@@ -353,7 +353,7 @@ class InstrumentProblem(ChainProblem):
     def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
         """The lengths of bars and scales of instruments that have a name."""
         quantity_of = {
-            int(columns[index]): part.common_quantity(part.unquantity_ofs[index], setup, u)
+            int(columns[index]): part.common_quantity(part.unknowns[index], setup, u)
             for part, setup, columns in zip(self.parts, self.setups, self.own_columns, strict=True)
             for index, u in part.prior()
         }
