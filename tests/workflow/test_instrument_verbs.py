@@ -125,6 +125,20 @@ def test_a_certificate_names_every_instrument(
     assert "artefact" not in conditions
 
 
+@pytest.mark.slow
+def test_the_examples_with_lasers_reach_a_certificate(
+    tmp_path: Path, pdf_unread: Callable[[], AbstractContextManager[None]]
+) -> None:
+    """Their scales are stated: no ground speaks against them, and the scale is a line of what is calibrated."""
+    with Database(tmp_path / "shop.duckdb") as db:
+        import_campaign(db, read_campaign(EXAMPLES / "laser"))
+        with pdf_unread():
+            issued = issue(db, CertificateRequest("laser", laboratory=LABORATORY, out=tmp_path, draft=True))
+        u = uncertainty(db, UncertaintyRequest("laser", 1, method="guf")).guf.u
+        assert load_certificate(db, issued.certificate.number).record["references"]
+    assert u["EXX"] == pytest.approx(np.hypot(0.5, 0.18), rel=0.15)
+
+
 def test_a_certificate_of_the_campaign_comes_first(
     db: Database, tmp_path: Path, pdf_unread: Callable[[], AbstractContextManager[None]]
 ) -> None:

@@ -199,17 +199,18 @@ def machine_history(
     parameter: str | None = None,
     since: datetime | None = None,
     followed_by: Mapping[str, tuple[str, int]] = MappingProxyType({}),
+    has_parts: bool = True,
 ) -> MachineHistory:
-    """All identified runs of a machine under one model, from ``since`` on.
+    """All identified runs of a machine under one model, from ``since`` on; its ``common_parts`` where asked for.
 
     Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
     own. May hold no run. Raises NotFoundError for a machine that is not there.
     """
     if since is None:
-        key = ("history", machine, model, version, tuple(sorted(followed_by.items())))
-        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by))
+        key = ("history", machine, model, version, tuple(sorted(followed_by.items())), has_parts)
+        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by, has_parts))
         return whole.own_copy(parameter)
-    return _read(db, machine, model, version, parameter, since, followed_by)
+    return _read(db, machine, model, version, parameter, since, followed_by, has_parts)
 
 
 def _read(
@@ -220,6 +221,7 @@ def _read(
     parameter: str | None,
     since: datetime | None,
     followed_by: Mapping[str, tuple[str, int]],
+    has_parts: bool,
 ) -> MachineHistory:
     campaigns = campaigns_of_machine(db, machine)
     identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
@@ -252,7 +254,7 @@ def _read(
         unidentified=_unidentified(campaigns, recorded, identified),
         channels=channels,
         fits=_fits(db, campaigns, identified),
-        common_parts=_common_parts(db, identified.values(), rows, names),
+        common_parts=_common_parts(db, identified.values(), rows, names) if has_parts else {},
     )
 
 
@@ -263,18 +265,18 @@ def _common_parts(
     names: tuple[str, ...],
 ) -> dict[CommonQuantity, Array]:
     """What the values (n, p) of the history have of each calibrated quantity, in display units."""
+    at = {name: column for column, name in enumerate(names)}
     heads = {head.number: head for head in identified}
+    places: dict[int, tuple[list[int], list[int], Array]] = {}
+    for number, head in heads.items():
+        read = [index for index, name in enumerate(head.parameters) if name in at]
+        places[number] = read, [at[head.parameters[index]] for index in read], np.array(head.factors)[read]
     parts: dict[CommonQuantity, Array] = {}
     for (number, run), of_run in parts_of(db, list(heads)).items():
-        row, head = rows.get((number, run)), heads[number]
-        if row is None:
-            continue
-        at = {name: column for column, name in enumerate(names)}
-        read = [index for index, name in enumerate(head.parameters) if name in at]
-        columns = [at[head.parameters[index]] for index in read]
-        for quantity, part in of_run.items():
+        read, columns, factors = places[number]
+        for quantity, part in of_run.items() if (number, run) in rows else ():
             whole = parts.setdefault(quantity, np.zeros((len(rows), len(names))))
-            whole[row, columns] = np.nan_to_num(part[read] / np.array(head.factors)[read])
+            whole[rows[number, run], columns] = np.nan_to_num(part[read] / factors)
     return parts
 
 
