@@ -99,10 +99,9 @@ class ChainAxis:
 class Machine:
     """A machine as its file describes it. ``tolerances`` are limits of absolute values in display units.
 
-    ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then
-    the tool branch; ``topology`` then only names them in their order. It is empty where the letters of
-    ``topology`` say everything. ``gravity`` is the direction of gravity in the machine's frame, None where the
-    file does not state it. A ``virtual`` machine was simulated, nobody measured it.
+    ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then the tool
+    branch; ``topology`` then only names them in their order. It is empty where the letters of ``topology`` say all.
+    ``gravity`` is its direction in the machine's frame, None where not stated. A ``virtual`` machine was simulated.
     """
 
     id: str
@@ -127,13 +126,14 @@ class Machine:
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe; ``standard_uncertainty`` of one coordinate and ``tip`` (in the spindle frame) in mm."""
+    """A probe; ``standard_uncertainty`` of a coordinate and ``tip`` (spindle frame) in mm, of a scale in mm/mm."""
 
     id: str
     model: str
     standard_uncertainty: float
     tip: tuple[float, float, float] | None = None
     certificate: str | None = None
+    scale_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)

@@ -134,3 +134,26 @@ class Source:
             return next(iter(suffixes.values()))
         turns = self.effect is not None and self.effect[:1] == "E" and self.effect[1:2] in ("A", "B", "C")
         return MICRORADIAN if turns else MICROMETRE
+
+
+#: The calibrated quantity by which all lengths of an instrument are off in proportion to themselves.
+SCALE = "scale"
+
+
+@dataclass(frozen=True, order=True)
+class CommonQuantity:
+    """A calibrated quantity that outlasts a campaign: the ``quantity`` (scale, a length) of the instrument or artefact
+    ``of`` that name, by its ``certificate`` ("" where none is named), with the stated standard uncertainty ``u`` in mm
+    or mm/mm.
+
+    Results of two campaigns that rest on the same one are off by the same (JCGM 100:2008, F.1.2.3).
+    """
+
+    of: str
+    certificate: str
+    quantity: str
+    u: float
+
+    def is_calibrated_as(self, other: CommonQuantity) -> bool:
+        """Whether both are one quantity with one calibration, however sure each campaign was of it."""
+        return (self.of, self.certificate, self.quantity) == (other.of, other.certificate, other.quantity)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from monitor.cli.rests_on_output import left_out
 from monitor.reporting.lacks import Undecided
 from monitor.workflow.history.agreement import AgreementPair
 
@@ -19,12 +20,13 @@ def agreement_line(pair: AgreementPair) -> str:
             if errors
             else f"{subject}: {Undecided.ONE_DAY_EACH}"
         )
-    subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
-    if not pair.disagree:
-        return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
-    return (
-        f"{subject}{_apart(pair.days_apart)} disagree in {', '.join(pair.disagree)}{number}{_meanwhile(pair)}"
+    subject, both = (
+        f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})",
+        left_out(pair.in_common or ()),
     )
+    if not pair.disagree:
+        return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}{both}"
+    return f"{subject}{_apart(pair.days_apart)} disagree in {', '.join(pair.disagree)}{number}{_meanwhile(pair)}{both}"
 
 
 def _apart(days: float | None) -> str:

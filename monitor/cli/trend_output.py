@@ -8,6 +8,7 @@ from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
 from monitor.cli.forecast_output import forecast_start
+from monitor.cli.rests_on_output import levels
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -76,6 +77,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _next_check(answer)
     yield from _backtest(answer)
     yield from resemblance(answer)
+    yield from levels(answer)
     yield from _no_slopes(answer)
     if answer.weekly_looks is not None:
         yield from weekly_lines(answer.weekly_looks)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.l_shape_file import read_l_shape
+from monitor.readers.scale_key import read_scale_uncertainty
 from monitor.readers.self_calibration_file import read_self_calibration
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Ball, Probe, Reflector, ScaleBar
@@ -17,8 +18,8 @@ LARGEST_EXPANSION_PER_K = 1e-3
 LARGEST_REFERENCE_DEGC = 200.0
 
 
-def read_probe(top: Table, *, required: bool = True) -> Probe | None:
-    """Read the ``[probe]`` table."""
+def read_probe(top: Table, *, required: bool = True, has_scale: bool = False) -> Probe | None:
+    """Read the ``[probe]`` table; one that measures from outside has a scale (``has_scale``)."""
     table = top.table("probe", required=required)
     if table is None:
         return None
@@ -34,11 +35,12 @@ def read_probe(top: Table, *, required: bool = True) -> Probe | None:
     )
     tip = table.numbers("tip_mm", 3, largest=FARTHEST_MM, unit="mm", example="[0.0, 0.0, -150.0]")
     certificate = table.text("certificate")
+    scale = read_scale_uncertainty(table) if has_scale else None
     table.finish()
     if identity is None or model is None or uncertainty is None:
         return None
     point = None if tip is None else (tip[0], tip[1], tip[2])
-    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate)
+    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate, scale)
 
 
 def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:

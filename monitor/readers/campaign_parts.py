@@ -111,7 +111,11 @@ def read_head(top: Table) -> Head:
     machine = read_machine(top)
     has_setups = rules is not None and rules.needs_setups
     # Without a method nobody knows whether the folder needs a probe or may have setups.
-    probe = read_probe(top, required=rules is not None and not has_setups)
+    probe = read_probe(
+        top,
+        required=rules is not None and not has_setups,
+        has_scale=rules is not None and rules.targets_are_reflectors,
+    )
     if rules is None:
         top.tables("setups")
     artefact, balls = read_artefact(top)

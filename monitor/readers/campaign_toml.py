@@ -87,6 +87,8 @@ def _probe(probe: Probe) -> Iterator[str]:
         yield f"tip_mm = {_numbers(probe.tip)}"
     if probe.certificate is not None:
         yield f"certificate = {_text(probe.certificate)}"
+    if probe.scale_uncertainty is not None:
+        yield f"scale_standard_uncertainty_um_per_m = {decimal_in(MICROMETRE.per(METRE))(probe.scale_uncertainty)}"
 
 
 def _artefact(artefact: Artefact) -> Iterator[str]:

@@ -13,6 +13,7 @@ from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
+from monitor.readers.scale_key import SCALE_UNCERTAINTY, read_scale_uncertainty
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
@@ -21,13 +22,10 @@ from monitor.units import METRE, MICROMETRE, MICRORADIAN
 IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 #: A standard uncertainty of an angle beyond this is a slip of unit: 0.1 rad.
 LARGEST_URAD = 1e5
-#: A standard uncertainty of a scale beyond this is a slip of unit: 1 %, in µm/m.
-LARGEST_SCALE = 1e4
 _LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
 _DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
 _DRIFT_UNCERTAINTY = "drift_standard_uncertainty"
 _TOOL_UNCERTAINTY = "tool_point_standard_uncertainty_mm"
-_SCALE_UNCERTAINTY = "scale_standard_uncertainty_um_per_m"
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -58,11 +56,11 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
         ONE_LENGTH, needs=("direction",), allows=(_TOOL_UNCERTAINTY,), holdable=("zero",)
     ),
     "distance": ReadingFormat(
-        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY, _TOOL_UNCERTAINTY, _SCALE_UNCERTAINTY),
+        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY, _TOOL_UNCERTAINTY, SCALE_UNCERTAINTY),
         holdable=("work_point", "length"),
     ),
     "displacement": ReadingFormat(
-        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY, _TOOL_UNCERTAINTY, _SCALE_UNCERTAINTY),
+        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY, _TOOL_UNCERTAINTY, SCALE_UNCERTAINTY),
         holdable=("direction", "scale"),
     ),
     "offset": ReadingFormat(
@@ -75,11 +73,11 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
         drifts=False,
     ),
     "point": ReadingFormat(
-        POINTS, optional=("point_z_mm",), allows=("tool_direction", _SCALE_UNCERTAINTY),
+        POINTS, optional=("point_z_mm",), allows=("tool_direction", SCALE_UNCERTAINTY),
         holdable=("frame", "targets", "scale"),
     ),
     "pose": ReadingFormat(
-        (*POINTS, *QUATERNION), allows=("tool_direction", _SCALE_UNCERTAINTY), holdable=("frame", "targets", "scale"),
+        (*POINTS, *QUATERNION), allows=("tool_direction", SCALE_UNCERTAINTY), holdable=("frame", "targets", "scale"),
         turns=True, drifts=False,
     ),
 })  # fmt: skip
@@ -135,7 +133,7 @@ def _setup(table: Table) -> Setup | None:
         certificate=table.text("certificate"),
         drift_uncertainty=_drift(table, form),
         tool_point_uncertainty=_tool_uncertainty(table, form),
-        scale_uncertainty=_scale_uncertainty(table, form),
+        scale_uncertainty=read_scale_uncertainty(table) if SCALE_UNCERTAINTY in form.allows else None,
     )
     table.finish()
     return None if len(table.faults) > before else setup
@@ -222,14 +220,6 @@ def _tool_uncertainty(table: Table, form: ReadingFormat) -> float | None:
     if _TOOL_UNCERTAINTY not in form.allows:
         return None
     return table.number(_TOOL_UNCERTAINTY, positive=True, largest=FARTHEST_MM, unit="mm", example="1.0")
-
-
-def _scale_uncertainty(table: Table, form: ReadingFormat) -> float | None:
-    """Return the standard uncertainty of the scale in mm/mm; None where it is taken as exact."""
-    if _SCALE_UNCERTAINTY not in form.allows:
-        return None
-    value = table.number(_SCALE_UNCERTAINTY, positive=True, largest=LARGEST_SCALE, unit="µm/m", example="0.5")
-    return None if value is None else MICROMETRE.per(METRE).to_internal(value)
 
 
 def _unit(table: Table, key: str, *, required: bool = True) -> Vector | None:

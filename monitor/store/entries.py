@@ -22,7 +22,8 @@ class Source:
 #: Tables of which an import, and an identification, adds the rows.
 _WITH_CAMPAIGN = "imported_campaign source_file run campaign_runs probing curve curve_row"
 _WITH_IDENTIFICATION = (
-    "identification identified_run identified_values parameter_value parameter_frame lack_of_fit residual"
+    "identification identified_run identified_values parameter_value parameter_frame lack_of_fit common_part "
+    "residual"
 )
 #: Every table of a plant and what its rows belong to. Those that belong to nothing are published otherwise, below.
 SOURCES: dict[str, Source] = {

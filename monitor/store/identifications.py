@@ -16,7 +16,7 @@ from monitor.store import audit
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
-from monitor.store.past import identified_values
+from monitor.store.past import common_parts, identified_values
 from monitor.store.results import (
     LackOfFit,
     StoredIdentification,
@@ -58,6 +58,7 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         )
         for run in identification.runs:
             _insert_run(db, number, run)
+            common_parts.insert_parts(db, number, run)
         _insert_values(db, number, identification)
         _insert_frames(db, number, identification)
         _insert_lack_of_fit(db, number, identification.lack_of_fit)
@@ -247,6 +248,7 @@ def _runs(db: Database, number: int, count: int) -> tuple[StoredRun, ...]:
     )
     vectors = np.column_stack([residuals["dx_mm"], residuals["dy_mm"], residuals["dz_mm"]])
     estimates = np.ma.filled(np.ma.asarray(values["value"]), np.nan)
+    parts = common_parts.parts_of(db, [number])
     stored_runs = []
     for run, rms, iterations, freedom, chi_square, covariance, refused in db.rows(
         "SELECT run, rms_mm, iterations, degrees_of_freedom, chi_square, covariance, refused "
@@ -266,6 +268,7 @@ def _runs(db: Database, number: int, count: int) -> tuple[StoredRun, ...]:
                 chi_square,
                 np.asarray(residuals["sequence"][of_run], dtype=np.int64),
                 vectors[of_run],
+                parts.get((number, run), {}),
             )
         )
     return tuple(stored_runs)

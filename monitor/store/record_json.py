@@ -86,8 +86,11 @@ def machine_record(text: str) -> Machine:
 
 
 def probe_json(probe: Probe) -> str:
-    """A probe as text; lengths in mm."""
-    return _text(asdict(probe))
+    """A probe as text; lengths in mm. A scale that is not stated is left out: texts and hashes stay what they were."""
+    document = asdict(probe)
+    if probe.scale_uncertainty is None:
+        del document["scale_uncertainty"]
+    return _text(document)
 
 
 def probe_record(text: str) -> Probe:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 from monitor.store import audit
 from monitor.units import Unit
 
@@ -20,7 +21,9 @@ class StoredRun:
 
     ``estimate`` (k,) and ``covariance`` (k, k) are NaN where a parameter was refused; ``refused`` are groups of
     parameters and why. ``residuals`` (n, 3) in mm belong to the touches ``sequence`` (n,). ``rms_mm`` is the
-    root mean square of all their components, ``chi_square`` the sum of their normalised squares.
+    root mean square of all their components, ``chi_square`` the sum of their normalised squares. ``common_parts`` are
+    changes (k,) of the estimate for one standard uncertainty of each calibrated quantity that outlasts the campaign,
+    NaN where a parameter was refused.
     """
 
     run: int
@@ -33,6 +36,7 @@ class StoredRun:
     chi_square: float
     sequence: npt.NDArray[np.int64]
     residuals: Array
+    common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,7 @@ def identification_content(
         # Nothing is added for those of before frames were stored: their hashes are the old ones.
         *([sorted(identification.refers_to.items())] if identification.refers_to else []),
         *_lack_of_fit_content(identification.lack_of_fit),
+        *_common_parts_content(identification.runs, signed_zeros=signed_zeros),
     )
 
 
@@ -98,6 +103,16 @@ def _lack_of_fit_content(lack_of_fit: LackOfFit | None) -> list[dict[str, str | 
         return []
     p_value = lack_of_fit.p_value
     return [{"lack of fit": None if p_value is None else float(p_value).hex()}]
+
+
+def _common_parts_content(runs: Sequence[StoredRun], *, signed_zeros: bool) -> list[dict[str, object]]:
+    """Return what is hashed of what runs have of calibrated quantities: nothing where they have none."""
+    parts = [
+        [run.run, *astuple(quantity), audit.bits(part, signed_zeros=signed_zeros)]
+        for run in runs
+        for quantity, part in sorted(run.common_parts.items())
+    ]
+    return [{"common parts": parts}] if parts else []
 
 
 def check_identification(identification: StoredIdentification) -> None:
@@ -122,9 +137,18 @@ def check_identification(identification: StoredIdentification) -> None:
         numbers = [run.rms_mm, run.chi_square, *run.residuals.ravel()]
         if not np.all(np.isfinite(numbers)):
             raise DataError(f"{name}: rms, chi-square and residuals must be finite")
+        _check_common_parts(run, count, name)
         if np.isinf(run.estimate).any() or np.isinf(run.covariance).any():
             raise DataError(f"{name}: estimates and covariances must be finite, or NaN where refused")
         held = {parameter for group, _ in run.refused for parameter in group}
         for parameter, value in zip(identification.parameters, run.estimate, strict=True):
             if np.isnan(value) and parameter not in held:
                 raise DataError(f"{name}: {parameter} has no number and no reason why it was refused")
+
+
+def _check_common_parts(run: StoredRun, count: int, name: str) -> None:
+    """Raise DataError where what a run has of a calibrated quantity does not fit its parameters."""
+    if any(part.shape != (count,) or np.isinf(part).any() for part in run.common_parts.values()):
+        raise DataError(
+            f"{name}: what it has of a calibrated quantity must be {count} finite numbers, NaN where refused"
+        )

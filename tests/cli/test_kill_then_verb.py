@@ -127,6 +127,8 @@ def _broken_by_an_earlier_version(path: Path, folder: Path, environment: dict[st
         connection.execute("DROP TABLE parameter_frame")
         connection.execute("DROP VIEW v_lack_of_fit")
         connection.execute("DROP TABLE lack_of_fit")
+        connection.execute("DROP VIEW v_common_parts")
+        connection.execute("DROP TABLE common_part")
         for name, table, column in (
             ("run_of_campaign", "run", "campaign_id"),
             ("identification_of_campaign", "identification", "campaign_id"),

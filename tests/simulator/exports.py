@@ -92,7 +92,8 @@ def write_instruments(folder: Path, seed: int = 41) -> None:
     rng = np.random.default_rng(seed)
     chain = shop.machine(pitch=0.0)
     folder.mkdir(parents=True)
-    parts = [maker(chain, rng) for maker in (shop.laser, shop.ball_bar, shop.r_test, shop.dial)]
+    parts = [shop.laser(chain, rng, keys=shop.SCALE_KEY)]
+    parts += [maker(chain, rng) for maker in (shop.ball_bar, shop.r_test, shop.dial)]
     rows = {}
     for row in (row for _, part in parts for row in shop.rounded(part)):
         rows.setdefault(str(row["setup"]), []).append(row)
@@ -133,6 +134,10 @@ GRID = np.array(
     [(x, y, z) for z in (0.0, 200.0) for y in (-150.0, 0.0, 150.0) for x in (-200.0, -50.0, 100.0, 250.0)]
 )
 CMM_U, TRACKER_U, PROBE_U = 1e-3, 5e-3, 1e-3
+#: What the setups state of their scales, um/m, and why.
+CMM_SCALE = 1.5, "L/400 of its maximum permissible error: 2.5 um/m as a half width, rectangular."
+PLATE_SCALE = 1.5, "Calibrated to 0.5 um/m; steel, its temperature known to 0.1 K: 1.2 um/m."
+TRACKER_SCALE = 0.5, "0.5 um/m as its maker's limit (0.3 um/m), air known to 0.3 K and 1 hPa (0.3 um/m each)."
 
 
 def _places(chain: object, rows: np.ndarray, rng: np.random.Generator, u: float) -> np.ndarray:
@@ -212,7 +217,7 @@ def write_plate(folder: Path, seed: int = 42) -> None:
     for file, writer in (("plate.qif", qif), ("plate.dfq", dfq)):
         (folder / file).write_bytes(writer(names, GRID, _places(chain, GRID, rng, CMM_U)).encode("ascii"))
         setup = file.replace(".", "-")
-        mapping += _point(setup, "coordinate measuring machine", CMM_U)
+        mapping += _point(setup, "coordinate measuring machine", CMM_U, *CMM_SCALE)
         columns = {f"{letter}_mm": f'"nominal_{letter}"' for letter in "xyz"}
         columns |= {f"point_{letter}_mm": f'"{letter}"' for letter in "xyz"}
         mapping += _entry(file, setup, {**columns, "c_deg": "0.0"})
@@ -220,7 +225,7 @@ def write_plate(folder: Path, seed: int = 42) -> None:
     # The plate's calibrated places are what the machine's tool sees there; the control reads where it stood.
     calibrated = _places(chain, flat, rng, PROBE_U)[:, :2]
     (folder / "TCHPR421.TXT").write_text(protocols(calibrated, flat[:, :2]), encoding="ascii")
-    mapping += _point("plate-probed", "calibrated plate, probed", PROBE_U)
+    mapping += _point("plate-probed", "calibrated plate, probed", PROBE_U, *PLATE_SCALE)
     mapping += _entry(
         "TCHPR421.TXT", "plate-probed",
         {
@@ -239,7 +244,7 @@ def write_plate(folder: Path, seed: int = 42) -> None:
     )
     (folder / "tracker.txt").write_text(tracker, encoding="ascii")
     (folder / "tracker-poses.csv").write_text(poses, encoding="ascii")
-    mapping += _point("tracker", "laser tracker", TRACKER_U)
+    mapping += _point("tracker", "laser tracker", TRACKER_U, *TRACKER_SCALE)
     metres = {f"point_{letter}_mm": f'{{ column = "{letter}", unit = "m" }}' for letter in "xyz"}
     mapping += _entry(
         "tracker.txt",
@@ -250,10 +255,11 @@ def write_plate(folder: Path, seed: int = 42) -> None:
     (folder / "mapping.toml").write_text(mapping, encoding="utf-8")
 
 
-def _point(setup: str, instrument: str, u: float) -> str:
+def _point(setup: str, instrument: str, u: float, scale: float, why: str) -> str:
     return (
         f'\n[[setups]]\nid = "{setup}"\nreading = "point"\ninstrument = "{instrument}"\n'
         f'standard_uncertainty_um = {1e3 * u:g}\ntool_point_mm = {shop.TOOL.tolist()}\nknown = ["targets"]\n'
+        f"# {why}\nscale_standard_uncertainty_um_per_m = {scale}\n"
     )
 
 

@@ -31,6 +31,11 @@ BAR_U = 3e-4
 BALL = np.array([80.0, 0.0, 60.0])
 LASER, LENGTH, NEST, DIAL = 3e-4, 5e-4, 5e-4, 1e-3
 Row = dict[str, object]
+#: What the examples state of the laser's scale: 1 K of air is 0.95 um/m, 1 hPa 0.27 (B. Edlen, Metrologia 2 (1966) 71).
+SCALE_KEY = (
+    "# Air known to 0.3 K and 1 hPa (0.3 um/m each), the laser's frequency to 0.1 um/m; no material is compensated.\n"
+    "scale_standard_uncertainty_um_per_m = 0.5\n"
+)
 
 
 def machine(pitch: float = PITCH, truth: Mapping[str, float] = TRUTH) -> SimulatedChain:
@@ -69,13 +74,15 @@ def seen(chain: SimulatedChain, readings: Mapping[str, float]) -> np.ndarray:
     return np.asarray(frame[:3, :3] @ TOOL + frame[:3, 3])
 
 
-def laser(chain: SimulatedChain, rng: np.random.Generator, cycles: int = 5) -> tuple[str, list[Row]]:
-    """Three axes there and back, the beam askew by some 0.2 mrad, near the table."""
+def laser(
+    chain: SimulatedChain, rng: np.random.Generator, cycles: int = 5, keys: str = ""
+) -> tuple[str, list[Row]]:
+    """Three axes there and back, the beam askew by some 0.2 mrad, near the table; setups have ``keys`` besides."""
     text, rows = "", []
     for name, way, limits in (("X", X, (0.0, 500.0)), ("Y", Y, (0.0, 400.0)), ("Z", Z, (0.0, 400.0))):
         text += _setup(
             f"laser-{name}", "displacement", "laser interferometer", LASER, f'direction = "{name}"\n'
-            "direction_standard_uncertainty_urad = 200.0\n"
+            f"direction_standard_uncertainty_urad = 200.0\n{keys}"
         )  # fmt: skip
         beam = np.array(way) + rng.normal(0.0, 2e-4, 3) * (1.0 - np.array(way))
         beam /= np.linalg.norm(beam)
@@ -188,7 +195,11 @@ def write_examples(folder: Path) -> None:
     """Write ``four-instruments`` and each of three instruments by itself, the same readings."""
     rng = np.random.default_rng(20)
     chain = machine()
-    measured = {"laser": laser(chain, rng), "ball-bar": ball_bar(chain, rng), "r-test": r_test(chain, rng)}
+    measured = {
+        "laser": laser(chain, rng, keys=SCALE_KEY),
+        "ball-bar": ball_bar(chain, rng),
+        "r-test": r_test(chain, rng),
+    }
     for name, (text, rows) in measured.items():
         _write(chain, folder / name, text, rows)
     parts = [*measured.values(), dial(chain, rng)]

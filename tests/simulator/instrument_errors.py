@@ -134,8 +134,10 @@ def week(
     size: float = 0.0,
     *,
     cycles: int = 2,
+    beside: Mapping[str, float] | None = None,
 ) -> Path:
-    """Write a campaign of six instruments; ``error`` of ``ERRORS`` has ``size`` µm, µrad or µm/m."""
+    """Write a campaign of six instruments; ``error`` of ``ERRORS`` has ``size`` µm, µrad or µm/m, and those ``beside``
+    it theirs."""
     chain = shop.machine(0.0, truth)
     parts = [
         shop.laser(chain, rng, cycles),
@@ -151,8 +153,8 @@ def week(
         row["time"] = number / (len(rows) - 1)
         # It wanders over some 20 minutes: quickly enough for a change within every setup.
         row["air_degC"] = 20.3 + np.sin(2.0 * np.pi * number / 19.0 + phase)
-    if error:
-        ERRORS[error](rows, size, rng)
+    for name, of_name in {**(beside or {}), **({error: size} if error else {})}.items():
+        ERRORS[name](rows, of_name, rng)
         counted_from_the_first(rows)
     for row in rows:
         del row["time"]

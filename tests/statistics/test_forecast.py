@@ -45,6 +45,21 @@ def test_predicted_probabilities_are_calibrated():
         assert abs(count / trials - p) < 0.02 + 3.3 * np.sqrt(p * (1 - p) / trials), (p, count)
 
 
+@pytest.mark.parametrize("with_common", [True, False])
+def test_what_all_runs_are_off_by_is_in_the_crossing_date(with_common):
+    """A laser that is off by a number of standard deviation 6 moves all runs: the date at which the machine itself
+    reaches its limit lies in the interval with it (148 of 150), without in 118 only."""
+    rng = np.random.default_rng(4)
+    hits, trials, common = 0, 150, 6.0
+    for _ in range(trials):
+        y, t, day = history(rng)
+        line = trend(y + rng.normal(0.0, common), t, days=day, robust=False)
+        known = common if with_common else 0.0
+        low, high = forecast(line, (-60.0, 10.0), 84.0, [], common=known).crossing.interval
+        hits += low <= 200.0 <= high
+    assert hits / trials > 0.93 if with_common else hits / trials < 0.86, hits
+
+
 def test_recommended_interval_is_where_the_probability_falls_below_the_reliability():
     y, t, day = history(np.random.default_rng(3))
     line = trend(y, t, days=day)

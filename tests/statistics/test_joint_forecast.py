@@ -50,6 +50,32 @@ def test_one_parameter_along_one_axis_agrees_with_its_own_forecast():
     assert found.recommended_interval == pytest.approx(own.recommended_interval, rel=0.2)
 
 
+def test_what_all_runs_are_off_by_together_is_drawn_once_for_all_parameters():
+    """Two gains by one laser: their sum is off by twice its scale, their difference by nothing."""
+    rng = np.random.default_rng(3)
+    values = 5.0 + 0.5 * rng.normal(size=(30, 2))
+    lines, now = lines_of(values), float(WEEKS[-1])
+    common, question = np.array([[2.0, 2.0]]), LengthQuestion(8.0, now, [now], now + 1.0)
+    for signs, both in ((1.0, 4.0), (-1.0, 0.0)):
+        vectors = ErrorVectors(np.array([[[1.0, signs], [0.0, 0.0], [0.0, 0.0]]]), np.zeros((1, 3)))
+        found = forecast_longest(
+            JointLines(lines, np.eye(2), common),
+            vectors,
+            question,
+            rng=np.random.default_rng(4),
+            draws=20_000,
+        )
+        plain = forecast_longest(
+            JointLines(lines, np.eye(2)), vectors, question, rng=np.random.default_rng(4), draws=20_000
+        )
+        # Half the width of 95 %, of the run's scatter and of what is common.
+        wide, narrow = (float(np.ptp(each.interval[0])) / 2.0 / 1.96 for each in (found, plain))
+        if both:
+            assert wide == pytest.approx(np.hypot(narrow, both), rel=0.03)
+        else:
+            assert wide == pytest.approx(narrow, rel=0.03)
+
+
 @pytest.mark.slow
 def test_prediction_interval_of_the_longest_vector_covers_the_next_run(rate_agrees):
     # Truth: three correlated parameters that drift, four points; the length of a run 20 weeks ahead.

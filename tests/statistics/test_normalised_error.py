@@ -28,6 +28,18 @@ def test_the_rate_of_false_disagreement_is_that_of_two_standard_deviations():
     assert np.mean(~found.agree) == pytest.approx(0.0455, abs=0.004)
 
 
+def test_jcgm100_5_2_2_what_both_share_is_taken_out():
+    """Of right results that share an error 4.6 % have |E_n| above 1 with its covariance, none without."""
+    rng, count, common = np.random.default_rng(7), 40_000, 2.0
+    shared = rng.normal(0.0, common, count)
+    x1, x2 = (shared + rng.normal(0.0, own, count) for own in (0.5, 1.0))
+    u1, u2 = np.full(count, np.hypot(0.5, common)), np.full(count, np.hypot(1.0, common))
+    assert np.mean(~normalised_error(x1, u1, x2, u2, np.full(count, common**2)).agree) == pytest.approx(
+        0.0455, abs=0.004
+    )
+    assert np.mean(~normalised_error(x1, u1, x2, u2).agree) < 1e-4
+
+
 def test_a_mean_of_runs_keeps_what_they_share():
     mean, u = result_of_runs([1.0, 2.0, 3.0], [0.5, 0.5, 0.5])
     assert mean == 2.0
@@ -42,6 +54,7 @@ def test_a_mean_of_runs_keeps_what_they_share():
         (([np.nan], [0.1], [1.0], [0.1]), "must be finite"),
         (([1.0], [-0.1], [1.0], [0.1]), "must not be negative"),
         (([1.0], [0.0], [1.0], [0.0]), "of two results one must have one"),
+        (([1.0], [0.1], [1.0], [0.1], [0.01]), "nothing is left that may differ"),
     ],
 )
 def test_bad_results_are_refused(arguments, message):

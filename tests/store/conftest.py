@@ -22,6 +22,7 @@ from monitor.records import (
     ScaleBar,
     SourceFile,
 )
+from monitor.sources import CommonQuantity
 from monitor.store import (
     Database,
     StoredIdentification,
@@ -127,6 +128,11 @@ def make_identification() -> Callable[..., StoredIdentification]:
                     16.3 / run,
                     np.array([1, 2, 3]),
                     np.array([[0.1, 0.2, 0.3], [-0.1, 1 / 3, 0.0], [0.0, 2e-3, -1e-3]]) * run,
+                    {
+                        CommonQuantity("a laser", "C-7", "scale", 1e-6): np.array(
+                            [0.0, 1e-6 / 3 * run, np.nan]
+                        )
+                    },
                 )
                 for run in runs
             ),

@@ -265,6 +265,8 @@ def test_an_old_database_is_brought_up_by_the_first_who_may_write(tmp_path: Path
         db.execute("DROP TABLE parameter_frame")
         db.execute("DROP VIEW v_lack_of_fit")
         db.execute("DROP TABLE lack_of_fit")
+        db.execute("DROP VIEW v_common_parts")
+        db.execute("DROP TABLE common_part")
         db.execute("DROP TABLE machine_model")
         db.execute("DELETE FROM schema_migration WHERE number >= 12")
     with pytest.raises(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -104,12 +105,13 @@ def test_a_certificate_names_every_instrument(
     db: Database, tmp_path: Path, pdf_unread: Callable[[], AbstractContextManager[None]]
 ) -> None:
     """ISO/IEC 17025:2017, 7.8.4.1 c: the standards that carry the traceability, each with its certificate."""
+    stated = tmp_path / "laboratory.toml"
+    text = re.sub("\ninstruments = .*", "", LABORATORY.read_text(encoding="utf-8"))
+    stated.write_text(text, encoding="utf-8")
     with pytest.raises(
         IncompleteCertificateError, match=r"instrument R-test \(r-test\).*traceability\] instruments"
     ):
-        issue(db, CertificateRequest("r-test", laboratory=LABORATORY, out=tmp_path, draft=True))
-    stated = tmp_path / "laboratory.toml"
-    text = LABORATORY.read_text(encoding="utf-8")
+        issue(db, CertificateRequest("r-test", laboratory=stated, out=tmp_path, draft=True))
     stated.write_text(text.replace("\nprobe =", '\ninstruments = "R 17"\nprobe ='), encoding="utf-8")
     with pdf_unread():
         answer = issue(db, CertificateRequest("r-test", laboratory=stated, out=tmp_path, draft=True))
@@ -121,6 +123,20 @@ def test_a_certificate_names_every_instrument(
     conditions = {entry["name"]: entry["value"] for entry in document["conditions"]}
     assert conditions["plan"] == "25 readings of 1 setups of instruments"
     assert "artefact" not in conditions
+
+
+@pytest.mark.slow
+def test_the_examples_with_lasers_reach_a_certificate(
+    tmp_path: Path, pdf_unread: Callable[[], AbstractContextManager[None]]
+) -> None:
+    """Their scales are stated: no ground speaks against them, and the scale is a line of what is calibrated."""
+    with Database(tmp_path / "shop.duckdb") as db:
+        import_campaign(db, read_campaign(EXAMPLES / "laser"))
+        with pdf_unread():
+            issued = issue(db, CertificateRequest("laser", laboratory=LABORATORY, out=tmp_path, draft=True))
+        u = uncertainty(db, UncertaintyRequest("laser", 1, method="guf")).guf.u
+        assert load_certificate(db, issued.certificate.number).record["references"]
+    assert u["EXX"] == pytest.approx(np.hypot(0.5, 0.18), rel=0.15)
 
 
 def test_a_certificate_of_the_campaign_comes_first(
@@ -144,9 +160,9 @@ def test_a_certificate_of_the_campaign_comes_first(
 def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> None:
     """A sphere that goes round with C tells where C is by the stated tool point; a dial on Z tells nothing of it."""
     campaign = read_campaign(EXAMPLES / "four-instruments")
-    stated, scale = identify(db, IdentifyRequest("four-instruments")).as_stated or ()
+    # The example states the scale of its laser: the tool point of the R-test alone is taken as stated.
+    (stated,) = identify(db, IdentifyRequest("four-instruments")).as_stated or ()
     assert (stated.name, dict(stated.moved)) == ("R-test", {"x": ("EX0C",), "y": ("EY0C",)})
-    assert (scale.name, dict(scale.moved)) == ("laser interferometer", {"scale": ("EXX", "EYY", "EZZ")})
     sentence = tool_point_sentence(campaign, ("EX0C", "EY0C", "EC0X"), texts_of("en"))
     assert sentence is not None
     assert sentence.startswith("EX0C, EY0C count from the tool points as stated (R-test), whose uncertainty")
@@ -154,6 +170,14 @@ def test_places_that_count_from_a_stated_tool_point_are_told(db: Database) -> No
     sure = replace(campaign, artefact=replace(campaign.artefact, setups=known))
     assert tool_point_sentence(sure, ("EX0C", "EY0C", "EC0X"), texts_of("en")) is None
     assert tool_point_sentence(campaign, ("EC0X", "EXX"), texts_of("en")) is None
+
+
+def test_a_scale_that_nobody_states_is_told() -> None:
+    campaign = read_campaign(EXAMPLES / "four-instruments")
+    silent = tuple(replace(setup, scale_uncertainty=None) for setup in campaign.artefact.setups)
+    campaign = replace(campaign, artefact=replace(campaign.artefact, setups=silent))
+    _, scale = campaign_method(campaign).identify(campaign).as_stated
+    assert (scale.name, dict(scale.moved)) == ("laser interferometer", {"scale": ("EXX", "EYY", "EZZ")})
 
 
 def test_a_scale_that_is_stated_as_known_is_printed() -> None:

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from monitor.cli.trend_output import _change, _crosses
 from monitor.records import VOLUMETRIC
@@ -32,8 +33,20 @@ DAYS = 60
 LIMIT = 50.0
 #: What the readings cannot tell, in the stored u of each run.
 U = 1.0
+#: What of it all runs of one machine have in common by the laser that measured them.
+COMMON = 0.9
 NOTHING = SimpleNamespace(suspect=())
-MACHINES = ("a-near", "b-far", "c-out", "d-scatters", "e-stepped", "f-drifts", "g-weekly", "h-back")
+MACHINES = (
+    "a-near",
+    "b-far",
+    "c-out",
+    "d-scatters",
+    "e-stepped",
+    "f-drifts",
+    "g-weekly",
+    "h-back",
+    "i-laser",
+)
 
 
 def _levels(machine: str) -> np.ndarray:
@@ -48,6 +61,7 @@ def _levels(machine: str) -> np.ndarray:
         "e-stepped": np.where(day < 15, 45.0, 12.0) + 1.0 * scatter,
         "f-drifts": 10.0 + 14.0 * day / (DAYS - 1) + 0.5 * scatter,
         "g-weekly": 20.0 + 2.0 * scatter,
+        "i-laser": 48.5 + 0.3 * scatter,
         "h-back": np.where(day < 3, 40.0, 72.0 - 10.0 * day / (DAYS - 1)),
     }[machine]
 
@@ -66,6 +80,12 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
                     keep(db, machine, runs[number : number + 1], f"{machine}-{number}")
             else:
                 keep(db, machine, runs, machine)
+        db.execute(
+            "INSERT INTO common_part SELECT identification_id, run, 'laser', '', 'scale', 1e-6, [?] "
+            "FROM identification JOIN campaign USING (campaign_id) JOIN run USING (campaign_id) "
+            "WHERE machine = 'i-laser'",
+            [COMMON],
+        )
         db.execute(
             "UPDATE imported_campaign SET machine_description = ?", [f'{{"tolerances": {{"EXX": {LIMIT}}}}}']
         )
@@ -102,6 +122,14 @@ def test_in_tolerance_at_the_next_check_is_that_of_trend(
     assert (of_fleet < RELIABILITY) == (stated_p < RELIABILITY)
 
 
+def test_what_all_runs_have_in_common_is_in_the_forecast(rows: dict[str, FleetTableRow]) -> None:
+    """1.5 below the limit with a scatter of 0.4 and a laser known to 0.9: by the normal distribution."""
+    levels = _levels("i-laser")
+    line = np.polyval(np.polyfit(np.arange(DAYS), levels, 1), 2.0 * DAYS)
+    expected = norm.cdf((LIMIT - line) / np.hypot(0.45, COMMON))
+    assert rows["i-laser"].in_tolerance_at_next_check == pytest.approx(expected, abs=0.05)
+
+
 @pytest.mark.parametrize("machine", MACHINES)
 def test_out_of_tolerance_is_that_of_the_weekly_report(
     shop: Path, rows: dict[str, FleetTableRow], machine: str
@@ -125,6 +153,7 @@ def test_a_limit_that_is_near_goes_before_days_that_differ(rows: dict[str, Fleet
         "h-back": Attention.OUT,
         "a-near": Attention.MAY_BE_OUT,
         "d-scatters": Attention.DUE,
+        "i-laser": Attention.DUE,
         "f-drifts": Attention.DRIFTS_OUT,
         "z-no-limit": Attention.DAYS_DIFFER,
     }

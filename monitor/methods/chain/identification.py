@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.shared_effects import FollowedEffects
 from monitor.records import Array
 from monitor.refusal import Refusal
+from monitor.sources import CommonQuantity
 from monitor.units import Unit
 
 
@@ -22,7 +23,8 @@ class RunIdentification:
     ``unknowns`` maps every other unknown of the run (ball coordinates, stylus tip) to its value in mm.
     ``residuals`` (m, 3) mm from target to tip in the frame of the last work axis, one row a probing.
     ``chi_square`` is the sum of the squared weighted residuals, ``degrees_of_freedom`` its expectation. ``displaced``
-    are stated points that the readings put elsewhere.
+    are stated points that the readings put elsewhere. ``common_parts`` are changes (k,) of the estimate for one
+    standard uncertainty of each calibrated quantity that other campaigns may rest on too.
     """
 
     run: int
@@ -35,6 +37,7 @@ class RunIdentification:
     chi_square: float
     degrees_of_freedom: int
     displaced: tuple[Displaced, ...] = ()
+    common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

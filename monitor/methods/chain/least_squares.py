@@ -241,3 +241,10 @@ def _solution(
         iterations=iterations,
         last=last,
     )
+
+
+def inverse_of(jacobian: Array, tolerance: float) -> Array:
+    """The pseudo-inverse (p, m) of derivatives (m, p), columns scaled to unit length first."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    return np.asarray(np.linalg.pinv(jacobian / scale, rcond=tolerance) / scale[:, None])

@@ -22,6 +22,7 @@ from monitor.machine import ChainPose
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.sessions import Stays
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
 # a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
@@ -132,6 +133,11 @@ class MeasuredChain(ABC):
     def extras_in_common(self) -> npt.NDArray[np.bool_]:
         """Which (e,) of the calibrated quantities have one value in all runs; the others have another in each."""
         return np.ones(len(self.extra_names), dtype=bool)
+
+    @property
+    def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
+        """Whose the calibrated quantities (e,) are; None for those that no other campaign can rest on."""
+        return (None,) * len(self.extra_names)
 
     def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """Whitened residuals (R, e) of the calibrated quantities and derivatives (R, e, q) by the own unknowns."""

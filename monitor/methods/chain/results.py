@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from monitor.methods.chain.common_parts import common_parts
 from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
@@ -67,6 +68,7 @@ def identification(
     count = len(problem.base_names)
     vectors = problem.vectors(solution.local, solution.common)
     spatial = problem.as_vectors(vectors)
+    by_quantity = common_parts(problem, solution)
     runs = []
     for index, run in enumerate(problem.runs):
         rows = problem.context.run == run
@@ -89,6 +91,7 @@ def identification(
                 chi_square=float(weighted @ weighted),
                 degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[index]),
                 displaced=problem.displaced(solution.local[index]),
+                common_parts={quantity: parts[index] for quantity, parts in by_quantity.items()},
             )
         )
     shared = shared_parameters(problem, solution)

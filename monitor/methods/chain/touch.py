@@ -14,6 +14,7 @@ import numpy as np
 from monitor.machine import ChainPose
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 
 # mm; more than the stylus' offset moves an axis as the spindle turns, less than any plan means to move it.
 STILL = 1.0
@@ -21,11 +22,13 @@ STILL = 1.0
 
 @dataclass(frozen=True)
 class Distance:
-    """A calibrated distance between two targets: length and standard uncertainty (R,) in mm, one a run."""
+    """A calibrated distance between two targets: length (R,) and standard uncertainty in mm, one length a run; what it
+    is ``of`` where that is known."""
 
     between: tuple[str, str]
     length: Array
     standard_uncertainty: float
+    of: CommonQuantity | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,11 @@ class TouchProblem(ChainProblem):
     def extra_names(self) -> tuple[str, ...]:
         """The calibrated distances."""
         return tuple("-".join(distance.between) for distance in self.distances)
+
+    @property
+    def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
+        """The calibrated distances."""
+        return tuple(distance.of for distance in self.distances)
 
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The ball of every probing and the tip."""

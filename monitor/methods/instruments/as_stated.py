@@ -5,9 +5,7 @@ axis comes out 0.1 mm beside it, and no reading shows that (``EX0B``, ``EZ0B`` o
 turns ``EX0B`` alone). Where the setup states how well the point is known, u holds that; where it does not, the numbers
 are those of the stated point, and whoever reads them is told which.
 
-The scale of a laser (of a tracker, a camera, a CMM) likewise: a compensation of the wavelength that is wrong by 1 K of
-air or 3.5 hPa makes every gain wrong by 1 um/m, three standard uncertainties of what its readings say, and where no
-second unit of length stands beside it no reading shows that.
+The scale of a laser (of a tracker, a camera, a CMM) likewise (``exact_scales``).
 """
 
 from __future__ import annotations
@@ -17,20 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from monitor.methods.chain.exact_scales import exact_scales
 from monitor.methods.chain.identification import AsStated
-from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE, eliminate
+from monitor.methods.chain.least_squares import MEMBER_SHARE, eliminate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.part import TOOL_POINT, Part
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import SCALE
-from monitor.methods.instruments.run_rows import inverse_of
 from monitor.records import FROM_TOOL_POINT, Array
-from monitor.units import METRE, MICROMETRE
 
 #: What readings show of a coordinate of a tool point beside free errors is more than this part, or rounding.
 SHOWN = 1e-6
-#: A scale that is off by so much, as by 1 K of air, moves a number by this part of its u or more, or it is not named.
-OFF, MOVED = MICROMETRE.per(METRE).to_internal(1.0), 0.1
 
 
 def as_stated(problem: ChainProblem) -> tuple[AsStated, ...]:
@@ -69,34 +63,15 @@ def _scales(problem: InstrumentProblem) -> Iterator[AsStated]:
         name: tuple(part.id for part in problem.parts if len(part.at) and exact.get(part.id) == name)
         for name in dict.fromkeys(exact.values())
     }
-    if not any(groups.values()):
-        return
-    at = problem.linearise(problem.start, problem.common_start)
-    of_run = problem.context.run
+    lengths = {}
     for name, group in groups.items():
-        lengths = np.zeros_like(problem.sigma)
-        for part in problem.parts:
-            if part.id in group:
-                read = part.lengths()
-                lengths[part.at, : read.shape[1]] = read
-        moved: dict[str, None] = {}
-        for run, local, common in zip(problem.runs, at.local, at.common, strict=True):
-            column = np.zeros(len(local))
-            mine = (lengths / problem.sigma)[of_run == run].ravel()
-            column[: len(mine)] = mine
-            moved |= dict.fromkeys(_moved_by(column, np.hstack([local, common]), problem.base_names))
-        if moved:
-            yield AsStated(name, group, {SCALE: tuple(moved)})
-
-
-def _moved_by(column: Array, jacobian: Array, names: tuple[str, ...]) -> Iterator[str]:
-    """The determined errors that a scale with the whitened ``column`` (N,) moves by more than a part of their u."""
-    inverse = inverse_of(jacobian, RANK_TOLERANCE)[: len(names)]
-    is_open = np.abs(eliminate(jacobian[None]).null_space[0][:, : len(names)]).max(axis=0, initial=0.0)
-    change, u = OFF * np.abs(inverse @ column), np.linalg.norm(inverse, axis=1)
-    for name, by, least, is_free in zip(names, change, MOVED * u, is_open < MEMBER_SHARE, strict=True):
-        if is_free and by > least:
-            yield name
+        if group:
+            read = np.zeros_like(problem.sigma)
+            for part in problem.parts:
+                if part.id in group:
+                    read[part.at, : part.lengths().shape[1]] = part.lengths()
+            lengths[name] = group, read
+    return exact_scales(problem, lengths)
 
 
 def _moved(

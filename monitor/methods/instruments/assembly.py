@@ -21,11 +21,12 @@ from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.instruments.base import instrument_base
 from monitor.methods.instruments.part import Part, scale_id_of, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import LEVER, SCALE, Reading, Rows, Stance, in_mm
+from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign, Setup
+from monitor.sources import SCALE
 
 NAME = "instruments"
 DEFAULT_MODEL = Model(NAME)

@@ -21,11 +21,12 @@ from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import COSINE, SCALE, Rows
+from monitor.methods.instruments.reading import COSINE, Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.pose import Pose
 from monitor.records import Array, Setup
+from monitor.sources import SCALE
 
 POSES, SEED = 120, 20260217
 # Travel of a linear axis and places of points at generic poses, mm.

@@ -23,8 +23,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.instruments.reading import SCALE, Reading, Rows, Shown, Stance, mean_of_runs
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, mean_of_runs
 from monitor.records import Array, Setup
+from monitor.sources import SCALE, CommonQuantity
 
 #: What the tool point is off where it is stated with an uncertainty.
 TOOL_POINT = ("tool point x", "tool point y", "tool point z")
@@ -100,6 +101,13 @@ class Part:
             return self.scale_id
         shared: Mapping[str, Hashable] = self.reading.shared
         return shared.get(name, alone)
+
+    def common_quantity(self, name: str, setup: Setup, u: float) -> CommonQuantity | None:
+        """Which calibrated quantity an unknown that is known to ``u`` is; None where no other campaign can have it."""
+        if name not in self.staying or not setup.instrument:
+            return None
+        quantity = name if setup.length is None or name == SCALE else f"{name} of {setup.length:g} mm"
+        return CommonQuantity(setup.instrument, setup.certificate or "", quantity, u)
 
     def start(self, runs: int) -> Array:
         """Where the search for the unknowns begins (R, q): without drift, scale and tool point as stated."""

@@ -25,6 +25,7 @@ from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
 from monitor.records import Array, Setup
+from monitor.sources import CommonQuantity
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
 # mount sags by a degree's fraction, a joint gives way by millimetres.
@@ -347,6 +348,16 @@ class InstrumentProblem(ChainProblem):
     def extra_names(self) -> tuple[str, ...]:
         """What is known of the setups beforehand."""
         return tuple(self.own_names[index] for index, _ in self._priors)
+
+    @property
+    def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
+        """The lengths of bars and scales of instruments that have a name."""
+        quantity_of = {
+            int(columns[index]): part.common_quantity(part.unknowns[index], setup, u)
+            for part, setup, columns in zip(self.parts, self.setups, self.own_columns, strict=True)
+            for index, u in part.prior()
+        }
+        return tuple(quantity_of[index] for index, _ in self._priors)
 
     def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """What the unknowns are off what is known of them, in standard uncertainties."""

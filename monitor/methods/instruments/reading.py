@@ -26,8 +26,6 @@ TURN, SHIFT = ("frame a", "frame b", "frame c"), ("frame x", "frame y", "frame z
 
 #: The unknown of a beam that acts as a gain: known beforehand, or no gain of an axis had a number.
 COSINE = "cosine error"
-#: What lengths are off in proportion to themselves, where that is stated with an uncertainty.
-SCALE = "scale"
 
 
 #: The factor from a column of the file to mm, by the end of its name; a component of a direction has none.

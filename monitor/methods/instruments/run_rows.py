@@ -122,10 +122,3 @@ def instruments_of(problem: InstrumentProblem) -> dict[str, tuple[str, ...]]:
         name = setup.instrument or setup.id
         groups[name] = (*groups.get(name, ()), setup.id)
     return groups
-
-
-def inverse_of(jacobian: Array, tolerance: float) -> Array:
-    """The pseudo-inverse (p, m) of derivatives (m, p), columns scaled to unit length first."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    return np.asarray(np.linalg.pinv(jacobian / scale, rcond=tolerance) / scale[:, None])

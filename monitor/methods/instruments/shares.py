@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
+from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution, inverse_of
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.run_rows import instruments_of, inverse_of, run_rows
+from monitor.methods.instruments.run_rows import instruments_of, run_rows
 from monitor.methods.method import InstrumentShare
 from monitor.records import Array
 

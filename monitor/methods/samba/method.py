@@ -23,6 +23,7 @@ from monitor.methods.rehearsal import Rehearsal
 from monitor.methods.samba.virtual import chosen_campaign, virtual_campaign
 from monitor.records import Array, Campaign
 from monitor.refusal import Advice, AdviceKind
+from monitor.sources import CommonQuantity
 
 NAME = "samba"
 DEFAULT_MODEL = Model(NAME)
@@ -70,7 +71,16 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
         base=model.base_of(chain),
         added=model.added_to(chain),
         sigma=np.full((len(campaign.probings), 3), campaign.probe.standard_uncertainty),
-        distances=(Distance(bar.balls, bar_length(campaign)[probed], bar.standard_uncertainty),),
+        distances=(
+            Distance(
+                bar.balls,
+                bar_length(campaign)[probed],
+                bar.standard_uncertainty,
+                CommonQuantity(
+                    campaign.artefact.id, bar.certificate or "", "length of the bar", bar.standard_uncertainty
+                ),
+            ),
+        ),
         tip=campaign.probe.tip or (0.0, 0.0, 0.0),
     )
     return problem.foreseen() if problem.added else problem

@@ -13,6 +13,7 @@ from monitor.machine import Chain
 from monitor.methods.model import Model, chain_of
 from monitor.methods.tracker.problem import TrackingProblem, first_guess
 from monitor.records import Array, Campaign
+from monitor.sources import SCALE, CommonQuantity
 
 NAME = "tracker"
 DEFAULT_MODEL = Model(NAME)
@@ -32,7 +33,7 @@ def tool_side(chain: Chain) -> Chain:
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProblem:
     """The least-squares problem of a campaign under a model.
 
-    Every coordinate of a point has the stated standard uncertainty.
+    Every coordinate of a point has the stated standard uncertainty, and all of a run the scale where it is stated.
     """
     chain = tool_side(chain_of(campaign.machine))
     context = context_of(campaign, chain)
@@ -43,6 +44,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
             raise DataError(f"run {run} of campaign {campaign.name} measured no reflector on the tool")
     _refuse_copies(campaign, context, points)
     carried, places = first_guess(context, points, fixed)
+    u = campaign.probe.scale_uncertainty
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     return TrackingProblem(
         context=replace(context, nominal=carried),
@@ -52,6 +54,10 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
         reflectors=tuple((float(x), float(y), float(z)) for x, y, z in places),
         fixed=fixed,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
+        observer=campaign.probe.id,
+        scale=None
+        if u is None
+        else CommonQuantity(campaign.probe.id, campaign.probe.certificate or "", SCALE, u),
     )
 
 

@@ -13,11 +13,13 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.methods.rehearsal import Rehearsal
 from monitor.methods.tracker.assembly import NAME, problem_of, tool_side
+from monitor.methods.tracker.problem import TrackingProblem
 from monitor.methods.tracker.virtual import virtual_robot
 from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
@@ -41,12 +43,19 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        readings, unknowns = 3 * int(np.sum(problem.context.run == run)), unknowns_of_run(problem, run)
+        readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
+        unknowns = unknowns_of_run(problem, run)
         if readings < unknowns:
             raise DataError(
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
+
+
+def exact_scale(problem: ChainProblem) -> tuple[AsStated, ...]:
+    """The scale of the tracker where it is taken as exact, and what counts from it."""
+    assert isinstance(problem, TrackingProblem)
+    return problem.exact_scales()
 
 
 METHOD = ChainMethod(
@@ -60,6 +69,7 @@ METHOD = ChainMethod(
     base_effects=tracker_base,
     trial_rows=150,
     shares_base=True,
+    as_stated=exact_scale,
     rehearsal=Rehearsal("robot", virtual_robot, noise_um=20.0),
     coordinates=Unable("points seen by a tracker stand in another frame in every run"),
 )

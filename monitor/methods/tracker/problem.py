@@ -21,10 +21,13 @@ from monitor.effects.catalogue import of_tracker
 from monitor.exceptions import DataError
 from monitor.machine import ChainPose, evaluate
 from monitor.machine.chain import rotation_about
+from monitor.methods.chain.exact_scales import exact_scales
 from monitor.methods.chain.first_frame import all_axes_meet, best_frame, frame_equations
+from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
+from monitor.sources import SCALE, CommonQuantity
 
 FRAME = ("frame x", "frame y", "frame z", "frame a", "frame b", "frame c")
 # A zero that is off by more than 20 degrees is another zero; mastering errors stay below some degrees.
@@ -44,21 +47,27 @@ AXES: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 class TrackingProblem(ChainProblem):
     """Points of reflectors (n rows); ``context.nominal`` (n, 3) holds them in the machine's frame by the first guess,
     ``reflectors`` (T, 3) their places by it in the order of ``targets``, ``fixed`` names those beside the machine,
-    ``gear_ratios`` are those that the machine file gives."""
+    ``gear_ratios`` are those that the machine file gives. ``observer`` is the tracker's name, ``scale`` that of its
+    lengths where it states how well it knows it: an unknown of every run then."""
 
     reflectors: tuple[tuple[float, float, float], ...] = ()
     fixed: tuple[str, ...] = ()
     gear_ratios: tuple[tuple[str, float], ...] = ()
+    observer: str = ""
+    scale: CommonQuantity | None = None
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
-        """The frame's motion, then the coordinates of the reflectors."""
-        return (*FRAME, *(f"reflector {target} {axis}" for target in self.targets for axis in "xyz"))
+        """The frame's motion, the coordinates of the reflectors, then the scale where it is not exact."""
+        places = (f"reflector {target} {axis}" for target in self.targets for axis in "xyz")
+        return (*FRAME, *places, *self.extra_names)
 
     @cached_property
     def own_start(self) -> Array:
         """The first guess (R, q)."""
-        start = np.concatenate([np.zeros(6), np.array(self.reflectors).reshape(-1)])
+        start = np.concatenate(
+            [np.zeros(6), np.array(self.reflectors).reshape(-1), np.zeros(len(self.extra_names))]
+        )
         return np.tile(start, (len(self.runs), 1))
 
     @property
@@ -111,12 +120,19 @@ class TrackingProblem(ChainProblem):
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The measured points in the machine's frame, and the reflectors in that of the last axis."""
         turn, _, _ = self._turned(nuisance)
-        arm = self.context.nominal - self._centre[self._run]
-        points = (
-            np.einsum("nij,nj->ni", turn[self._run], arm) + self._centre[self._run] + nuisance[self._run, :3]
-        )
-        places = nuisance[:, 6:].reshape(len(self.runs), len(self.targets), 3)
+        points = self._arms(turn) + self._centre[self._run] + nuisance[self._run, :3]
+        if self.scale is not None:
+            # About the middle: where the tracker stands is the frame's.
+            points += self._arms(turn) * nuisance[self._run, -1:]
+        end = 6 + 3 * len(self.targets)
+        places = nuisance[:, 6:end].reshape(len(self.runs), len(self.targets), 3)
         return points, places[self._run, self._target]
+
+    def _arms(self, turn: Array) -> Array:
+        """The measured points (n, 3) from the middle of their run, as ``turn`` (R, 3, 3) has their frame."""
+        arm = self.context.nominal - self._centre[self._run]
+        arms: Array = np.einsum("nij,nj->ni", turn[self._run], arm)
+        return arms
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain at (R, p) and (c,); reflectors beside the machine are not carried by it."""
@@ -138,15 +154,41 @@ class TrackingProblem(ChainProblem):
         derivatives = np.zeros((len(self.context), 3, nuisance.shape[1]))
         derivatives[:, :, :3] = -np.eye(3)
         turn, about_cb, about_c = self._turned(nuisance)
-        arm = self.context.nominal - self._centre[self._run]
-        turned = np.einsum("nij,nj->ni", turn[self._run], arm)
+        turned = self._arms(turn)
         # d(R_C R_B R_A) turns about R_C R_B x, R_C y and z.
         for index, axes in enumerate((about_cb[:, :, 0], about_c[:, :, 1], np.tile(AXES[2], (len(turn), 1)))):
             derivatives[:, :, 3 + index] = -np.cross(axes[self._run], turned)
         rows = np.arange(len(self.context))
         for axis in range(3):
             derivatives[rows, :, 6 + 3 * self._target + axis] = pose.by_tip[:, :, axis]
+        if self.scale is not None:
+            derivatives[:, :, -1] = -turned
         return derivatives
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """The scale, where the tracker states how well it knows it."""
+        return () if self.scale is None else (SCALE,)
+
+    @property
+    def common_quantities(self) -> tuple[CommonQuantity | None, ...]:
+        """The scale."""
+        return () if self.scale is None else (self.scale,)
+
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
+        """What the scale is off, in its standard uncertainty."""
+        if self.scale is None:
+            return super().extras(nuisance)
+        by_own = np.zeros((len(nuisance), 1, nuisance.shape[1]))
+        by_own[:, 0, -1] = 1.0 / self.scale.u
+        return nuisance[:, -1:] / self.scale.u, by_own
+
+    def exact_scales(self) -> tuple[AsStated, ...]:
+        """The tracker, where it does not say how well it knows its scale, with what that moves."""
+        if self.scale is not None:
+            return ()
+        turn, _, _ = self._turned(self.own_start)
+        return tuple(exact_scales(self, {self.observer: (self.targets, self._arms(turn))}))
 
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""

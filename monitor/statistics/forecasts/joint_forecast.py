@@ -35,11 +35,13 @@ NODES = 48
 class JointLines:
     """The ``lines`` of p parameters, and the ``correlation`` (p, p) of lines and scatter.
 
-    The lines are in the unit of their values over days or any unit of time.
+    The lines are in the unit of their values over days or any unit of time. ``common`` (q, p) are their changes for one
+    standard uncertainty of each of q quantities by which all runs are off together; None without any.
     """
 
     lines: Sequence[Trend]
     correlation: Array
+    common: Array | None = None
 
     def predict(self, t: float) -> Array:
         """Return the best estimate (p,) of the parameters at a time."""
@@ -177,9 +179,10 @@ def draw_lines(joint: JointLines, rng: np.random.Generator, count: int) -> Futur
     roots = np.array([np.linalg.cholesky(line.covariance + 1e-30 * np.eye(2)) for line in lines])
     level = z[0] * roots[:, 0, 0]
     slope = z[0] * roots[:, 1, 0] + z[1] * roots[:, 1, 1]
-    return Futures(
-        joint, level * heavy, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy
-    )
+    level *= heavy
+    if joint.common is not None and joint.common.size:
+        level += rng.standard_normal((count, len(joint.common))) @ joint.common
+    return Futures(joint, level, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy)
 
 
 def _first_crossing(times: Array, lengths: Array, limit: float) -> Array:

@@ -107,6 +107,7 @@ class FleetSums(GroupSums):
     are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
     without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
     it). ``last_value`` and ``last_u`` are of the last run of the machine (NaN where the parameter was refused there),
+    ``last_common`` is what that u holds of calibrated quantities that outlast a campaign,
     ``check_d`` is when it is measured next, as far after its last run as its campaigns lie apart (days since 1970).
     """
 
@@ -131,6 +132,7 @@ class FleetSums(GroupSums):
     beyond_d: Array
     last_value: Array
     last_u: Array
+    last_common: Array
     check_d: Array
     repeated_sums: RepeatedSums
     temperatures: TemperatureSums
@@ -273,6 +275,7 @@ def _sums(
         beyond_d=number["beyond_d"],
         last_value=number["last_value"] / f,
         last_u=number["last_u"] / f,
+        last_common=number["last_common"] / f,
         check_d=number["check_d"],
         repeated_sums=RepeatedSums(
             runs=number["runs_rep"],

@@ -267,14 +267,23 @@ WITH last AS (
     FROM fleet_chosen GROUP BY machine_no
 ), ends AS (
     SELECT campaign_id, arg_max(run, started_at) AS run FROM run SEMI JOIN last USING (campaign_id) GROUP BY campaign_id
+), parts AS (
+    SELECT identification_id, unnest(part) AS part, generate_subscripts(part, 1) AS number
+    FROM common_part JOIN last USING (identification_id) JOIN ends USING (campaign_id, run)
+), common AS (
+    SELECT identification_id, list(u ORDER BY number) AS us
+    FROM (SELECT identification_id, number, sqrt(sum(part * part)) AS u FROM parts GROUP BY ALL)
+    GROUP BY identification_id
 )
-SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, x AS last_value, u AS last_u
+SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, x AS last_value, u AS last_u, coalesce(of_all, 0.0) AS last_common
 FROM (
     SELECT machine_no, unnest(h.numbers) AS k, unnest(list_transform(v.value, lambda xs: xs[place])) AS x,
-           unnest(list_transform(v.u, lambda us: us[place])) AS u
+           unnest(list_transform(v.u, lambda us: us[place])) AS u,
+           unnest(coalesce(v.us, list_transform(v.u, lambda us: 0.0))) AS of_all
     FROM (
-        SELECT last.*, list_position(v.runs, run) AS place, v.value, v.u
+        SELECT last.*, list_position(v.runs, run) AS place, v.value, v.u, common.us
         FROM last JOIN ends USING (campaign_id) JOIN identified_values AS v USING (identification_id)
+        LEFT JOIN common USING (identification_id)
     ) AS v JOIN fleet_heading AS h USING (heading)
 )
 """
@@ -399,7 +408,8 @@ SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        coalesce(l.latest_n, 0) AS latest_n, coalesce(l.latest_k, 0) AS latest_k, coalesce(l.latest_m, 0.0) AS latest_m,
        coalesce(l.latest_mm, 0.0) AS latest_mm, coalesce(e.since_d, 'nan') AS since_d,
        coalesce(b.beyond_d, 'nan') AS beyond_d,
-       coalesce(r.last_value, 'nan') AS last_value, coalesce(r.last_u, 'nan') AS last_u, c.check_d,
+       coalesce(r.last_value, 'nan') AS last_value, coalesce(r.last_u, 'nan') AS last_u,
+       coalesce(r.last_common, 0.0) AS last_common, c.check_d,
        coalesce(h.channel, '') AS thermometer
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}

@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
+from monitor.store.past.common_parts import parts_of
 from monitor.store.past.identified_values import IdentifiedValues, values_of
 from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
 from monitor.store.type_tolerances import types_in_use
@@ -112,8 +114,9 @@ class MachineHistory:
     the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
     are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
     of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
-    in the same order. ``fits`` by campaign say whether its readings refute the model, where that was looked for: none
-    for identifications of older versions.
+    in the same order. ``common_parts`` are what values (n, p) have of each calibrated quantity that outlasts a
+    campaign, 0 for runs that do not rest on it. ``fits`` by campaign say whether its readings refute the model, where
+    that was looked for: none for identifications of older versions.
     """
 
     machine: str
@@ -134,6 +137,7 @@ class MachineHistory:
     unidentified: tuple[str, ...]
     channels: frozenset[str] = frozenset()
     fits: Mapping[str, CampaignFit] = field(default_factory=dict)
+    common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
 
     @cached_property
     def seconds(self) -> Array:
@@ -160,6 +164,10 @@ class MachineHistory:
             values=np.array(self.values[:, columns], order="C"),
             u=np.array(self.u[:, columns], order="C"),
             conditions={name: values.copy() for name, values in self.conditions.items()},
+            common_parts={
+                quantity: np.array(parts[:, columns], order="C")
+                for quantity, parts in self.common_parts.items()
+            },
         )
 
     def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
@@ -178,6 +186,7 @@ class MachineHistory:
             values=self.values[mask],
             u=self.u[mask],
             conditions={name: values[mask] for name, values in self.conditions.items()},
+            common_parts={quantity: parts[mask] for quantity, parts in self.common_parts.items()},
         )
 
 
@@ -190,17 +199,18 @@ def machine_history(
     parameter: str | None = None,
     since: datetime | None = None,
     followed_by: Mapping[str, tuple[str, int]] = MappingProxyType({}),
+    has_parts: bool = True,
 ) -> MachineHistory:
-    """All identified runs of a machine under one model, from ``since`` on.
+    """All identified runs of a machine under one model, from ``since`` on; its ``common_parts`` where asked for.
 
     Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
     own. May hold no run. Raises NotFoundError for a machine that is not there.
     """
     if since is None:
-        key = ("history", machine, model, version, tuple(sorted(followed_by.items())))
-        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by))
+        key = ("history", machine, model, version, tuple(sorted(followed_by.items())), has_parts)
+        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by, has_parts))
         return whole.own_copy(parameter)
-    return _read(db, machine, model, version, parameter, since, followed_by)
+    return _read(db, machine, model, version, parameter, since, followed_by, has_parts)
 
 
 def _read(
@@ -211,6 +221,7 @@ def _read(
     parameter: str | None,
     since: datetime | None,
     followed_by: Mapping[str, tuple[str, int]],
+    has_parts: bool,
 ) -> MachineHistory:
     campaigns = campaigns_of_machine(db, machine)
     identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
@@ -243,7 +254,30 @@ def _read(
         unidentified=_unidentified(campaigns, recorded, identified),
         channels=channels,
         fits=_fits(db, campaigns, identified),
+        common_parts=_common_parts(db, identified.values(), rows, names) if has_parts else {},
     )
+
+
+def _common_parts(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    names: tuple[str, ...],
+) -> dict[CommonQuantity, Array]:
+    """What the values (n, p) of the history have of each calibrated quantity, in display units."""
+    at = {name: column for column, name in enumerate(names)}
+    heads = {head.number: head for head in identified}
+    places: dict[int, tuple[list[int], list[int], Array]] = {}
+    for number, head in heads.items():
+        read = [index for index, name in enumerate(head.parameters) if name in at]
+        places[number] = read, [at[head.parameters[index]] for index in read], np.array(head.factors)[read]
+    parts: dict[CommonQuantity, Array] = {}
+    for (number, run), of_run in parts_of(db, list(heads)).items():
+        read, columns, factors = places[number]
+        for quantity, part in of_run.items() if (number, run) in rows else ():
+            whole = parts.setdefault(quantity, np.zeros((len(rows), len(names))))
+            whole[rows[number, run], columns] = np.nan_to_num(part[read] / factors)
+    return parts
 
 
 def _fits(

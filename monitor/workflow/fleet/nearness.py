@@ -88,7 +88,7 @@ def _inside(sums: FleetSums, cells: CellTests, drift: CellDrift, level: Array, l
     at = sums.check_d - sums.epoch_d
     value = level + drift.slope * (sums.check_d - sums.last_d)
     ends = sums.last_d - sums.epoch_d
-    line = _LineAhead(drift.lines, value, about, drift.u, sums.first_d - sums.epoch_d, ends)
+    line = _LineAhead(drift.lines, value, about, drift.u, sums.first_d - sums.epoch_d, ends, sums.last_common)
     inside = line.inside(at, of_run, limit)
     doubted = np.flatnonzero(inside < RELIABILITY)
     if doubted.size:
@@ -104,7 +104,8 @@ def _inside(sums: FleetSums, cells: CellTests, drift: CellDrift, level: Array, l
 @dataclass(frozen=True, eq=False)
 class _LineAhead:
     """Lines of c cells: their ``value`` at the next check, the variance of a day ``about`` them, ``u`` of the slope
-    with its season, and when the days they go through begin and end, in days as those of the lines."""
+    with its season, and when the days they go through begin and end, in days as those of the lines; all runs are off
+    together by the standard uncertainty ``common``."""
 
     lines: BlockLines
     value: Array
@@ -112,6 +113,7 @@ class _LineAhead:
     u: Array
     begins: Array
     ends: Array
+    common: Array
 
     def inside(self, at: Array, of_run: Array, limit: Array) -> Array:
         """Return the probability (c,) that a run, of variance ``of_run`` about its day, lies within ± ``limit``.
@@ -129,6 +131,7 @@ class _LineAhead:
                 SeasonAhead(of_slope, self.begins, self.ends, DAYS_PER_YEAR, bend).at(at)
             )
             spread = np.maximum(of_line, 0.0) + of_season**2 + self.about * self.lines.scatter + of_run
+            spread += self.common**2
             u = np.maximum(np.sqrt(spread), 1e-300)
             dof = np.where(self.lines.dof > 0.0, self.lines.dof, np.nan)
             above, below = (limit - self.value) / u, (-limit - self.value) / u
@@ -178,4 +181,4 @@ def _line_since(sums: FleetSums, rows: npt.NDArray[np.intp], groups: Array, at: 
         about = (groups * deviation**2).sum(axis=1) / (used.sum(axis=1) - 2.0)
     u = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal).u
     value = sums.origin[rows] + mean + slope * (at - mean_t)
-    return _LineAhead(lines, value, about, u, first, last)
+    return _LineAhead(lines, value, about, u, first, last, sums.last_common[rows])

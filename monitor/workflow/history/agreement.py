@@ -18,12 +18,14 @@ import numpy.typing as npt
 from monitor.documents import OMITTED, WORDED
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Undecided
+from monitor.sources import CommonQuantity
 from monitor.statistics.days.before_after import OtherDays, before_after
 from monitor.statistics.days.beside_drift import Verdict, beside_drift
 from monitor.statistics.days.stepped_line import campaigns_of
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
+from monitor.workflow.history.in_common import RestsOn, calibrated_alike, rests_on
 from monitor.workflow.history.series import day_numbers
 
 #: Level of false calls of one parameter at one event.
@@ -88,7 +90,7 @@ class AgreementPair:
     """Two results with E_n of every parameter that both have; ``disagree`` names those beyond their uncertainties.
 
     Two ``methods``, of which the second was measured ``days_apart`` after the first (before it where negative); or one
-    ``method`` before and after an ``event``.
+    ``method`` before and after an ``event``. What both rest on, ``in_common``, is no part of their difference.
     """
 
     kind: PairKind
@@ -100,6 +102,7 @@ class AgreementPair:
     days_apart: float | None = field(default=None, metadata=OMITTED)
     parameters: Mapping[str, ParameterAgreement]
     disagree: tuple[str, ...]
+    in_common: tuple[RestsOn, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,7 @@ def agreement(
     # Of years of campaigns few are compared: only their results are read.
     names = {name for comparison in comparisons for name in comparison.pair.campaigns}
     history = _with_stated(history, _stated_uncertainties(db, history, names))
+    history = replace(history, common_parts=calibrated_alike(history.common_parts))
     pairs = [_compared(history, comparison) for comparison in comparisons]
     return tuple(pair for pair in pairs if pair.parameters)
 
@@ -240,6 +244,7 @@ def _across_event(
 def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair:
     first, second = comparison.pair.campaigns
     parameters: dict[str, ParameterAgreement] = {}
+    in_common: dict[CommonQuantity, None] = {}
     for column, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         if comparison.pair.kind is PairKind.EVENT:
             across = _across_event(history, comparison, column, unit)
@@ -255,10 +260,31 @@ def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair
         if len(results) < 2 or results[0][1] + results[1][1] == 0.0:
             continue
         (x1, u1), (x2, u2) = results
-        error = normalised_error(x1, u1, x2, u2)
+        shared = _shared(history, comparison, column)
+        in_common |= dict.fromkeys(shared)
+        try:
+            error = normalised_error(x1, u1, x2, u2, sum(shared.values()))
+        except DataError:
+            continue
         parameters[name] = ParameterAgreement(
             unit, x1, u1, x2, u2, float(error.difference[0]), float(error.expanded[0]), K, float(error.e_n[0]),
             bool(error.agree[0]),
         )  # fmt: skip
     disagree = tuple(name for name, result in parameters.items() if result.agree is False)
-    return replace(comparison.pair, parameters=parameters, disagree=disagree)
+    return replace(
+        comparison.pair,
+        parameters=parameters,
+        disagree=disagree,
+        in_common=tuple(map(rests_on, sorted(in_common))) or None,
+    )
+
+
+def _shared(history: MachineHistory, comparison: _Comparison, column: int) -> dict[CommonQuantity, float]:
+    """The covariance of both results by each calibrated quantity that both rest on (JCGM 100:2008, F.1.2.3)."""
+    first, second = _rows(history, comparison, column)
+    shared = {}
+    for quantity, part in history.common_parts.items():
+        product = float(part[first, column].mean() * part[second, column].mean())
+        if product != 0.0:
+            shared[quantity] = product
+    return shared

@@ -79,7 +79,13 @@ def drift_forecast(
     checks = [] if check is None else [max(check, origin)]
     try:
         ahead = statistics.forecast(
-            line, (-limit, limit), origin, checks, reliability=reliability, horizon=horizon_of(origin)
+            line,
+            (-limit, limit),
+            origin,
+            checks,
+            reliability=reliability,
+            horizon=horizon_of(origin),
+            common=float(drift.piece.u_common[-1]),
         )
     except DataError:
         return None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import cached_property
 
@@ -10,9 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
+from monitor.sources import CommonQuantity
 from monitor.store import FEWEST_STEADY, MachineHistory
 from monitor.units import DEGREE_CELSIUS, column_unit
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
+from monitor.workflow.history.in_common import calibrated_alike
+
+#: A run differs from others by this part of its u at least; less is rounding of what it has in common with them.
+LEAST_OF_RUN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +29,8 @@ class Series:
     days, ``hour`` (n,) of the shop's clock, ``warm_up`` (n,) whether the machine was warming up; ``offset`` of the
     shop's clock from UTC, that of the machine's last run. ``temperature`` (n,) is that of the machine or its shop in °C
     as far as recorded (NaN: not), under the name ``thermometer``. ``campaign`` (n,) numbers the campaigns of the runs;
-    None where nobody says them.
+    None where nobody says them. ``common_parts`` (n,) are what values change by for one standard uncertainty of each
+    calibrated quantity that outlasts a campaign.
     """
 
     name: str
@@ -38,6 +45,7 @@ class Series:
     temperature: Array | None = None
     thermometer: str | None = None
     campaign: npt.NDArray[np.intp] | None = None
+    common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
 
     def part(self, mask: npt.NDArray[np.bool_]) -> Series:
         """The runs of a mask (n,)."""
@@ -47,6 +55,7 @@ class Series:
             self.name, self.unit, self.values[mask], self.u[mask], self.t[mask], self.days[mask], self.hour[mask],
             self.warm_up[mask], self.offset, None if self.temperature is None else self.temperature[mask],
             self.thermometer, None if self.campaign is None else self.campaign[mask],
+            {quantity: part[mask] for quantity, part in self.common_parts.items()},
         )  # fmt: skip
 
     @cached_property
@@ -76,9 +85,24 @@ class Series:
         mask: npt.NDArray[np.bool_] = (ended >= began[ended == ended.max()].min())[day]
         return mask
 
+    @property
+    def in_all_runs(self) -> dict[CommonQuantity, Array]:
+        """The parts (n,) of the quantities that every run rests on: by these all runs are off together."""
+        return {quantity: part for quantity, part in self.common_parts.items() if len(part) and part.all()}
+
+    @property
+    def u_common(self) -> Array:
+        """The standard uncertainty (n,) of what all runs are off together: no number of runs makes it smaller, and no
+        difference of two runs has it."""
+        parts = [part**2 for part in self.in_all_runs.values()]
+        return np.sqrt(np.sum(parts, axis=0)) if parts else np.zeros(len(self.u))
+
     def weights(self) -> Array | None:
-        """The uncertainties of the runs, None where a run has none (then all count alike)."""
-        return self.u if bool(np.isfinite(self.u).all() and (self.u > 0.0).all()) else None
+        """The uncertainties of the runs by which they differ, None where a run has none (then all count alike)."""
+        if not bool(np.isfinite(self.u).all() and (self.u > 0.0).all()):
+            return None
+        of_run = self.u**2 - self.u_common**2
+        return np.sqrt(np.maximum(of_run, (LEAST_OF_RUN * self.u) ** 2))
 
 
 def _steady(warm_up: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -123,12 +147,13 @@ def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDA
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
     thermometer, temperature = _temperature(history)
     campaign = np.unique(history.campaign, return_inverse=True)[1].ravel()
+    common = calibrated_alike(history.common_parts)
     series = {}
     for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         mask = np.isfinite(history.values[:, j])
         whole = Series(
             name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset,
-            temperature, thermometer, campaign,
+            temperature, thermometer, campaign, {quantity: part[:, j] for quantity, part in common.items()},
         )  # fmt: skip
         if mask.any():
             series[name] = (whole.part(mask), mask)

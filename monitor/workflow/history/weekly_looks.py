@@ -65,7 +65,8 @@ def weekly_notices(db: Database, last: Week | None = None) -> WeeklyNotices:
 
 def _machine_weeks(db: Database, name: str, last: Week | None) -> _MachineWeeks | None:
     """The weeks of a machine; None where it has no value."""
-    history = machine_history(db, name, followed_by=numbered_by(db, name))
+    # Weeks are compared with weeks: what all of them have in common is in no difference.
+    history = machine_history(db, name, followed_by=numbered_by(db, name), has_parts=False)
     recorded = machine_runs(db, name)
     campaigns, _ = possible_campaigns(recorded, ())
     history = only_runs(

@@ -121,6 +121,11 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
                 chi_square=run.chi_square,
                 sequence=probings.sequence[probings.run == run.run],
                 residuals=run.residuals,
+                # What each run alone says of an added effect is taken as its own.
+                common_parts={
+                    quantity: np.concatenate([part, np.zeros(more)])
+                    for quantity, part in run.common_parts.items()
+                },
             )
         )
     return StoredIdentification(

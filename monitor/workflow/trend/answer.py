@@ -14,6 +14,7 @@ from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.in_common import RestsOn
 from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.season import Season, SlopeVerdict
 
@@ -82,7 +83,8 @@ class DriftStatement:
 
 @dataclass(frozen=True)
 class LatestMean:
-    """The mean of the last day's runs; its uncertainty by their scatter, of a single run as stated."""
+    """The mean of the last day's runs; its uncertainty by their scatter and what all runs rest on, of a single run as
+    stated."""
 
     latest: float
     latest_u: float | None
@@ -340,7 +342,8 @@ class ControlCharts:
 
 @dataclass(frozen=True)
 class ParameterTrend:
-    """The long view of one parameter."""
+    """The long view of one parameter. All runs since its last change are off together by what it ``rests_on``: levels
+    and forecasts hold that, slopes and steps do not."""
 
     unit: str
     drift: DriftStatement = field(metadata=INLINED)
@@ -360,6 +363,7 @@ class ParameterTrend:
     control: ParameterCharts
     q_value: float | None
     event_steps: tuple[StepAtEvent, ...] = ()
+    rests_on: tuple[RestsOn, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from monitor.statistics import (
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
+from monitor.workflow.history.in_common import RestsOn, rests_on
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import (
     ConditionEffect,
@@ -37,6 +38,8 @@ from monitor.workflow.trend.answer import (
 DAY_COVERAGE_H, YEAR_COVERAGE_D = 12.0, 300.0
 #: A dependence needs so many runs with the condition; a cycle so many, by its name.
 FEWEST_RUNS, FEWEST_OF_CYCLE = 6, {"day": 8, "year": 12}
+#: What all runs rest on is named from this part of u on.
+COUNTS = 0.1
 #: Channels that go together more closely than this cannot be told apart (their variances inflate tenfold).
 COLLINEAR = 0.95
 
@@ -83,16 +86,27 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
 
 
 def latest_mean(steady: Series) -> LatestMean:
-    """The mean of the last day's steady runs, with its standard uncertainty (None where not stated).
+    """The mean of the last day's steady runs, with its standard uncertainty (None where not stated): the scatter of the
+    runs by their number, and what they are off together.
 
     A day of another campaign that overlaps it is part of it, as in the table of all machines.
     """
     last = steady.of_last_day
     count = int(last.sum())
-    u = float(steady.values[last].std(ddof=1) / np.sqrt(count)) if count > 1 else float(steady.u[last][0])
+    if count > 1:
+        common = float(steady.part(last).u_common[-1])
+        u = float(np.hypot(steady.values[last].std(ddof=1) / np.sqrt(count), common))
+    else:
+        u = float(steady.u[last][0])
     return LatestMean(
         float(steady.values[last].mean()), number(u), count, date(float(steady.t[-1]), steady.offset)
     )
+
+
+def all_rest_on(piece: Series) -> tuple[RestsOn, ...]:
+    """What all runs of a piece of history are off together by, as far as it counts in the uncertainty of its last."""
+    u_of = {quantity: float(abs(part[-1])) for quantity, part in piece.in_all_runs.items()}
+    return tuple(rests_on(quantity, u) for quantity, u in u_of.items() if u > COUNTS * piece.u[-1])
 
 
 def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedChange:

@@ -48,6 +48,7 @@ from monitor.workflow.trend.control import Charts, points_of
 from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast
 from monitor.workflow.trend.parameter import (
+    all_rest_on,
     conditions,
     cycles,
     dated_change,
@@ -308,6 +309,7 @@ class _Page:
             why_no_backtest=why_no_test,
             control=self.charts.of(self.history.parameters.index(series.name)),
             q_value=None,
+            rests_on=all_rest_on(drift.piece) or None,
         )
 
     def _channels(self, past: ParameterPast) -> dict[str, Array]:

@@ -170,6 +170,18 @@ def _residuals(parameters: _Extrapolated) -> Array:
     return residuals
 
 
+def _in_common(parameters: _Extrapolated) -> Array:
+    """What the p parameters are off together (q, p), for one standard uncertainty of each of q quantities."""
+    of_each = [parameters.drifts[name].piece.in_all_runs for name in parameters.lines]
+    quantities = dict.fromkeys(quantity for parts in of_each for quantity in parts)
+    return np.array(
+        [
+            [float(parts[quantity][-1]) if quantity in parts else 0.0 for parts in of_each]
+            for quantity in quantities
+        ]
+    )
+
+
 def _backtest(
     parameters: _Extrapolated, vectors: _Vectors, rng: np.random.Generator
 ) -> tuple[VolumetricTest | None, Lack | None]:
@@ -252,7 +264,7 @@ def volumetric_forecast(
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
     correlation, shrunk, _ = statistics.residual_correlation(_residuals(parameters), parameters.days)
     ahead = statistics.forecast_longest(
-        statistics.JointLines(list(parameters.lines.values()), correlation),
+        statistics.JointLines(list(parameters.lines.values()), correlation, _in_common(parameters)),
         statistics.ErrorVectors(vectors.sensitivity, vectors.at_zero),
         statistics.LengthQuestion(
             limit, origin, [max(question.check, origin)], horizon_of(origin), question.reliability

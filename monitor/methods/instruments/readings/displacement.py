@@ -15,8 +15,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import COSINE, SCALE, Plain, Rows, Shown, Stance, direction_of
+from monitor.methods.instruments.reading import COSINE, Plain, Rows, Shown, Stance, direction_of
 from monitor.records import Array
+from monitor.sources import SCALE
 
 #: A laser is set up along an axis to a millimetre over a metre.
 BEAM = 1e-3

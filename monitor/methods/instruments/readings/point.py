@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.methods.instruments.frames import first_frame, seen_points
-from monitor.methods.instruments.reading import SCALE, SHIFT, TURN, Plain, Rows, Shown, Stance
+from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Shown, Stance
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
+from monitor.sources import SCALE
 
 # Where the points vary along the line of sight by less than this part of what they vary across it, two numbers show a
 # tilt of the frame only through products of errors.
