@@ -67,6 +67,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
 
     Raises NotFoundError for a machine or parameter that is not there, InputError for dates that cannot be.
     """
+    request = request.at_machine(db)
     history = _history(db, request)
     events = machine_events(db, request.machine)
     # Read before anything is computed: the file is let go of when nothing was asked for a moment.
