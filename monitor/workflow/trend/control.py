@@ -152,8 +152,8 @@ class Charts:
         )  # fmt: skip
 
     def _all_in_reference(self, count: int) -> Lack:
-        name = f"{self.points.kind} since the last event" if self.is_since_event else self.points.kind
-        return Lack(Part.CHART, Cause.ALL_IN_REFERENCE, count=count, name=name)
+        cause = Cause.ALL_SINCE_EVENT_IN_REFERENCE if self.is_since_event else Cause.ALL_IN_REFERENCE
+        return Lack(Part.CHART, cause, count=count, name=self.points.kind)
 
     def of_vector(self, names: tuple[str, ...], rng: np.random.Generator) -> VectorCharts:
         """T² and MEWMA of all parameters together; the shares say which of them raise the latest point."""
