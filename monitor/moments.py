@@ -11,7 +11,7 @@ from monitor.exceptions import InputError
 _DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 _MOMENT = re.compile(
     _DAY.pattern
-    + r"([T ][0-9]{1,2}:[0-9]{2}(:[0-9]{2}([.,][0-9]{1,6})?)?( ?(Z|[+-][0-9]{2}(:?[0-9]{2})?))?)?"
+    + r"([T ][0-9]{1,2}:[0-9]{2}(:[0-9]{2}([.,][0-9]{1,6})?)?( ?(Z|[+-][0-9]{2}(:?[0-9]{2}(:?[0-9]{2})?)?))?)?"
 )
 
 
@@ -30,8 +30,16 @@ def day_of(text: str, named: str) -> date:
 
 
 def moment_of(text: str, named: str, zone: tzinfo | None = None) -> datetime:
-    """Return the moment of a text with its offset; a day is its beginning, without an offset it is a time of ``zone``
-    (None: of this computer).
+    """Return the moment of a text with its offset: as ``written_moment``, and without an offset a time of ``zone``
+    (None: of this computer). Raises InputError."""
+    read = written_moment(text, named)
+    if read.tzinfo is not None:
+        return read
+    return with_offset(read, named) if zone is None else read.replace(tzinfo=zone)
+
+
+def written_moment(text: str, named: str) -> datetime:
+    """Return the moment of a text, with its offset where it has one; a day is its beginning.
 
     ``named`` begins the message, such as ``--at soon``. Raises InputError, which names the forms that are read, or says
     what no calendar or clock has.
@@ -44,12 +52,9 @@ def moment_of(text: str, named: str, zone: tzinfo | None = None) -> datetime:
     day, _, time = typed.replace("T", " ").partition(" ")
     hour, colon, rest = time.replace(" ", "").partition(":")
     try:
-        read = datetime.fromisoformat(f"{day}T{hour:0>2}{colon}{rest}" if time else day)
+        return datetime.fromisoformat(f"{day}T{hour:0>2}{colon}{rest}" if time else day)
     except ValueError as error:
         raise InputError(f"{named}: there is no such day or time, {error}") from error
-    if read.tzinfo is not None:
-        return read
-    return with_offset(read, named) if zone is None else read.replace(tzinfo=zone)
 
 
 def with_offset(moment: datetime, named: str) -> datetime:

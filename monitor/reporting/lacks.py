@@ -34,6 +34,7 @@ class Cause(StrEnum):
     """Why it is not there. ``OWN_WORDS`` is what a method says that refuses the numbers."""
 
     ALL_IN_REFERENCE = "all_in_reference"
+    ALL_SINCE_EVENT_IN_REFERENCE = "all_since_event_in_reference"
     DOES_NOT_SETTLE = "does_not_settle"
     FEW_DAYS = "few_days"
     FEW_POINTS = "few_points"
@@ -101,6 +102,7 @@ _SUBJECTS = {
 }
 _CAUSES = {
     Cause.ALL_IN_REFERENCE: "all {count} {name} are the reference period",
+    Cause.ALL_SINCE_EVENT_IN_REFERENCE: "all {count} {name} since the last event are the reference period",
     Cause.DOES_NOT_SETTLE: "nothing settles within the {needed[0]} h recorded of a day",
     Cause.FEW_DAYS: (
         "{count} days since the last change or event are too few to hold any out; {needed[0]} are needed"

@@ -10,6 +10,7 @@ from typing import Any
 import duckdb
 
 from monitor.exceptions import InputError
+from monitor.stopping import broken_off_by, checkpoint
 from monitor.store.connection import Database
 
 #: What DuckDB calls a moment with a time zone, such as ``now()``.
@@ -38,11 +39,12 @@ def _reading(connection: duckdb.DuckDBPyConnection) -> Iterator[None]:
 def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
     """Run one SELECT, SHOW or DESCRIBE; at most ``limit`` rows.
 
-    Raises InputError for anything else, and for what DuckDB does not understand, with its own words.
+    Raises InputError for anything else, and for what DuckDB does not understand, with its own words; StoppedError, also
+    in the midst of the query, where it is taken back.
     """
     with db.connected() as connection:
         statement = _only_query(connection, text)
-        with _reading(connection):
+        with _reading(connection), broken_off_by(connection.interrupt):
             try:
                 cursor = connection.execute(statement)
                 columns = tuple(str(column[0]) for column in cursor.description or ())
@@ -51,6 +53,8 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
                 cursor = cursor if zoned is None else connection.execute(zoned)
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
+                # A query that was broken off has no fault.
+                checkpoint()
                 raise InputError(f"the query cannot be answered: {fault}") from fault
     truncated = limit is not None and len(rows) > limit
     return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)

@@ -86,7 +86,7 @@ def application(
     app.state.presses = Presses()
     app.state.working_folder = working_folder
     app.include_router(static_routes())
-    app.include_router(interface(asker, working_folder))
+    app.include_router(interface(desk, working_folder))
     for room in _PAGES:
         app.include_router(room.routes())
     app.add_exception_handler(HTTPException, _of_http)
@@ -95,7 +95,7 @@ def application(
     app.add_exception_handler(MonitorError, _of_question)
     app.add_exception_handler(Exception, _of_question)
     # Around everything, what answers a fault of the software included.
-    return Gate(app, settings, app.state.sessions, desk.close)
+    return Gate(app, settings, app.state.sessions, desk)
 
 
 async def _of_http(request: Request, error: Exception) -> Response:

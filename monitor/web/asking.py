@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,10 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from monitor.exceptions import InputError, MonitorError
+from monitor.stopping import Stop, is_stoppable, stoppable
 from monitor.store import Database, last_identification, list_campaigns
 from monitor.web.access import NOT_OFFERED, offered, role_needed, taken_fields, writes
+from monitor.web.days import with_moments
 from monitor.web.freshness import IDENTIFYING, REMEMBERED, Freshness
 from monitor.web.opening import Copies
 from monitor.web.users import User
@@ -55,6 +57,8 @@ class Asker:
         self._db = db
         self._copies = copies
         self.freshness = Freshness()
+        #: Set where the server ends: it stops what nobody else can take back.
+        self.ending = Stop()
         self._path = os.path.abspath(db.path)
         self._file = _identity(self._path)
         self._own_files = {question: {"trusted": trusted_signers} for question in _OF_SIGNERS}
@@ -70,9 +74,19 @@ class Asker:
         Without ``storing`` all that the question stores is undone once it is answered. ``progress`` is told what an
         import begins with.
 
-        Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
+        Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises;
+        StoppedError where it is taken back, or the server ends.
         """
         check_role(user, question)
+        with nullcontext() if is_stoppable() else stoppable(self.ending):
+            return self._answered(
+                user, question, document or {}, files or {}, tolerances, storing=storing, progress=progress
+            )
+
+    def _answered(
+        self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any],
+        tolerances: Mapping[str, Mapping[str, float]] | None, *, storing: bool, progress: Callable[[str], None] | None,
+    ) -> Any:  # fmt: skip
         self.follow()
         if self._copies is None and _identity(self._path) != self._file:
             # What is written from now on would go with the old file.
@@ -81,13 +95,13 @@ class Asker:
                 "until the server is stopped and started again"
             )
         if not storing:
-            return self._tried(user, question, document or {}, files or {})
+            return self._tried(user, question, document, files)
         if question not in REMEMBERED or files or tolerances is not None:
-            return self._asked(user, question, document or {}, files or {}, tolerances, progress)
+            return self._asked(user, question, document, files, tolerances, progress)
         # The key before the copy that is asked: an older copy's answer would be remembered as that of a newer.
-        key, answer = self.freshness.recall(question, document or {})
+        key, answer = self.freshness.recall(question, document)
         if answer is None:
-            answer = self._asked(user, question, document or {}, {}, None)
+            answer = self._asked(user, question, document, {}, None)
             self.freshness.remember(key, answer)
         return answer
 
@@ -185,7 +199,7 @@ def request_of(question: str, document: Mapping[str, Any], files: Mapping[str, A
     if kind is None:
         return None
     try:
-        return _adapter(kind).validate_python({**document, **files})
+        return _adapter(kind).validate_python({**with_moments(kind, document), **files})
     except ValidationError as error:
         raise InputError("; ".join(_fault(fault) for fault in error.errors())) from error
 
@@ -200,8 +214,6 @@ def _fault(fault: Any) -> str:
     path = ".".join(str(part) for part in fault["loc"]) or "the document"
     if fault["type"] == "missing":
         return f"'{path}' is missing"
-    if str(fault["type"]).startswith(("datetime_", "date_")):
-        return f"'{path}' is a moment, such as 2026-03-05T07:00:00-05:00, not '{fault['input']}'"
     return f"'{path}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}"
 
 

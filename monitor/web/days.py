@@ -1,12 +1,17 @@
-"""Days and moments as people type them into forms and addresses."""
+"""Days and moments as people type them into forms and addresses, and as programs send them in documents."""
 
 from __future__ import annotations
 
 import re
-from datetime import date, datetime, tzinfo
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
+from datetime import date, datetime
+from types import NoneType, UnionType
+from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.moments import moment_of
+from monitor.moments import day_of, written_moment
 
 _GERMAN = re.compile(r"([0-9]{1,2})\. ?([0-9]{1,2})\. ?([0-9]{4})")
 #: Other forms that Python reads (20260302, 2026-W10-1) a reader may take for another day.
@@ -24,17 +29,62 @@ def typed_day(name: str, text: str) -> date:
         raise InputError(f"{name} is a day, such as 2026-03-02 or 02.03.2026, not '{text}'") from error
 
 
-def typed_moment(name: str, text: str, zone: tzinfo | None = None) -> datetime:
+def typed_moment(name: str, text: str) -> datetime:
     """Return the moment that a text says: what the command line takes, or 02.03.2026 07:00; a day is its beginning.
 
-    Without an offset it is a time of ``zone`` (None: of the server's computer). Raises InputError.
+    It has an offset where the text says one. Raises InputError.
     """
     typed = text.strip().removesuffix("Uhr").strip()
     german = _GERMAN.match(typed)
     if german:
         time = typed[german.end() :].lstrip(", ")
         typed = f"{typed_day(name, german[0])} {time}".strip()
-    return moment_of(typed, f"{name}, '{text[:40]}'", zone)
+    return written_moment(typed, f"{name}, '{text[:40]}'")
+
+
+def with_moments(kind: Any, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a document of a request of this kind with its days and moments read as the command line reads them.
+
+    Raises InputError for what is none, a number too: pydantic would take it for seconds since 1970.
+    """
+    hints = typing.get_type_hints(kind)
+    return {
+        name: _read(hints[name], f"'{name}'", value) if name in hints else value
+        for name, value in document.items()
+    }
+
+
+def _read(hint: Any, name: str, value: Any) -> Any:
+    """Read what a field of a type holds; what can be no day and no moment stays for the check of types."""
+    members = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, UnionType) else (hint,)
+    for member in members:
+        if member in _WRITTEN and not (value is None and NoneType in members):
+            return _from_text(member, name, value)
+        if isinstance(value, list) and (elements := typing.get_args(member)):
+            return [_read(elements[0], name, element) for element in value]
+        if isinstance(value, dict) and is_dataclass(member):
+            return with_moments(member, value)
+    return value
+
+
+#: What reads the text of a day or a moment, and how one is written.
+_WRITTEN: Mapping[Any, tuple[Callable[[str, str], Any], str]] = {
+    datetime: (written_moment, "a day or a time as text, such as 2026-03-05T07:00:00-05:00"),
+    date: (day_of, "a day as text, such as 2026-03-05"),
+}
+
+
+def _from_text(kind: Any, name: str, value: Any) -> Any:
+    read, form = _WRITTEN[kind]
+    if isinstance(value, str):
+        return read(value, f"{name}, '{value[:40]}'")
+    raise InputError(f"{name} is {_shown(value)}: write {form}")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list | dict):
+        return "a list" if isinstance(value, list) else "an object"
+    return f"the number {value}"[:50] if not isinstance(value, bool) and value is not None else str(value)
 
 
 def as_iso(**days: str) -> dict[str, str]:

@@ -6,167 +6,30 @@ again finds the work where it is.
 
 from __future__ import annotations
 
-import asyncio
 import json
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, TimeoutError as StillWorking
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from threading import Event, RLock
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from threading import RLock
+from typing import Any, TypeVar
 
-from monitor.exceptions import MonitorError, NotFoundError, StoreError
-from monitor.progress import listening
-from monitor.stopping import StoppedError, stoppable
+from monitor.exceptions import NotFoundError
 from monitor.store import held_bytes
 from monitor.web.asking import Asker, ForbiddenError, check_role
+from monitor.web.faults import SERVER_END
 from monitor.web.freshness import Stamp, differ_by_imports
-from monitor.web.users import Role, User
+from monitor.web.ticket import Ticket
+from monitor.web.users import User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
 WORKERS = 2
-#: A page waits so long before it shows that something is being computed; a trend page has to come within 0.3 s.
-PATIENCE_S = 0.1
 #: Answers that are held, and their bytes; the oldest is forgotten, and computed again when somebody asks. The one that
 #: was answered last is held whatever its size: whoever opens its page again would wait as long.
 MOST, MOST_BYTES = 200, 512_000_000
-#: Where only imports came since, an answer stands for so many times as long as it took: while somebody imports one
-#: campaign after the other, sums over the whole fleet take a tenth of one processor and not all of it.
-REST = 10.0
-#: And no longer than this.
-LONGEST_REST_S = 60.0
-#: A refusal stands so long, as long as nothing is written: a page that asks two questions which are refused after a
-#: second each would compute one while it shows the other, for ever.
-REFUSAL_STANDS_S = 60.0
-#: And a fault, or a database that others hold, so long: shown, and asked anew before anybody has read it twice.
-FAULT_STANDS_S = 10.0
 
 Key = TypeVar("Key")
-
-
-class Outcome(NamedTuple):
-    """What there was of a question when it was looked at: an answer, a refusal, or the ticket that is waited for.
-
-    One look: whoever asked first for the answer and then whether it is done would show a page that lacks what was
-    answered between the two, and is not loaded again.
-    """
-
-    answer: Any
-    refusal: str
-    waiting: Ticket | None
-
-
-@dataclass
-class Ticket:
-    """A question under way, with who asked it first."""
-
-    number: int
-    question: str
-    document: Mapping[str, Any]
-    user: User
-    future: Future[Any]
-    stop: Event
-    asked_at: float = field(default_factory=time.monotonic)
-    asked_on: datetime = field(default_factory=lambda: datetime.now(UTC))
-    #: What had been written when it was asked.
-    stamp: Stamp = ()
-    #: How long it was computed; None while it is not.
-    took_s: float | None = None
-    #: How many bytes the answer holds, about; 0 while there is none.
-    bytes: int = 0
-    #: Who took it back; empty as long as nobody did.
-    taken_back_by: str = ""
-    #: What it said of how far it is, the latest last.
-    said: list[str] = field(default_factory=list)
-    #: The share of the work that is done as it told last; empty where nothing is told of it.
-    shares: list[float] = field(default_factory=list)
-    #: What it does just now where nobody knows how far that is; empty otherwise.
-    doing: list[str] = field(default_factory=list)
-
-    @property
-    def seconds(self) -> float:
-        """Return how long ago it was asked."""
-        return time.monotonic() - self.asked_at
-
-    @property
-    def is_rested(self) -> bool:
-        """Whether it has stood for so long that it may be computed anew: ``REST`` times as long as it took."""
-        return self.took_s is None or self.seconds > self.took_s + min(REST * self.took_s, LONGEST_REST_S)
-
-    @property
-    def is_done(self) -> bool:
-        """Whether there is an answer, or a refusal; what was taken back has neither until it is asked again."""
-        return self.future.done() and not self.is_taken_back
-
-    @property
-    def is_taken_back(self) -> bool:
-        """Whether somebody took it back before there was an answer."""
-        if not self.taken_back_by or not self.future.done():
-            return False
-        return self.future.cancelled() or isinstance(self.future.exception(), StoppedError)
-
-    @property
-    def is_stopping(self) -> bool:
-        """Whether it was taken back and still goes on to its next checkpoint."""
-        return bool(self.taken_back_by) and not self.future.done()
-
-    @property
-    def is_good(self) -> bool:
-        """Whether it is under way, was taken back, has an answer, or a refusal or fault that stands."""
-        if not self.is_done:
-            return True
-        if self.future.cancelled():
-            return False
-        error = self.future.exception()
-        # Not noted yet: it ended just now.
-        if error is None or self.took_s is None:
-            return True
-        is_refusal = isinstance(error, MonitorError) and not isinstance(error, StoreError)
-        return self.seconds < self.took_s + (REFUSAL_STANDS_S if is_refusal else FAULT_STANDS_S)
-
-    @property
-    def is_refused(self) -> bool:
-        """Whether it ended without an answer, by a refusal or a fault."""
-        return self.is_done and not self.future.cancelled() and self.future.exception() is not None
-
-    def may_be_taken_back_by(self, user: User) -> bool:
-        """Whether this user asked it, or is an approver."""
-        return user.name == self.user.name or user.role >= Role.APPROVER
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it is computed now; else it waits for others."""
-        return self.future.running()
-
-    def answer(self, patience: float = PATIENCE_S) -> Any:
-        """Return the answer, None where it is not there yet or was taken back. Raises what the question raised.
-
-        The patience counts from when it was asked first, so that a page with four questions waits once.
-        """
-        try:
-            return self.future.result(timeout=max(patience - self.seconds, 0.0))
-        except (StillWorking, CancelledError, StoppedError):
-            return None
-
-    async def settled(self, patience: float) -> None:
-        """Wait until there is an answer or a refusal, at most so many seconds after it was asked first.
-
-        No thread waits with it: some forty answer all pages.
-        """
-        waited_for = asyncio.wrap_future(self.future)
-        # Read here, or asyncio reports a refusal as one that nobody saw; the page asks for it by ``answer``.
-        waited_for.add_done_callback(lambda future: future.cancelled() or future.exception())
-        await asyncio.wait([waited_for], timeout=max(patience - self.seconds, 0.0))
-
-    def outcome(self) -> Outcome:
-        """Return the answer, or why there is none, or this ticket while it is computed."""
-        try:
-            answer = self.answer()
-        except MonitorError as error:
-            return Outcome(None, str(error), None)
-        return Outcome(answer, "", self if answer is None else None)
 
 
 class Desk:
@@ -180,6 +43,7 @@ class Desk:
         # Who writes does not wait behind what others compute.
         self._writers = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-writer")
         self._written: OrderedDict[int, Ticket] = OrderedDict()
+        self._of_programs: dict[int, Ticket] = {}
         self._tickets: dict[tuple[str, str, Stamp], Ticket] = {}
         self._answered_last: dict[tuple[str, str], Ticket] = {}
         # What is answered at once is noted by whoever asks, who holds it already.
@@ -209,13 +73,9 @@ class Desk:
             ):
                 return ticket
             self._forget_outdated()
-            self._count += 1
-            stop, shares, doing = Event(), list[float](), list[str]()
+            ticket = self._tickets[key] = self._new(user, question, document, stamp=key[2])
             pool = self._quick if question == "trend" and document.get("parameter") else self._pool
-            future = pool.submit(self._answered, stop, shares, doing, user, question, document, files)
-            self._tickets[key] = ticket = Ticket(
-                self._count, question, document, user, future, stop, stamp=key[2], shares=shares, doing=doing
-            )
+            future = ticket.future = pool.submit(self._answered, ticket, files)
             # Handed over once: a ticket that its own future names for ever would wait for the garbage collector, which
             # rarely looks at what is old, with an answer of megabytes.
             noted = [ticket]
@@ -292,21 +152,38 @@ class Desk:
     ) -> Ticket:
         """Return the ticket of work that is this user's alone, such as an import; ``work`` tells what it is at."""
         check_role(user, question)
-        said: list[str] = []
-        stop = Event()
-
-        def stoppably() -> Any:
-            with stoppable(stop):
-                return work(said.append)
-
         with self._lock:
-            self._count += 1
-            future = self._writers.submit(stoppably)
-            ticket = Ticket(self._count, question, subject, user, future, stop, said=said)
+            ticket = self._new(user, question, subject)
             self._written[ticket.number] = ticket
+
+            def followed() -> Any:
+                with ticket.followed():
+                    return work(ticket.said.append)
+
+            ticket.future = self._writers.submit(followed)
             while len(self._written) > MOST:
                 self._written.popitem(last=False)
             return ticket
+
+    @contextmanager
+    def of_program(self, user: User, question: str, document: Mapping[str, Any]) -> Iterator[Ticket]:
+        """Yield the ticket of a question that this thread answers in the block, which ends by StoppedError where it is
+        taken back."""
+        with self._lock:
+            ticket = self._new(user, question, document, is_of_program=True)
+            self._of_programs[ticket.number] = ticket
+        ticket.future.set_running_or_notify_cancel()
+        try:
+            with ticket.followed():
+                yield ticket
+        finally:
+            ticket.future.set_result(None)
+            with self._lock:
+                del self._of_programs[ticket.number]
+
+    def _new(self, user: User, question: str, document: Mapping[str, Any], **more: Any) -> Ticket:
+        self._count += 1
+        return Ticket(self._count, question, document, user, **more)
 
     def begun(self, user: User, number: int) -> Ticket:
         """Return the ticket of work that was begun. Raises NotFoundError for one that is gone or somebody else's."""
@@ -342,30 +219,14 @@ class Desk:
             self.asker.freshness.stamp(question, document),
         )
 
-    def _answered(
-        self,
-        stop: Event,
-        shares: list[float],
-        doing: list[str],
-        user: User,
-        question: str,
-        document: Mapping[str, Any],
-        files: Mapping[str, Any] | None,
-    ) -> Any:
-
-        def tell(share: float) -> None:
-            shares[:] = [share]
-
-        def say(activity: str) -> None:
-            doing[:] = [activity] if activity else []
-
-        with stoppable(stop), listening(tell, say):
-            return self.asker(user, question, document, files)
+    def _answered(self, ticket: Ticket, files: Mapping[str, Any] | None) -> Any:
+        with ticket.followed():
+            return self.asker(ticket.user, ticket.question, ticket.document, files)
 
     def under_way(self) -> list[Ticket]:
         """Return what is not answered yet, in the order of asking."""
         with self._lock:
-            every = [*self._tickets.values(), *self._written.values()]
+            every = [*self._tickets.values(), *self._written.values(), *self._of_programs.values()]
         return sorted(
             (ticket for ticket in every if not ticket.future.done()), key=lambda ticket: ticket.number
         )
@@ -382,9 +243,7 @@ class Desk:
             raise ForbiddenError(
                 f"{ticket.user.name} asked this: {ticket.user.name} or an approver can take it back"
             )
-        ticket.taken_back_by = user.name
-        ticket.stop.set()
-        ticket.future.cancel()
+        ticket.take_back(user.name)
         return ticket
 
     def ask_again(self, number: int) -> None:
@@ -394,10 +253,20 @@ class Desk:
                 if ticket.number == number and ticket.is_taken_back:
                     del self._tickets[key]
 
-    def close(self) -> None:
-        """Wait for what is being computed, so that nothing is left half; take back what waits."""
+    def end(self) -> list[Ticket]:
+        """Take back all that is under way, what pages have done at once included, and return it; called again, also
+        what came since."""
+        self.asker.ending.set()
+        unfinished = self.under_way()
+        for ticket in unfinished:
+            ticket.take_back(SERVER_END)
+        return unfinished
+
+    def close(self, *, waiting: bool = True) -> None:
+        """Take back what waits; unless not ``waiting``, wait for what is being computed, so that nothing is left
+        half."""
         for pool in (self._pool, self._quick, self._writers):
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown(wait=waiting, cancel_futures=True)
 
 
 def _without(tickets: dict[Key, Ticket], forgotten: Ticket) -> dict[Key, Ticket]:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from starlette.exceptions import HTTPException
 
 from monitor.exceptions import CampaignError, InputError, MonitorError, NotFoundError
+from monitor.stopping import StoppedError
 from monitor.web.asking import ForbiddenError, ReplacedError
 
 OUR_FAULT = "this is a fault of the software, please report it; nothing was stored by this request"
+
+#: By whom work is taken back that is cut off because the server ends.
+SERVER_END = "the end of the server"
 
 
 class TooLargeError(Exception):
@@ -21,6 +26,25 @@ class TooLargeError(Exception):
 
 class TooSlowError(Exception):
     """The rest of a request did not come; the message is a sentence."""
+
+
+class TakenBackError(Exception):
+    """A question that was taken back before it was answered, ``by`` somebody or the end of the server."""
+
+    def __init__(self, by: str, stopped: StoppedError) -> None:
+        self.by = by
+        super().__init__(f"this was taken back by {by} before it was answered: {_what_stays(stopped)}")
+
+
+def _what_stays(stopped: StoppedError) -> str:
+    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+    from monitor.workflow.intake.importing import StoppedImportError
+
+    if not isinstance(stopped, StoppedImportError) or not stopped.answer.imported:
+        return "what was not finished is not stored"
+    imported = ", ".join(folder.campaign for folder in stopped.answer.imported)
+    rest = ", ".join(Path(folder).name for folder in stopped.not_imported)
+    return f"{imported} went in and stays, {rest} did not"
 
 
 @dataclass(frozen=True)
@@ -76,6 +100,8 @@ def _refusal_of(error: Exception) -> Refusal:
         return Refusal(408, str(error))
     if isinstance(error, ForbiddenError):
         return Refusal(403, str(error))
+    if isinstance(error, TakenBackError):
+        return Refusal(503 if error.by == SERVER_END else 409, str(error))
     if isinstance(error, ReplacedError):
         return Refusal(503, str(error))
     if isinstance(error, NotFoundError):

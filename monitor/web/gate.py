@@ -14,7 +14,9 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from monitor.web.faults import OUR_FAULT, TooLargeError, TooSlowError
+from monitor.stopping import StoppedError
+from monitor.web.desk import Desk
+from monitor.web.faults import OUR_FAULT, SERVER_END, TakenBackError, TooLargeError, TooSlowError, refusal_of
 from monitor.web.sessions import COOKIE, Sessions
 from monitor.web.settings import UPLOAD_BYTES, ServerSettings
 from monitor.web.users import User
@@ -61,10 +63,9 @@ _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 class Gate:
     """Lets a request in with ``state.user`` and ``state.session``, or answers it with a refusal in plain words."""
 
-    def __init__(
-        self, app: App, settings: ServerSettings, sessions: Sessions, close: Callable[[], None]
-    ) -> None:
-        self.close = close
+    def __init__(self, app: App, settings: ServerSettings, sessions: Sessions, desk: Desk) -> None:
+        self.desk = desk
+        self.close = desk.close
         self._app = app
         self._settings = settings
         self.sessions = self._sessions = sessions
@@ -108,6 +109,10 @@ class Gate:
         except TooSlowError as error:
             if not started:
                 await _plain(send, 408, str(error), as_page=from_form)
+        except StoppedError as error:
+            if not started:
+                ended = refusal_of(TakenBackError(SERVER_END, error))
+                await _plain(send, ended.status, ended.error, as_page=from_form)
         except Exception:
             # It was logged and answered where it happened; what follows would only be said twice.
             if not started:

@@ -20,9 +20,11 @@ from starlette.responses import JSONResponse, Response
 
 from monitor.documents import to_document
 from monitor.exceptions import MonitorError
+from monitor.stopping import StoppedError
 from monitor.web.access import ROOT, address_of, offered, taken_fields
-from monitor.web.asking import Asker, check_role
-from monitor.web.faults import by_field, refusal_of, relabelled
+from monitor.web.asking import check_role
+from monitor.web.desk import Desk
+from monitor.web.faults import TakenBackError, by_field, refusal_of, relabelled
 from monitor.web.openapi import openapi
 from monitor.web.parcel import MEDIA_TYPE, packed
 from monitor.web.received import Body, ReceivedQuestion, read_body, received
@@ -34,7 +36,7 @@ _SMALL = 2**20
 _log = logging.getLogger("monitor.web")
 
 
-def interface(asker: Asker, working_folder: Path) -> APIRouter:
+def interface(desk: Desk, working_folder: Path) -> APIRouter:
     """Return the routes of every question that is offered."""
     router = APIRouter()
 
@@ -49,18 +51,18 @@ def interface(asker: Asker, working_folder: Path) -> APIRouter:
         return JSONResponse(openapi())
 
     for name in offered():
-        router.add_api_route(address_of(name), _answering(asker, name, working_folder), methods=["POST"])
+        router.add_api_route(address_of(name), _answering(desk, name, working_folder), methods=["POST"])
     return router
 
 
-def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
+def _answering(desk: Desk, question: str, working_folder: Path) -> Any:
     async def answer(request: Request) -> Response:
         user: User = request.state.user
         try:
             check_role(user, question)
             with tempfile.SpooledTemporaryFile(max_size=_SMALL, dir=str(working_folder)) as content:
                 body = await read_body(request, question, content)
-                return await run_in_threadpool(_answered, asker, user, question, body, working_folder)
+                return await run_in_threadpool(_answered, desk, user, question, body, working_folder)
         except Exception as error:
             return _refused(question, error)
         finally:
@@ -69,13 +71,16 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
     return answer
 
 
-def _answered(asker: Asker, user: User, question: str, body: Body, working_folder: Path) -> Response:
+def _answered(desk: Desk, user: User, question: str, body: Body, working_folder: Path) -> Response:
     with tempfile.TemporaryDirectory(dir=working_folder) as folder:
         asked = received(question, body, Path(folder))
-        try:
-            answer = asker(user, question, asked.document, asked.files, asked.tolerances)
-        except MonitorError as error:
-            return _refused(question, error, asked)
+        with desk.of_program(user, question, asked.subject) as ticket:
+            try:
+                answer = desk.asker(user, question, asked.document, asked.files, asked.tolerances)
+            except MonitorError as error:
+                return _refused(question, error, asked)
+            except StoppedError as error:
+                return _refused(question, TakenBackError(ticket.taken_back_by, error), asked)
         return _response(question, asked, relabelled(to_document(answer), asked.labels), working_folder)
 
 

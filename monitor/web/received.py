@@ -57,6 +57,16 @@ class ReceivedQuestion:
         itself = "the upload" if path == self.incoming and not self.is_parcel else label
         self.labels |= {f"{path}/": "" if label == "." else f"{label.rstrip('/')}/", str(path): itself}
 
+    @property
+    def subject(self) -> Mapping[str, Any]:
+        """What it is about: its document, of an import with the names of its folders."""
+        folders = self.files.get("folders")
+        return (
+            self.document
+            if folders is None
+            else {**self.document, "folders": [path.name for path in folders]}
+        )
+
     def written(self) -> list[Path]:
         """Return the files that the question wrote."""
         return sorted(path for path in self.outgoing.rglob("*") if path.is_file())

@@ -16,13 +16,13 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from socket import socket
 
 import uvicorn
 
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.web.app import application
+from monitor.web.ending import EndingServer, cut_off_at_the_end
 from monitor.web.gate import Gate
 from monitor.web.listening import listening
 from monitor.web.note import Note, posted, read_note
@@ -38,22 +38,6 @@ _SWITCH_S = 0.0005
 #: So long a server leaves both cores to its first page before it loads the questions that people ask next.
 _HEAD_START_S = 0.5
 _USUAL = ("fleet", "campaigns", "values", "trend", "compare", "explain", "import")
-
-
-class _Server(uvicorn.Server):
-    """A server that says where it listens once it does; ``listens`` is called with the port."""
-
-    def __init__(self, config: uvicorn.Config, listens: Callable[[int], None]) -> None:
-        super().__init__(config)
-        self._listens = listens
-
-    async def startup(self, sockets: list[socket] | None = None) -> None:
-        """Listen; the port is the one that the system gave where none was named."""
-        await super().startup(sockets)
-        for server in self.servers:
-            for taken in server.sockets:
-                self._listens(int(taken.getsockname()[1]))
-                return
 
 
 def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
@@ -94,9 +78,12 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
 
             prepare()
             sys.setswitchinterval(_SWITCH_S)
-            _Server(config, listens).run(sockets)
-            beside.close()
-            gate.close()
+            with cut_off_at_the_end(working_folder):
+                try:
+                    EndingServer(config, gate.desk, say, listens, beside.close).run(sockets)
+                finally:
+                    beside.close()
+                    gate.desk.close(waiting=False)
 
 
 def _refuse_served(database: Path) -> None:

@@ -19,7 +19,7 @@ from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.attention import ATTENTION, Attention
 
 if TYPE_CHECKING:
-    from monitor.web.desk import Ticket
+    from monitor.web.ticket import Ticket
     from monitor.workflow.fleet.answer import FleetTableRow
     from monitor.workflow.plan.test_answer import TestAnswer
 
@@ -245,6 +245,10 @@ def so_far(ticket: Ticket) -> str:
     return f"{seconds}{doing}" if ticket.is_running else f"{seconds}, waiting for others"
 
 
+#: Of a question that a program asks so many keys are said, and so many letters of each with its value.
+_MOST_SAID, _LONGEST_SAID = 12, 80
+
+
 def importing(ticket: Ticket) -> str:
     """Say at which of its folders an import is."""
     total = len(ticket.document["folders"])
@@ -258,7 +262,16 @@ def asked_for(ticket: Ticket) -> str:
     folders = ticket.document.get("folders")
     if folders is not None:
         return f"import of {counted(len(folders), 'folder')}: {listed(folders)}"
-    return " ".join([ticket.question, *(f"{key} {value}" for key, value in ticket.document.items())])
+    said = [
+        f"{key} {value}" for key, value in ticket.document.items() if value is not None and value is not False
+    ]
+    return " ".join([ticket.question, *map(_cut, said[:_MOST_SAID])])
+
+
+def _cut(text: str) -> str:
+    """Return the beginning of a text that a program sent, in one line: it may be a query of a page."""
+    line = " ".join(text[: 2 * _LONGEST_SAID].split())
+    return line if len(line) <= _LONGEST_SAID else f"{line[:_LONGEST_SAID]}…"
 
 
 def without_option(text: str) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 from monitor.exceptions import InputError, did_you_mean
 from monitor.reporting import messages
 from monitor.store import NOTE, Database, StoredEvent, list_campaigns, list_events, record_event
 from monitor.store.catalogue import check_machine
+from monitor.workflow.moments import at_machine
 
 #: Before it nobody recorded what happened to a machine that is measured today.
 FIRST_YEAR = 1900
@@ -20,7 +21,8 @@ USUAL_KINDS = ("crash", "repair", "compensation", "probe")
 
 @dataclass(frozen=True)
 class EventRequest:
-    """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment with an offset; without text list them.
+    """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment (without an offset from UTC by the clock
+    of the shop); without text list them.
 
     An event of any kind but a note splits the history of the machine. Raises InputError for a kind that is nearly a
     usual one, a moment to come, or a moment or kind without words.
@@ -32,9 +34,6 @@ class EventRequest:
     kind: str = NOTE
 
     def __post_init__(self) -> None:
-        if self.at is not None and self.at.tzinfo is None:
-            at = self.at.isoformat()
-            raise InputError(f"the moment {at} lacks its offset from UTC, such as {at}-05:00")
         if self.text is None:
             self._refuse_unsaid()
             return
@@ -55,7 +54,11 @@ class EventRequest:
             raise InputError(
                 f"{self.at.isoformat()} lies before {FIRST_YEAR}, and an event cannot be undone; give the time it had"
             )
-        if self.at is not None and self.at > datetime.now(UTC) + timedelta(hours=1):
+        if (
+            self.at is not None
+            and self.at.tzinfo is not None
+            and self.at > datetime.now(UTC) + timedelta(hours=1)
+        ):
             raise InputError(
                 f"{self.at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
             )
@@ -92,7 +95,9 @@ def event(db: Database, request: EventRequest) -> EventAnswer:
                 "say when it happened: --at 2026-03-05T07:00:00-05:00, or --at '2026-03-05 07:00' "
                 "in the time of this computer"
             )
-        record_event(db, request.machine, request.at, request.kind, request.text)
+        at, text = at_machine(db, request.machine, request.at), request.text
+        request = replace(request, at=at)
+        record_event(db, request.machine, at, request.kind, text)
     return EventAnswer(list_events(db, request.machine), tuple(_notes(db, request)))
 
 

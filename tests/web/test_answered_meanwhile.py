@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from monitor.web.desk import Ticket
+from monitor.web.ticket import Ticket
 
 CAMPAIGN = "hidden-spindle-growth"
 TOOK_S = 60.0

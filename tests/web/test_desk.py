@@ -14,7 +14,7 @@ pytest.importorskip("fastapi", reason="the extra web is not installed")
 
 from monitor.exceptions import BusyError, InputError, NotFoundError
 from monitor.progress import saying, told
-from monitor.web import desk as desk_module
+from monitor.web import ticket as ticket_module
 from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
 from monitor.web.users import Role, User
@@ -95,7 +95,7 @@ def test_nothing_rests_longer_than_a_minute_and_a_refusal_not_at_all(asked: tupl
     ticket, _ = desk.ask_rested(ADA, *SUMS)
     ticket.future.result(60.0)
     ticket.took_s = 100.0
-    ticket.asked_at -= 100.0 + desk_module.LONGEST_REST_S - 5.0
+    ticket.asked_at -= 100.0 + ticket_module.LONGEST_REST_S - 5.0
     assert not ticket.is_rested
     ticket.asked_at -= 10.0
     assert ticket.is_rested
@@ -120,7 +120,7 @@ def test_a_refusal_stands_until_something_is_written_or_a_minute_went_by(asked: 
             with pytest.raises(NotFoundError, match="nothing was identified"):
                 ticket.answer(60.0)
     assert tickets[1].number == tickets[0].number + 1
-    tickets[0].asked_at -= desk_module.REFUSAL_STANDS_S + 5.0
+    tickets[0].asked_at -= ticket_module.REFUSAL_STANDS_S + 5.0
     third = desk.ask(ADA, *questions[0])
     assert third.number == tickets[1].number + 1
     third.future.exception(60.0)
@@ -143,7 +143,7 @@ def test_a_fault_stands_for_a_moment_and_is_asked_anew(
         asker.fault = None
         assert desk.ask(ADA, "compare", {"campaign": "c"}) is ticket
         with monkeypatch.context() as later:
-            later.setattr(desk_module, "FAULT_STANDS_S", -60.0)
+            later.setattr(ticket_module, "FAULT_STANDS_S", -60.0)
             again = desk.ask(ADA, "compare", {"campaign": "c"})
         assert again is not ticket
         assert again.answer(60.0)

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +134,12 @@ def test_an_answer_fits_the_schema_that_describes_it(
         ("compare", {"campaign": 5}, 400, "'campaign'"),
         ("compare", {"campaign": "hidden-spindle-growth", "figures": "/tmp"}, 400, "takes no 'figures'"),
         ("trend", {"machine": "HU40-T", "reliability": 2}, 400, "between 0 and 1"),
-        ("values", {"machine": "HU40-T", "since": "2026-01-01T00:00:00"}, 400, "offset from UTC"),
+        ("values", {"machine": "HU40-T", "since": 1772434800}, 400, "'since' is the number 1772434800: write a day or"),
+        ("values", {"machine": "HU40-T", "until": "1772434800"}, 400, "write a day or a time as 2026-03-05"),
+        ("trend", {"machine": "HU40-T", "reference": [1, 2.5]}, 400, "'reference' is the number 1: write a day or a"),
+        ("map", {"campaign": "hidden-spindle-growth", "before": 1e9}, 400, "'before' is the number 1000000000.0"),
+        ("event", {"machine": "HU40-T", "text": "x", "at": True}, 400, "'at' is True: write a day or a time as text"),
+        ("periods", {"machine": "HU40-T", "earlier": {"since": 0, "until": []}, "later": {}}, 400, "'since' is the"),
         ("model history", {"model": "samba@9"}, 404, "samba"),
         ("add effect", {"effect": "nonsense", "to": "samba"}, 400, "nonsense"),
         ("residuals", {"campaign": "load-cell"}, 400, "curve"),
@@ -228,6 +234,36 @@ def test_the_values_are_those_of_the_view_that_people_query(local: Any) -> None:
     assert later["started_at"] == values["started_at"][3:]
     _, earlier = local.ask("values", {"machine": "HU40-T", "until": values["started_at"][3]})
     assert earlier["started_at"] == values["started_at"][:3]
+
+
+def test_every_key_takes_a_moment_with_and_without_its_offset(local: Any) -> None:
+    """By UTC, by another offset and by the clock of the shop, five hours behind: the same moment."""
+    assert local.ask("identify", {"campaign": "hidden-spindle-growth"})[0] == 200
+    _, values = local.ask("values", {"machine": "HU40-T"})
+    local_start = datetime.fromisoformat(values["started_at"][3])
+    written = [
+        local_start.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        local_start.astimezone(timezone(timedelta(hours=1))).isoformat(),
+        local_start.replace(tzinfo=None).isoformat(),
+        f"{local_start:%Y-%m-%d %H:%M:%S}",
+    ]
+    for moment in written:
+        for question, key in (("values", "since"), ("trend", "since")):
+            status, answer = local.ask(question, {"machine": "HU40-T", "parameter": "EB0C", key: moment})
+            assert status == 200, answer
+            runs = answer["runs"] if question == "trend" else len(answer["started_at"])
+            assert runs == len(values["started_at"]) - 3
+
+
+@pytest.mark.slow
+def test_a_moment_before_which_runs_count_is_read_as_any_other(local: Any) -> None:
+    asked = {"campaign": "hidden-spindle-growth", "method": "guf"}
+    runs = local.ask("runs", {"campaign": "hidden-spindle-growth"})[1]["runs"]
+    by_the_shop, by_utc = runs[4]["started_at_local"], runs[4]["started_at"]
+    answers = [local.ask("uncertainty", {**asked, "before": moment}) for moment in (by_the_shop, by_utc)]
+    assert by_utc.endswith("Z")
+    assert answers[0][0] == 200, answers
+    assert answers[0] == answers[1]
 
 
 def zipped(folder: Path, replaced: dict[str, bytes] | None = None) -> bytes:

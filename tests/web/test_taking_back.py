@@ -15,12 +15,13 @@ pytest.importorskip("fastapi", reason="the extra web is not installed")
 pytest.importorskip("plotly", reason="the extra web is not installed")
 
 from monitor.exceptions import NotFoundError
-from monitor.stopping import StoppedError, checkpoint, stoppable
+from monitor.stopping import Stop, StoppedError, checkpoint, stoppable
 from monitor.store import Database
 from monitor.web.asking import ForbiddenError
-from monitor.web.desk import Desk, Ticket
+from monitor.web.desk import Desk
 from monitor.web.freshness import Freshness
 from monitor.web.pages import machine, model
+from monitor.web.ticket import Ticket
 from monitor.web.users import Role, User
 
 ADA, BOB, EVE = User("ada", Role.VIEWER), User("bob", Role.ENGINEER), User("eve", Role.APPROVER)
@@ -104,7 +105,7 @@ def test_waiting_work_never_begins(desk: Desk, asker: Answering) -> None:
 
 def test_what_it_had_written_is_undone(tmp_path: Path) -> None:
     with Database(tmp_path / "monitor.duckdb", threads=1) as db:
-        stop = Event()
+        stop = Stop()
 
         def write() -> None:
             with db.transaction():

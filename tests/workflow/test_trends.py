@@ -214,6 +214,52 @@ def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
     assert {one["at"] for one in document["events"]} == {at.isoformat()}
 
 
+def test_charts_begin_anew_at_a_recorded_event_and_see_what_comes_after_it(made: Database) -> None:
+    """The step that an event explains stood as an alarm of all charts beside a drift that was as usual."""
+    week, rng = np.arange(60)[:, np.newaxis], np.random.default_rng(8)
+    scatter = rng.normal(size=(60, 2))
+    add_machine(
+        made,
+        "mended",
+        {"EX0B": scatter + 9.0 * (week >= 20), "EX0C": scatter + 9.0 * (week >= 20) + 9.0 * (week >= 50)},
+    )
+    before = trends(made, "mended")
+    charts = ("shewhart", "ewma", "cusum")
+    for found in before["parameters"].values():
+        assert {found["control"][name]["state"] for name in charts} == {"alarm"}
+    at = (START + timedelta(days=7 * 20 - 3)).replace(tzinfo=UTC)
+    record_event(made, "mended", at, "repair", "ball screw changed")
+    # One behind the last run begins nothing.
+    record_event(made, "mended", at + timedelta(days=600), "crash", "spindle hit the vice")
+    document = trends(made, "mended")
+    assert (
+        document["control"]["reference_from"]
+        == (START + timedelta(days=7 * 20, hours=1.5)).isoformat() + "+00:00"
+    )
+    # A third of the forty weeks since the event.
+    assert document["control"]["reference_points"] == 13
+    usual, stepped = (document["parameters"][name]["control"] for name in ("EX0B", "EX0C"))
+    assert [usual[name]["state"] for name in charts] == ["in control"] * 3
+    assert usual["centre"] == pytest.approx(9.0, abs=1.0)
+    assert usual["shewhart"]["lower"] > 0.0
+    assert {stepped[name]["state"] for name in charts} == {"alarm"}
+    # Who names a period means that one, whatever happened since.
+    named = trends(made, "mended", reference=(START.replace(tzinfo=UTC), at))
+    assert named["parameters"]["EX0B"]["control"]["centre"] == pytest.approx(0.0, abs=0.5)
+    assert named["parameters"]["EX0B"]["control"]["shewhart"]["state"] == "alarm"
+
+
+def test_a_few_days_since_an_event_are_all_the_reference(made: Database) -> None:
+    add_machine(made, "lately", {"EX0B": np.random.default_rng(2).normal(size=(40, 2))})
+    record_event(
+        made, "lately", (START + timedelta(days=7 * 34 - 3)).replace(tzinfo=UTC), "repair", "belt changed"
+    )
+    document = trends(made, "lately")
+    why = document["parameters"]["EX0B"]["control"]["why"]
+    assert why == "no chart: all 6 days since the last event are the reference period"
+    assert document["control"]["reference_points"] == 6
+
+
 def test_choices_and_their_refusals(made: Database) -> None:
     since = START.replace(tzinfo=UTC) + timedelta(weeks=30)
     one = trends(made, "M", parameter="EX0B", since=since)

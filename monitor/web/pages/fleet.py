@@ -18,9 +18,10 @@ from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.messages import attention_words
 from monitor.reporting.svg.sparkline import MOST, sparkline
 from monitor.web.days import as_iso
-from monitor.web.desk import Desk, Ticket
+from monitor.web.desk import Desk
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
+from monitor.web.ticket import Ticket
 from monitor.web.words import (
     BEING_COMPUTED,
     DOES_NOT_FIT,

@@ -20,10 +20,11 @@ from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.readers import MAPPING as FILE
 from monitor.readers.archive import UploadedFile, unpack, unpack_files
 from monitor.web.asking import check_role
-from monitor.web.desk import Desk, Ticket
+from monitor.web.desk import Desk
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
 from monitor.web.rendering import link, page
+from monitor.web.ticket import Ticket
 
 if TYPE_CHECKING:
     from monitor.workflow.intake.importing import ImportAnswer

@@ -54,7 +54,7 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             number = whole_number("number", form.text("number"), DIGITS)
         ticket = request.app.state.desk.take_back(request.state.user, number)
-        address = "/work" if ticket.question != "import" else link("/import/under-way", number=number)
+        address = link("/import/under-way", number=number) if ticket.has_page else "/work"
         return RedirectResponse(address, status_code=303)
 
     @router.post("/work/again")

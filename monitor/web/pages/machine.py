@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
-from datetime import UTC, date, datetime, time, timedelta, timezone
+from datetime import UTC, date, datetime, time, timedelta
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -17,13 +17,14 @@ from monitor.reporting.messages import DRIFT_OR_SEASON, SEASON_NOT_TOLD
 from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, groups_without_legend, trend_chart
 from monitor.web.days import as_iso, typed_moment
-from monitor.web.desk import Desk, Ticket
+from monitor.web.desk import Desk
 from monitor.web.faults import refusal_of
 from monitor.web.forms import asked_once, read_form
 from monitor.web.pages.fleet import ASKED as FLEET
 from monitor.web.pages.refused import RefusedForm, led_back, led_back_to_the_form, refused_form
 from monitor.web.rendering import page
 from monitor.web.sending import attachment
+from monitor.web.ticket import Ticket
 
 if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer
@@ -103,7 +104,7 @@ def routes() -> APIRouter:
             machine = form.text("machine")
             document = {"machine": machine, "text": form.text("text"), **form.filled("kind")}
         try:
-            at = await run_in_threadpool(_moment, request, machine, form.text("at"))
+            at = typed_moment("when it happened", form.text("at"))
             await asked_once(request, form, "event", {**document, "at": at.isoformat()})
         except NotFoundError:
             raise
@@ -114,22 +115,6 @@ def routes() -> APIRouter:
         return led_back(request, "/machine", {"name": machine}, "events")
 
     return router
-
-
-def _moment(request: Request, machine: str, text: str) -> datetime:
-    """When something happened; without an offset by the clock of the shop, as the run nearest to it had it."""
-    ask, user = request.app.state.asker, request.state.user
-    typed = typed_moment("when it happened", text, UTC).astimezone(UTC).replace(tzinfo=None)
-    measured = [
-        row for row in ask(user, "campaigns", {"machine": machine}).campaigns if row.first_run_at is not None
-    ]
-    if not measured:
-        return typed_moment("when it happened", text, None)
-    campaign = min(measured, key=lambda row: max(row.first_run_at - typed, typed - row.last_run_at))
-    runs = ask(user, "runs", {"campaign": campaign.campaign}).runs
-    run = min(runs, key=lambda row: abs(row.started_at - typed))
-    clock = timezone(run.started_at_local - run.started_at)
-    return typed_moment("when it happened", text, clock)
 
 
 def _values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:

@@ -21,10 +21,11 @@ from monitor.web.charts.residuals import (
     scene_chart,
     scene_vectors,
 )
-from monitor.web.desk import Desk, Ticket
+from monitor.web.desk import Desk
 from monitor.web.forms import Form, asked_once, read_form, whole_number
 from monitor.web.pages.campaign import named_campaign
 from monitor.web.rendering import link, page
+from monitor.web.ticket import Ticket
 from monitor.web.words import listed
 
 if TYPE_CHECKING:

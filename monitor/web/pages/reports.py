@@ -13,9 +13,9 @@ from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError
 from monitor.store import CampaignRow
-from monitor.web.desk import Ticket
 from monitor.web.rendering import link, page
 from monitor.web.sending import attachment
+from monitor.web.ticket import Ticket
 
 if TYPE_CHECKING:
     from monitor.workflow.health.request import ReportAnswer

@@ -15,7 +15,7 @@ from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_
 from monitor.store import Database, MachineHistory, machine_history, numbered_by
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series
-from monitor.workflow.moments import check_offsets
+from monitor.workflow.moments import at_machine, check_period
 
 #: False discovery rate over the parameters of a comparison.
 RATE = 0.05
@@ -23,20 +23,20 @@ RATE = 0.05
 
 @dataclass(frozen=True)
 class Period:
-    """A period: ``since`` belongs to it, ``until`` does not; both with an offset from UTC.
+    """A period: ``since`` belongs to it, ``until`` does not; without an offset from UTC by the clock of the shop.
 
-    Raises InputError for one without an offset, or that is empty.
+    Raises InputError for one that is empty.
     """
 
     since: datetime
     until: datetime
 
     def __post_init__(self) -> None:
-        check_offsets(self.since, self.until)
-        if self.since >= self.until:
-            raise InputError(
-                f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"
-            )
+        check_period(self.since, self.until)
+
+    def at_machine(self, db: Database, machine: str) -> Period:
+        """Return the period with the offsets that the clock of the machine's shop had."""
+        return Period(at_machine(db, machine, self.since), at_machine(db, machine, self.until))
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,9 @@ class PeriodsRequest:
     later: Period
 
     def __post_init__(self) -> None:
-        if self.later.since < self.earlier.until:
+        ends = (self.earlier.until, self.later.since)
+        # By different clocks they are compared once both have an offset.
+        if (ends[0].tzinfo is None) == (ends[1].tzinfo is None) and ends[1] < ends[0]:
             raise InputError(
                 "the periods overlap, or the later one comes first; end one before the other begins"
             )
@@ -103,6 +105,10 @@ def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
     Runs that are marked as warming up take no part where enough others remain. Raises NotFoundError for a machine that
     is not there, DataError where a period has no run.
     """
+    machine = request.machine
+    request = PeriodsRequest(
+        machine, request.earlier.at_machine(db, machine), request.later.at_machine(db, machine)
+    )
     history = machine_history(db, request.machine, followed_by=numbered_by(db, request.machine))
     masks = [_within(history, period) for period in (request.earlier, request.later)]
     for mask, period in zip(masks, (request.earlier, request.later), strict=True):

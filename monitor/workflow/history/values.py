@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
 
 from monitor.documents import OMITTED
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import NotFoundError
 from monitor.store import Database, machine_history, machine_topology, numbered_by, older_numbers
 from monitor.workflow.models import resolve
-from monitor.workflow.moments import check_offsets
+from monitor.workflow.moments import at_machine, check_period
 
 
 @dataclass(frozen=True)
 class ValuesRequest:
     """The runs of a machine under a ``model`` (None: those that its numbers come from); one ``parameter``, or all.
 
-    ``since`` and ``until`` have an offset from UTC; the first belongs to the period, the second does not.
+    ``since`` belongs to the period, ``until`` does not; without an offset from UTC by the clock of the shop.
     """
 
     machine: str
@@ -30,11 +30,7 @@ class ValuesRequest:
     model: str | None = None
 
     def __post_init__(self) -> None:
-        check_offsets(self.since, self.until)
-        if self.since is not None and self.until is not None and self.since >= self.until:
-            raise InputError(
-                f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"
-            )
+        check_period(self.since, self.until)
 
 
 @dataclass(frozen=True)
@@ -73,6 +69,11 @@ class ValuesAnswer:
 
 def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
     """List the values of a machine's parameters in display units. Raises NotFoundError; nothing is stored."""
+    request = replace(
+        request,
+        since=at_machine(db, request.machine, request.since),
+        until=at_machine(db, request.machine, request.until),
+    )
     name, version = None, None
     if request.model is not None:
         stored = resolve(db, request.model)

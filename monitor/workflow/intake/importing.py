@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Event
 
 from monitor.documents import OMITTED
 from monitor.exceptions import CampaignError, InputError, StoreError
@@ -23,7 +22,7 @@ from monitor.readers import (
 )
 from monitor.records import Campaign, CurveCampaign
 from monitor.reporting import messages
-from monitor.stopping import StoppedError, stoppable
+from monitor.stopping import Stop, StoppedError, stoppable
 from monitor.store import (
     Database,
     Imported,
@@ -231,7 +230,7 @@ def _import(db: Database, source: _Source) -> ImportedFolder:
             record_refusal(db, path, faults, campaign=source.name or name, machine=machine)
         raise
     # It is in the database: who takes the import back now hears so.
-    with stoppable(Event()):
+    with stoppable(Stop()):
         clear_refusals(db, path, imported.campaign)
         return _answer(db, source.path, imported, reading.understood)
 

@@ -1,11 +1,13 @@
 """Control charts of a machine's parameters against a reference period: which alarm can be believed.
 
 Points are the runs, or the means of the days where there are enough of them: runs of one day resemble each other,
-and a chart that takes them for independent raises false alarms. Part of `monitor trend`.
+and a chart that takes them for independent raises false alarms. A recorded event begins the charts anew, as it splits
+the history: the step that it explains is stated at the event, and no alarm. Part of `monitor trend`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 
@@ -43,7 +45,7 @@ RUN_LENGTH = 370.0
 VECTOR_RUN_LENGTH, VECTOR_TRIALS = 200.0, 1000
 #: Weight of the latest point in EWMA (Lucas and Saccucci, Technometrics 32 (1990) 1).
 EWMA_WEIGHT = 0.2
-#: Without a named reference period: the first points, a third of all, at least 8 and at most 30.
+#: Without a named reference period: the first points since the last event, a third of all, at least 8 and at most 30.
 SHARE, FEWEST, MOST = 3, 8, 30
 #: A parameter takes part in the charts of the vector where it has more than this share of the points.
 COMPLETE = 0.9
@@ -59,14 +61,19 @@ class Points:
     offset: timedelta
 
 
-def points_of(history: MachineHistory, offset: timedelta) -> Points:
-    """Points of the charts: runs, or day means where there are enough days; runs of a warming machine left out."""
+def are_days(history: MachineHistory) -> bool:
+    """Whether there are enough days for their means to be the points."""
+    return len(np.unique(day_numbers(history)[steady_runs(history)])) >= DAYS_FOR_MEANS
+
+
+def points_of(history: MachineHistory, offset: timedelta, *, by_days: bool) -> Points:
+    """Points of the charts: day means or runs; runs of a warming machine left out."""
     t = history.seconds / SECONDS_PER_DAY
     steady = steady_runs(history)
     labels, values = day_numbers(history)[steady], history.values[steady]
-    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
-    if len(distinct) < DAYS_FOR_MEANS:
+    if not by_days:
         return Points(values, t[steady], "runs", offset)
+    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
     finite = np.isfinite(values)
     sums, counts = np.zeros((len(distinct), values.shape[1])), np.zeros((len(distinct), values.shape[1]))
     np.add.at(sums, index, np.where(finite, values, 0.0))
@@ -75,6 +82,13 @@ def points_of(history: MachineHistory, offset: timedelta) -> Points:
     order = np.argsort(first, kind="stable")
     moments = np.bincount(index, t[steady]) / np.bincount(index)
     return Points(means[order], moments[order], "days", offset)
+
+
+def since_last_event(history: MachineHistory, events: Sequence[float]) -> MachineHistory:
+    """The runs since the last of ``events`` (days since 1970) behind which there is a steady run."""
+    t = history.seconds / SECONDS_PER_DAY
+    last = t[steady_runs(history)].max()
+    return history.part(t >= max((at for at in events if at <= last), default=-np.inf))
 
 
 def reference_points(points: Points, reference: tuple[float, float] | None) -> npt.NDArray[np.bool_]:
@@ -86,11 +100,18 @@ def reference_points(points: Points, reference: tuple[float, float] | None) -> n
 
 
 class Charts:
-    """All charts of a machine about one reference period."""
+    """All charts of a machine about one reference period: a named one (days since 1970), whatever happened, or the
+    first points since the last of ``events``."""
 
-    def __init__(self, points: Points, reference: tuple[float, float] | None) -> None:
-        self.points = points
-        self.inside = reference_points(points, reference)
+    def __init__(
+        self, history: MachineHistory, offset: timedelta, events: Sequence[float],
+        reference: tuple[float, float] | None,
+    ) -> None:  # fmt: skip
+        charted = history if reference is not None else since_last_event(history, events)
+        # By the whole history: of the few days since an event the runs resemble each other, too.
+        self.points = points_of(charted, offset, by_days=are_days(history))
+        self.is_since_event = len(charted.run) < len(history.run)
+        self.inside = reference_points(self.points, reference)
 
     def period(self) -> ReferencePeriod:
         """The reference period in words and dates."""
@@ -111,8 +132,7 @@ class Charts:
         except DataError as error:
             return ParameterCharts(refused(Part.CHART, error))
         if not len(values):
-            lack = Lack(Part.CHART, Cause.ALL_IN_REFERENCE, count=len(before), name=self.points.kind)
-            return ParameterCharts(lack)
+            return ParameterCharts(self._all_in_reference(len(before)))
         plain = individuals_chart(values, reference, arl=RUN_LENGTH)
         path = ewma_chart(values, reference, arl=RUN_LENGTH)
         sums = cusum_chart(values, reference, arl=RUN_LENGTH)
@@ -130,6 +150,10 @@ class Charts:
                 None if sums.started is None else self._date(t[sums.started]),
             ),
         )  # fmt: skip
+
+    def _all_in_reference(self, count: int) -> Lack:
+        cause = Cause.ALL_SINCE_EVENT_IN_REFERENCE if self.is_since_event else Cause.ALL_IN_REFERENCE
+        return Lack(Part.CHART, cause, count=count, name=self.points.kind)
 
     def of_vector(self, names: tuple[str, ...], rng: np.random.Generator) -> VectorCharts:
         """T² and MEWMA of all parameters together; the shares say which of them raise the latest point."""

@@ -7,12 +7,13 @@ from datetime import datetime
 from pathlib import Path
 
 from monitor.exceptions import InputError
-from monitor.workflow.moments import check_offsets
+from monitor.store import Database
+from monitor.workflow.moments import at_machine, check_period
 
 
 @dataclass(frozen=True)
 class TrendRequest:
-    """Follow the parameters of a machine; moments have an offset from UTC.
+    """Follow the parameters of a machine; moments without an offset from UTC are by the clock of the shop.
 
     ``parameter`` alone, runs from ``since`` on, of the ``campaigns`` (empty: all), under a ``model`` (by default the
     method's own). The control charts compare with a ``reference`` period (by default the first third). ``reliability``
@@ -34,7 +35,7 @@ class TrendRequest:
     weekly_looks: bool = False
 
     def __post_init__(self) -> None:
-        check_offsets(self.since, self.next_check, *(self.reference or ()))
+        check_period(*(self.reference or (None, None)))
         if not 0.0 < self.reliability < 1.0:
             raise InputError(f"--reliability {self.reliability:g}: a probability lies between 0 and 1")
         limit = self.volumetric_limit_um
@@ -42,9 +43,19 @@ class TrendRequest:
             raise InputError(f"--volumetric-limit {limit:g}: a limit in µm lies above zero")
         if limit is not None and self.parameter is not None:
             raise InputError("--volumetric-limit needs all parameters; leave out --parameter")
-        if self.reference is not None and self.reference[0] >= self.reference[1]:
-            first, last = (f"{moment:%Y-%m-%d}" for moment in self.reference)
-            raise InputError(f"--reference {first}..{last}: the first date must lie before the second")
+
+    def at_machine(self, db: Database) -> TrendRequest:
+        """Return the request with its moments as the clock of the machine's shop had them."""
+        reference = None
+        if self.reference is not None:
+            first, last = self.reference
+            reference = at_machine(db, self.machine, first), at_machine(db, self.machine, last)
+        return replace(
+            self,
+            since=at_machine(db, self.machine, self.since),
+            next_check=at_machine(db, self.machine, self.next_check),
+            reference=reference,
+        )
 
     @property
     def is_plain(self) -> bool:

@@ -44,7 +44,7 @@ from monitor.workflow.trend.answer import (
     StepAtEvent,
     TrendAnswer,
 )
-from monitor.workflow.trend.control import Charts, points_of
+from monitor.workflow.trend.control import Charts
 from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast
 from monitor.workflow.trend.parameter import (
@@ -68,6 +68,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
 
     Raises NotFoundError for a machine or parameter that is not there, InputError for dates that cannot be.
     """
+    request = request.at_machine(db)
     history = _history(db, request)
     events = machine_events(db, request.machine)
     # Read before anything is computed: the file is let go of when nothing was asked for a moment.
@@ -180,7 +181,9 @@ def _answer(
     offset = next(iter(past.values())).series.offset
     reference = request.reference
     charts = Charts(
-        points_of(history, offset),
+        history,
+        offset,
+        splitting_events(events),
         None if reference is None else (days_since_1970(reference[0]), days_since_1970(reference[1])),
     )
     check = _next_check(history, request)
