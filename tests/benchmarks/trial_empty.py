@@ -6,7 +6,8 @@ A campaign without noise is made and fitted once for every number of runs; then 
 residual, the base parameters are taken out again (they are linear to parts in a million at these sizes), and the scan
 of the catalogue is asked as ``explain`` asks it, under the correlation of neighbours that the noise itself shows.
 What is left out of ``explain`` can add no effect of the catalogue, only free shapes; those are counted by
-``trial_unknown.py``. Campaigns whose noise shows the same correlation are weighed together; where no candidate passes
+``trial_unknown.py``. Drifts of one run are asked at once, not after the catalogue.
+Campaigns whose noise shows the same correlation are weighed together; where no candidate passes
 the first control of the false discovery rate the scan ends there, and is not asked (it cannot name anything).
 Portions of seeds go round over all kinds until ``--seconds`` of processor time are used. Stopped early, it prints what
 it has, with exact (Clopper-Pearson) intervals.
@@ -35,6 +36,7 @@ from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.evidence import Pool, best_of_families, weigh_beside
 from monitor.discovery.search.scan import scan
@@ -111,8 +113,10 @@ class Plan:
                 whitened.__dict__["nuisance"] = scene.fit.nuisance
                 whitened.__dict__["by_error"] = self.fit.by_error
                 seen = ChainScene(whitened, scene.shared, scene.candidates, scene.refused)
-                if not self.begins(seen, pool, rate):
+                drifts = drifts_of_runs(seen, (), rate)
+                if not drifts and not self.begins(seen, pool, rate):
                     continue
+                seen = replace(seen, candidates=(*seen.candidates, *scene_of(whitened, drifts).candidates))
                 result = scan(seen, ChainAcceptance(seen, self.drivers, rate), rate=rate)
                 named[index] = [finding.candidate.family for finding in result.findings]
         return named
