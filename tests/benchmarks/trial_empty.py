@@ -24,6 +24,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,14 +65,15 @@ PORTION = 50
 
 @dataclass
 class Plan:
-    """A campaign without noise, fitted."""
+    """A campaign without noise, fitted; with what is ``hidden`` in it."""
 
     days: int
     each: int
+    hidden: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         campaign, _ = virtual_campaigns.virtual(
-            1, days=self.days, runs_per_day=self.each, noise_um=0.0, stated_um=1.0
+            1, self.hidden, days=self.days, runs_per_day=self.each, noise_um=0.0, stated_um=1.0
         )
         problem = problem_of(campaign).for_search()
         self.fit = fit(problem)
@@ -94,6 +96,8 @@ class Plan:
         rows = problem.padded(vectors).reshape(len(residual), -1)
         residual[:, : rows.shape[1]] = rows
         residual = project_out(self.own, residual[..., None])[..., 0]
+        if self.hidden:
+            residual = residual + self.fit.solution.last.residual
         last = replace(self.fit.solution.last, residual=residual)
         return replace(self.fit, solution=replace(self.fit.solution, last=last))
 
