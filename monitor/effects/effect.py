@@ -326,7 +326,7 @@ def parse_effect(text: str, chain: Chain) -> ParsedEffect:
 def _split_driver(text: str) -> tuple[str, str]:
     """Return body and driver; an @ inside brackets belongs to a formula."""
     at = text.rfind("@")
-    if at == -1 or ")" in text[at:]:
+    if at == -1 or text.count(")", at) > text.count("(", at):
         return text, ""
     if at == len(text) - 1:
         raise EffectError(f"'{text}' ends in @ without a driver; write for example {text}warmup")

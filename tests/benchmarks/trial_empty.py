@@ -6,7 +6,8 @@ A campaign without noise is made and fitted once for every number of runs; then 
 residual, the base parameters are taken out again (they are linear to parts in a million at these sizes), and the scan
 of the catalogue is asked as ``explain`` asks it, under the correlation of neighbours that the noise itself shows.
 What is left out of ``explain`` can add no effect of the catalogue, only free shapes; those are counted by
-``trial_unknown.py``. Campaigns whose noise shows the same correlation are weighed together; where no candidate passes
+``trial_unknown.py``. Drifts of one run are asked at once, not after the catalogue.
+Campaigns whose noise shows the same correlation are weighed together; where no candidate passes
 the first control of the false discovery rate the scan ends there, and is not asked (it cannot name anything).
 Portions of seeds go round over all kinds until ``--seconds`` of processor time are used. Stopped early, it prints what
 it has, with exact (Clopper-Pearson) intervals.
@@ -23,6 +24,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +37,7 @@ from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.evidence import Pool, best_of_families, weigh_beside
 from monitor.discovery.search.scan import scan
@@ -62,14 +65,15 @@ PORTION = 50
 
 @dataclass
 class Plan:
-    """A campaign without noise, fitted."""
+    """A campaign without noise, fitted; with what is ``hidden`` in it."""
 
     days: int
     each: int
+    hidden: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         campaign, _ = virtual_campaigns.virtual(
-            1, days=self.days, runs_per_day=self.each, noise_um=0.0, stated_um=1.0
+            1, self.hidden, days=self.days, runs_per_day=self.each, noise_um=0.0, stated_um=1.0
         )
         problem = problem_of(campaign).for_search()
         self.fit = fit(problem)
@@ -92,6 +96,8 @@ class Plan:
         rows = problem.padded(vectors).reshape(len(residual), -1)
         residual[:, : rows.shape[1]] = rows
         residual = project_out(self.own, residual[..., None])[..., 0]
+        if self.hidden:
+            residual = residual + self.fit.solution.last.residual
         last = replace(self.fit.solution.last, residual=residual)
         return replace(self.fit, solution=replace(self.fit.solution, last=last))
 
@@ -111,8 +117,10 @@ class Plan:
                 whitened.__dict__["nuisance"] = scene.fit.nuisance
                 whitened.__dict__["by_error"] = self.fit.by_error
                 seen = ChainScene(whitened, scene.shared, scene.candidates, scene.refused)
-                if not self.begins(seen, pool, rate):
+                drifts = drifts_of_runs(seen, (), rate)
+                if not drifts and not self.begins(seen, pool, rate):
                     continue
+                seen = replace(seen, candidates=(*seen.candidates, *scene_of(whitened, drifts).candidates))
                 result = scan(seen, ChainAcceptance(seen, self.drivers, rate), rate=rate)
                 named[index] = [finding.candidate.family for finding in result.findings]
         return named

@@ -145,6 +145,15 @@ def test_run_time_goes_from_zero_to_one_in_every_run() -> None:
     )
 
 
+def test_run_time_of_one_run_is_zero_in_the_others() -> None:
+    context = context_of(small_campaign(), parse_topology(HU40))
+    expected = [0.0] * 3 + [0.0, 0.5, 1.0] + [0.0] * 6
+    np.testing.assert_allclose(columns("EXX:const@run_time(2)", context).ravel(), expected, atol=1e-15)
+    effect = parse_effect("EB0Z@run_time(2)", context.chain)
+    assert effect.text == "EB0Z@run_time(2)"
+    assert effect.driver.phrase == ", drifting evenly in run 2 alone"
+
+
 def test_run_time_of_a_run_with_one_probing_is_zero() -> None:
     context = context_of(small_campaign(1), parse_topology(HU40))
     assert columns("EXX:const@run_time", context).ravel().tolist() == [0.0] * 4

@@ -1,4 +1,5 @@
-"""The scan of a chain: with gears where some stand out of what it leaves, with tables instead of several shapes."""
+"""The scan of a chain: with gears and drifts of one run where some stand out of what it leaves, with tables instead of
+several shapes."""
 
 from __future__ import annotations
 
@@ -8,20 +9,21 @@ from dataclasses import replace
 from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.wander import with_base_instead
 from monitor.discovery.search.scan import by_error_taken_away, scan
 
-# More orders of gears than this are noise that no order explains.
-MOST_GEARS = 12
+# More orders of gears, and drifts, than these are noise that none explains.
+MOST_GEARS, MOST_DRIFTS = 12, 60
 
 
 def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
-    """Scan a scene; where gears stand out of what it leaves, once more with them; at last with tables instead of
-    several shapes. Return the scene with the candidates that were added."""
+    """Scan a scene; where gears or drifts of one run stand out of what it leaves, once more with them; at last with
+    tables instead of several shapes. Return the scene with the candidates that were added."""
 
     def scanned(
         scene: ChainScene, begin: Sequence[ChainCandidate], shared: Sequence[ChainCandidate] = ()
@@ -29,17 +31,26 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         return scan(scene, ChainAcceptance(scene, drivers, rate, shared), rate=rate, begin=begin)
 
     gears: set[str] = set()
+    drifts: set[str] = set()
     selected: Sequence[ChainCandidate] = ()
     while True:
         result = standing_out(scene, scanned(scene, selected))
         selected = result.candidates
-        variants = gear_variants(scene, result.candidates, rate)
-        new = [variant for variant in variants if variant.effect.text not in gears]
-        if not new or len(gears) > MOST_GEARS:
+        new = _not_yet(gear_variants(scene, selected, rate), gears, MOST_GEARS)
+        new += _not_yet(drifts_of_runs(scene, selected, rate), drifts, MOST_DRIFTS)
+        if not new:
             if not all_curves_were_searched(scene.fit):
                 scene, result = with_tables(scene, result, scanned)
             result = with_base_instead(scene, result, rate)
             scene, result = with_unknown_shapes(scene, standing_out(scene, result))
             return scene, by_error_taken_away(scene, standing_out(scene, result))
-        gears |= {variant.effect.text for variant in new}
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
+
+
+def _not_yet(variants: Sequence[ChainVariant], searched: set[str], most: int) -> list[ChainVariant]:
+    """The variants that were not searched yet, which are from now on; none where more than ``most`` were."""
+    new = [variant for variant in variants if variant.effect.text not in searched]
+    if len(searched) > most:
+        return []
+    searched |= {variant.effect.text for variant in new}
+    return new

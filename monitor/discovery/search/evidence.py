@@ -8,7 +8,7 @@ against what stays, and ranked by the logarithm of the likelihood ratio less the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic
 
@@ -18,6 +18,7 @@ import scipy
 
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate
 from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.remainder import Remainder
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.records import Array
 
@@ -30,6 +31,8 @@ ODDS_OF_TOO_LARGE = 400.0
 # What would have to be a hundred times as large (0.1 rad, 5 mm) is no error but another machine; so far the
 # linearised columns do not reach. A scale that shrinks the whole machine explains any residual.
 BEYOND = 100.0
+# So many products with selected effects are remembered, some hundreds of MB of a few columns each at most.
+MOST_PRODUCTS = 4_000_000
 # So many standard deviations of a coefficient are put down to noise before its size is judged.
 STANDS_OUT = 3.0
 
@@ -58,14 +61,36 @@ class Evidence(Generic[CandidateT]):
 
 @dataclass(frozen=True)
 class Pool(Generic[CandidateT]):
-    """Candidates to be weighed together, again and again: their columns side by side."""
+    """Candidates to be weighed together, again and again: their columns side by side, and their products with those of
+    effects that were selected beside them, each computed once."""
 
     candidates: tuple[CandidateT, ...]
+    _products: dict[int, tuple[object, Array]] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
     def rows(self) -> Array:
         """All columns (K, M), one row each."""
         return np.concatenate([candidate.columns.T for candidate in self.candidates])
+
+    def overlap(self, beside: Remainder) -> Array:
+        """The products (K, r) of all columns with the basis of what selected effects span."""
+        products = [self._product(beside.shared, beside.shared)]
+        products += [self._product(candidate, candidate.columns) for candidate in beside.selected]
+        return np.concatenate(products, axis=1) @ beside.combinations
+
+    def onto(self, beside: Remainder, overlap: Array) -> Array:
+        """The products (K,) of all columns with what selected effects leave, of which ``overlap`` (K, r) is known."""
+        return self._product(beside.whole, beside.whole) - overlap @ (beside.basis.T @ beside.whole)
+
+    def _product(self, owner: object, columns: Array) -> Array:
+        """The products of all columns with those of an owner."""
+        known = self._products.get(id(owner))
+        if known is None:
+            if len(self._products) * len(self.rows) > MOST_PRODUCTS:
+                self._products.clear()
+            # The owner is kept too: an identity is only that of an object that exists.
+            known = self._products[id(owner)] = owner, self.rows @ columns
+        return known[1]
 
     @cached_property
     def by_size(self) -> dict[int, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]:
@@ -127,9 +152,8 @@ class Pool(Generic[CandidateT]):
     def with_more(self, more: Sequence[CandidateT]) -> Pool[CandidateT]:
         """The pool and further candidates of families that it lacks."""
         families = {candidate.family for candidate in self.candidates}
-        return Pool(
-            (*self.candidates, *(candidate for candidate in more if candidate.family not in families))
-        )
+        new = [candidate for candidate in more if candidate.family not in families]
+        return Pool((*self.candidates, *new)) if new else self
 
 
 def pool_of(scene: Scene[CandidateT]) -> Pool[CandidateT]:
@@ -147,22 +171,23 @@ def weigh(
 
     ``degrees_of_freedom`` are those of ``residual`` (M,) before the selected columns are taken out.
     """
-    basis = orthonormal(selected)
-    remainder = without(basis, residual[:, None])[:, 0]
-    return _weighed(candidates, basis, remainder, degrees_of_freedom - basis.shape[1])
-
-
-def _weighed(
-    candidates: Sequence[CandidateT] | Pool[CandidateT], basis: Array, remainder: Array, dof: int
-) -> list[Evidence[CandidateT]]:
-    """Weigh every candidate beside what an orthonormal ``basis`` (M, r) leaves of a residual, ``remainder`` (M,) with
-    ``dof`` degrees of freedom."""
     pool = candidates if isinstance(candidates, Pool) else Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    total = float(remainder @ remainder)
-    onto = (pool.rows @ remainder) / pool.lengths
-    overlap = (pool.rows @ basis) / pool.lengths[:, None]
+    basis = orthonormal(selected)
+    remainder = without(basis, residual[:, None])[:, 0]
+    left = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
+    return _weighed(pool, pool.rows @ basis, pool.rows @ remainder, left)
+
+
+def _weighed(
+    pool: Pool[CandidateT], overlap: Array, onto: Array, left: tuple[float, int]
+) -> list[Evidence[CandidateT]]:
+    """Weigh every candidate of a pool by the products of its columns with an orthonormal basis (K, r) of what is
+    selected and with what that leaves (K,), of which ``left`` is the sum of squares with its degrees of freedom."""
+    total, dof = left
+    onto = onto / pool.lengths
+    overlap = overlap / pool.lengths[:, None]
     explained = np.zeros(len(pool.candidates))
     rank = np.zeros(len(pool.candidates), dtype=np.int64)
     large = np.zeros(len(pool.candidates))
@@ -184,7 +209,15 @@ def weigh_beside(
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate beside the selected ones, the most convincing first."""
     beside = scene.remainders.beside(selected)
-    return _weighed(candidates, beside.basis, beside.residual, beside.degrees_of_freedom)
+    left = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    if isinstance(candidates, Pool):
+        overlap = candidates.overlap(beside)
+        return _weighed(candidates, overlap, candidates.onto(beside, overlap), left)
+    # Nothing is gained by products with each selected effect of candidates that are weighed once.
+    pool = Pool(tuple(candidates))
+    if not pool.candidates:
+        return []
+    return _weighed(pool, pool.rows @ beside.basis, pool.rows @ beside.residual, left)
 
 
 def explained_by(

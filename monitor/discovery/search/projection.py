@@ -12,14 +12,20 @@ RELATIVE_RANK = 1e-9
 
 def orthonormal(columns: Array) -> Array:
     """An orthonormal basis (M, rank) of what columns (M, k) span."""
+    return orthonormal_by(columns)[0]
+
+
+def orthonormal_by(columns: Array) -> tuple[Array, Array]:
+    """That basis, and the combinations (k, rank) of the columns that it consists of."""
     if columns.shape[1] == 0:
-        return columns
+        return columns, np.zeros((0, 0))
     scale = np.linalg.norm(columns, axis=0)
-    scaled = columns / np.where(scale == 0, 1.0, scale)
+    scale = np.where(scale == 0, 1.0, scale)
+    scaled = columns / scale
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     keep = values > RELATIVE_RANK * max(float(values.max()), 1.0)
-    basis: Array = scaled @ (vectors[:, keep] / np.sqrt(values[keep]))
-    return basis
+    combinations = vectors[:, keep] / np.sqrt(values[keep])
+    return scaled @ combinations, combinations / scale[:, None]
 
 
 def orthonormal_to_full_precision(columns: Array) -> Array:

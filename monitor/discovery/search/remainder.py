@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from monitor.discovery.search.candidate import Candidate
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import orthonormal_by, without
 from monitor.records import Array
 
 # So many numbers of bases are remembered, 64 MB: 200 sets of ten effects on 4 000 readings.
@@ -20,9 +20,16 @@ MOST_NUMBERS = 8_000_000
 @dataclass(frozen=True)
 class Remainder:
     """The residual (M,) without the span of the ``selected`` effects and of those that the model shares, an orthonormal
-    ``basis`` (M, r) of that span, and the degrees of freedom that it leaves."""
+    ``basis`` (M, r) of that span, and the degrees of freedom that it leaves.
+
+    The basis consists of ``combinations`` (c, r) of the ``shared`` columns and of those of the selected ones, in their
+    order; ``whole`` (M,) is the residual before.
+    """
 
     selected: tuple[Candidate[object], ...]
+    shared: Array
+    combinations: Array
+    whole: Array
     basis: Array
     residual: Array
     degrees_of_freedom: int
@@ -41,6 +48,7 @@ class Remainders:
         self._residual = residual
         self._degrees_of_freedom = degrees_of_freedom
         self._columns = columns
+        self._shared = columns([])
         self._remembered: dict[frozenset[int], Remainder] = {}
         self._numbers = 0
 
@@ -50,9 +58,12 @@ class Remainders:
         key = frozenset(id(candidate) for candidate in selected)
         remainder = self._remembered.pop(key, None)
         if remainder is None:
-            basis = orthonormal(self._columns(selected))
+            basis, combinations = orthonormal_by(self._columns(selected))
             residual = without(basis, self._residual[:, None])[:, 0]
-            remainder = Remainder(tuple(selected), basis, residual, self._degrees_of_freedom - basis.shape[1])
+            freedom = self._degrees_of_freedom - basis.shape[1]
+            remainder = Remainder(
+                tuple(selected), self._shared, combinations, self._residual, basis, residual, freedom
+            )
             self._numbers += basis.size
         self._remembered[key] = remainder
         while self._numbers > MOST_NUMBERS and len(self._remembered) > 1:

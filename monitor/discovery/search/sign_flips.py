@@ -73,7 +73,7 @@ def p_value_by_flips(
     if dof < 1 or total <= 0.0:
         return 1.0
     ends = np.searchsorted(run, np.arange(runs + 1))
-    overlap = pool.rows @ basis
+    overlap = pool.overlap(beside)
     scores = np.empty((len(pool.rows), runs))
     for index, (start, end) in enumerate(pairwise(ends)):
         scores[:, index] = pool.rows[:, start:end] @ residual[start:end]

@@ -92,7 +92,8 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
         return TieBreak.NOTHING, (), ()
     driver, other = _driver(effect.effect), _driver(rival)
     if driver not in OF_POSES or other not in OF_POSES:
-        if driver != other:
+        # What one run did does not act again while others are indexed.
+        if driver != other or driver == "each_run":
             columns = (_recorded(name) for name in (driver, other) if name not in OF_POSES)
             return TieBreak.DRIVERS, tuple(dict.fromkeys(columns)), ()
         return TieBreak.INDEXATIONS, (driver,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
@@ -101,6 +102,8 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
 
 def _driver(text: str) -> str:
     name = text.rpartition("@")[2] if "@" in text else ""
+    # A run that drifts unlike the others (@run_time(3)) does not come again: more runs show whether another does.
+    name = re.sub(r"^run_time\(\d+\)$", "each_run", name)
     # A time constant that was searched (@warmup45min) is no other driver.
     return re.sub(r"^(warmup|settling|lagged)[\d.]+min", r"\1", name)
 

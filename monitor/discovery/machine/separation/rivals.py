@@ -14,6 +14,7 @@ from monitor.discovery.machine.scene import (
     MachineEffect,
     scene_of,
 )
+from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import bends_of, part_of_period, with_drivers
 from monitor.discovery.search.candidate import Variant
@@ -70,6 +71,9 @@ class RivalSearch:
         if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
             variants += bends_of(candidate.effect)
         variants += _of_other_errors(candidate.effect)
+        runs = self.scene.fit.problem.runs
+        if len(runs) >= FEWEST_RUNS:
+            variants += in_one_run(candidate.effect, map(int, runs), len(runs))
         driven = scene_of(self.scene.fit, variants).candidates
         return pool + [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
 

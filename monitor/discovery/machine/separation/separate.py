@@ -19,7 +19,7 @@ from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
 from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
-from monitor.effects.drivers import Always, EachRun
+from monitor.effects.drivers import Always, EachRun, RunTime
 from monitor.effects.drivers.gravity import Gravity
 from monitor.exceptions import DataError
 from monitor.machine import Chain, Joint, evaluate, touching_positions
@@ -201,7 +201,7 @@ def _have_same_driver(effect: MachineEffect, rival: MachineEffect) -> bool:
     on the same driver."""
     if not isinstance(effect, ChainEffect) or not isinstance(rival, ChainEffect):
         return False
-    if isinstance(effect.driver, EachRun):
+    if isinstance(effect.driver, EachRun) or (isinstance(effect.driver, RunTime) and effect.driver.run):
         return False
     plain = [isinstance(each.driver, (Always, Gravity)) for each in (effect, rival)]
     return all(plain) or (not any(plain) and effect.driver_text == rival.driver_text)

@@ -15,6 +15,7 @@ import scipy
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.noise.plan_cells import plan_cells
+from monitor.discovery.machine.suspects.tails import Tails, tails_of
 from monitor.methods.chain.gross import off_reading
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
@@ -192,6 +193,8 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
     """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
     deviations = deviations_of(fit)
     context = fit.problem.context
+    weighted = ~fit.left_out
+    tails = tails_of((deviations.vectors / np.sqrt(deviations.inflation)[:, None])[weighted])
     moves = []
     tests = 0
     for run, rows in enumerate(deviations.rows):
@@ -199,7 +202,7 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
         for target in np.intersect1d(context.target[rows], fit.problem.movable):
             touches = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
             tests += max(len(touches) - 2 * TOUCHES_EACH_SIDE + 1, 0)
-            move = _ball_move(fit, deviations, run, touches)
+            move = _ball_move(fit, deviations, tails, run, touches)
             if move is not None:
                 # Where the others drift as well, a mean of touches knows less than their number says.
                 share = _shared_by_neighbours(deviations.vectors[rows], context.target[rows], str(target))
@@ -232,8 +235,11 @@ def _shared_by_neighbours(vectors: Array, targets: npt.NDArray[np.str_], suspect
     return share
 
 
-def _ball_move(fit: Fit, deviations: Deviations, run: int, touches: npt.NDArray[np.int64]) -> BallMove | None:
-    """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test."""
+def _ball_move(
+    fit: Fit, deviations: Deviations, tails: Tails, run: int, touches: npt.NDArray[np.int64]
+) -> BallMove | None:
+    """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test, and no
+    smaller than its likelihood under the tails of all touches allows."""
     context, rows, basis = fit.problem.context, deviations.rows[run], deviations.of_run(run)
     first = np.arange(TOUCHES_EACH_SIDE, len(touches) - TOUCHES_EACH_SIDE + 1)
     if len(first) == 0:
@@ -249,6 +255,12 @@ def _ball_move(fit: Fit, deviations: Deviations, run: int, touches: npt.NDArray[
     best = int(chi_square.argmax())
     if chi_square[best] <= 0:
         return None
+    moved = -basis @ shared[best].T
+    moved[touches[first[best] :]] += np.eye(3)
+    vectors = deviations.vectors[rows] / np.sqrt(deviations.inflation[rows])[:, None]
+    judged = ~fit.left_out[rows]
+    likelihood = tails.shift(vectors[judged], moved[judged], shifts[best])
+    chi_square[best] = min(float(chi_square[best]), max(likelihood, 0.0))
     row = int(rows[touches[first[best]]])
     # The tip followed the ball, so the vector from where the ball was to the tip is its shift.
     x, y, z = (float(part) for part in shifts[best] * fit.problem.sigma[row])
