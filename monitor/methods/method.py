@@ -408,11 +408,12 @@ class ChainMethod(Method):
             try:
                 solution = solve(problem)
             except DataError as error:
-                gross = gross_of(campaign, problem, None, partial(self.problem_of, model=model))
+                gross = gross_of(campaign, problem, None, partial(self.problem_of, model=model)).readings
                 raise type(error)(f"{error}{problem.unsettled}{_suspected(problem, gross)}") from error
-        gross = gross_of(campaign, problem, solution, partial(self.problem_of, model=model))
+        search = gross_of(campaign, problem, solution, partial(self.problem_of, model=model))
         return replace(
-            identification(campaign, model, problem, solution, self.advice, gross),
+            identification(campaign, model, problem, solution, self.advice, search.readings),
+            unsearched=search.unsearched,
             taken_up=self.taken_up(problem),
             as_stated=self.as_stated(problem),
         )

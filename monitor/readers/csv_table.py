@@ -118,17 +118,18 @@ def _line_of_head(header: Sequence[str], lines: Sequence[str]) -> int | None:
     return None
 
 
-def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> None:
-    """Note every required column that the header lacks, and the one that may be it under another name."""
-    other_names = misspelt(table, required)
+def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> frozenset[str]:
+    """Note every required column that the header lacks, and the one that may be it under another name; return these."""
+    other_names = _misspelt(table, required)
     for column in required:
         if column not in table.columns:
             hint = f"is it {quoted(other_names[column])}? " if column in other_names else ""
             message = f"the column is missing; {hint}the header needs {one_of(required)}"
             faults.add(table.file, 1, column, message)
+    return frozenset(other_names.values())
 
 
-def misspelt(table: CsvTable, required: Sequence[str]) -> dict[str, str]:
+def _misspelt(table: CsvTable, required: Sequence[str]) -> dict[str, str]:
     """Return the column that is likely meant for each required one that the header lacks, where a name is close."""
     unused = [name for name in table.columns if name not in required]
     missing = [column for column in required if column not in table.columns]

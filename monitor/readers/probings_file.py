@@ -122,9 +122,9 @@ def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> Probin
     What does not depend on the missing column is checked all the same.
     """
     required = (*expected.first, *expected.columns, *expected.allowed.measured_columns)
-    refuse_missing(table, expected.listed, faults)
+    named = refuse_missing(table, expected.listed, faults)
     taken = (*required, "target", SETUP) if expected.allowed.needs_setups else required
-    readings, channels = _cells(table, taken, expected, faults)
+    readings, channels = _cells(table, taken, named, expected, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None
     sequence = wholes(table, "sequence", faults) if "sequence" in table.columns else None
     known_target = _known_targets(table, expected.targets, faults)
@@ -168,7 +168,7 @@ def _setups(
 
 
 def _cells(
-    table: CsvTable, required: Sequence[str], expected: Expected, faults: Faults
+    table: CsvTable, required: Sequence[str], named: frozenset[str], expected: Expected, faults: Faults
 ) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
     """Return the readings and the channels by column; readings of an axis that is not in the topology are refused."""
     columns, allowed = expected.columns, expected.allowed
@@ -177,7 +177,7 @@ def _cells(
         for name in odd:
             message = f"the topology has no axis for {quoted(name)}; its columns are {one_of(columns)}"
             faults.add(FILE, 1, name, message)
-    names = recorded_columns(table, [*required, *odd], faults, allowed.suffixes, allowed.plain_columns)
+    names = recorded_columns(table, [*required, *odd], faults, named, allowed.suffixes, allowed.plain_columns)
     readings = {}
     for name in [*columns, *(odd if expected.axes is None else ())]:
         if name in table.columns:

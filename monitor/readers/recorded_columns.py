@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from monitor.exceptions import did_you_mean
-from monitor.readers.csv_table import CsvTable, misspelt
+from monitor.readers.csv_table import CsvTable
 from monitor.readers.faults import Faults, quoted
 from monitor.units import CONDITION_SUFFIXES, column_unit
 
@@ -19,18 +19,18 @@ def recorded_columns(
     table: CsvTable,
     taken: Sequence[str],
     faults: Faults,
+    named: Collection[str] = (),
     suffixes: Sequence[str] = CONDITION_SUFFIXES,
     plain: Sequence[str] = (),
 ) -> list[str]:
     """Return the columns that are not ``taken``, in order; those of an unknown unit are noted and left out.
 
-    Nothing is noted of one that was named as the likely other name of a missing column: that is one mistake.
+    Nothing more is noted of one that was ``named`` as the likely other name of a missing column: that is one mistake.
     ``suffixes`` are the units allowed, ``plain`` the columns without a unit that a method allows.
     """
     columns = []
-    misspellings = set(misspelt(table, taken).values())
     for column in table.columns:
-        if column in taken or (column in misspellings and not has_unit(column, suffixes)):
+        if column in taken or (column in named and not has_unit(column, suffixes)):
             continue
         if has_unit(column, suffixes) or column in plain:
             columns.append(column)

@@ -38,8 +38,9 @@ def read_runs(table: CsvTable, faults: Faults, *, ambient: bool = True) -> RunsP
     """Read the runs; None where the column of their numbers is missing. ``ambient`` is whether each must have the
     ambient temperature; else the column may be empty or missing."""
     required = (*PLAN, AMBIENT)
-    refuse_missing(table, required if ambient else PLAN, faults)
-    conditions = _conditions(table, recorded_columns(table, required, faults), faults, ambient=ambient)
+    named = refuse_missing(table, required if ambient else PLAN, faults)
+    recorded = recorded_columns(table, required, faults, named)
+    conditions = _conditions(table, recorded, faults, ambient=ambient)
     day = wholes(table, "day", faults) if "day" in table.columns else None
     warm_up = _truths(table, faults) if "warm_up" in table.columns else None
     started = _moments(table, faults) if "started_at" in table.columns else None

@@ -61,6 +61,19 @@ class GrossReadingNoted(Sentence):
 
 
 @dataclass(frozen=True)
+class UnsearchedNoted(Sentence):
+    """Rows of a run were not looked at for gross readings: their part of very many is no plan of its own."""
+
+    run: int
+
+    def __str__(self) -> str:
+        return (
+            f"run {self.run}: some of its rows were not looked at for wrong readings: of so many rows these are looked "
+            "for in parts, and a part of this run cannot be identified by itself, as without the scale bar"
+        )
+
+
+@dataclass(frozen=True)
 class ResidualsNoted(Sentence):
     """The residuals are ``times`` what the stated uncertainties leave: much more, or far less (below 1)."""
 

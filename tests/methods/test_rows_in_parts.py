@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from monitor.discovery import fit
-from monitor.exceptions import TooManyRowsError
+from monitor.exceptions import DataError, TooManyRowsError
 from monitor.methods import campaign_method
+from monitor.methods.chain import parts, problem
 from monitor.methods.chain.memory import free_memory
 from monitor.progress import listening
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.workflow.identify.notes import note
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CHAIN = "monitor.methods.chain"
@@ -26,11 +28,19 @@ def campaign(request: pytest.FixtureRequest) -> Campaign:
     return read_campaign(EXAMPLES / request.param)
 
 
+def let_few_rows_be_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let blocks be so small that some lack a run, a target or the spheres, and parts as small as plans are; a part is
+    fitted at once, as with the numbers that are shipped."""
+    assert parts.MOST_TOGETHER < problem.MOST_AT_ONCE
+    monkeypatch.setattr(f"{CHAIN}.problem.MOST_AT_ONCE", 210)
+    monkeypatch.setattr(f"{CHAIN}.problem.ROWS_AT_ONCE", 17)
+    monkeypatch.setattr(f"{CHAIN}.parts.MOST_TOGETHER", 150)
+
+
 @pytest.fixture
 def in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let parts be so small that some lack a run, a target or the spheres."""
-    monkeypatch.setattr(f"{CHAIN}.problem.MOST_AT_ONCE", 20)
-    monkeypatch.setattr(f"{CHAIN}.problem.ROWS_AT_ONCE", 17)
+    """Few rows are many."""
+    let_few_rows_be_many(monkeypatch)
 
 
 def test_the_triangle_of_a_run_says_what_its_rows_say(campaign: Campaign, in_parts: None) -> None:
@@ -55,10 +65,10 @@ def test_identify_in_parts_is_identify_at_once(campaign: Campaign, monkeypatch: 
     """Numbers to a millionth of their standard uncertainty, and everything that is refused or noted."""
     method = campaign_method(campaign)
     at_once = method.identify(campaign)
-    monkeypatch.setattr(f"{CHAIN}.problem.MOST_AT_ONCE", 20)
-    monkeypatch.setattr(f"{CHAIN}.problem.ROWS_AT_ONCE", 17)
+    let_few_rows_be_many(monkeypatch)
+    assert len(list(parts.parts_of(campaign))) > 1
     parted = method.identify(campaign)
-    assert (parted.iterations, parted.gross) == (at_once.iterations, at_once.gross)
+    assert (parted.iterations, parted.gross, parted.unsearched) == (at_once.iterations, at_once.gross, ())
     for mine, theirs in zip(parted.runs, at_once.runs, strict=True):
         u = np.sqrt(np.diag(theirs.covariance))
         np.testing.assert_allclose(mine.estimate / u, theirs.estimate / u, rtol=0.0, atol=1e-6)
@@ -66,6 +76,73 @@ def test_identify_in_parts_is_identify_at_once(campaign: Campaign, monkeypatch: 
         np.testing.assert_allclose(mine.residuals, theirs.residuals, atol=1e-9)
         assert mine.chi_square == pytest.approx(theirs.chi_square, rel=1e-9)
         assert (mine.refused, mine.degrees_of_freedom) == (theirs.refused, theirs.degrees_of_freedom)
+
+
+def many_touches(names: tuple[str, ...] = ("S1", "S2")) -> Campaign:
+    """Run 1 of an example four times over with noise, its bar touched once; of a second run just ``names`` of it."""
+    whole = read_campaign(EXAMPLES / "cold-cold")
+    one = np.flatnonzero(whole.probings.run == whole.runs[0].run)
+    bar = np.isin(whole.probings.target[one], ("S1", "S2"))
+    rows = np.concatenate([one[bar], np.repeat(one[~bar], 12)])
+    again = rows[
+        np.isin(whole.probings.target[rows], names) | ~np.isin(whole.probings.target[rows], ("S1", "S2"))
+    ]
+    both = whole.probings.rows(np.concatenate([rows, again]))
+    rng = np.random.default_rng(3)
+    readings = {
+        axis: values + rng.normal(0.0, 3e-4, len(values)) if axis in "XYZ" else values
+        for axis, values in both.readings.items()
+    }
+    run = np.repeat([1, 2], [len(rows), len(again)])
+    sequence = np.concatenate([np.arange(1, len(rows) + 1), np.arange(1, len(again) + 1)])
+    runs = tuple(replace(whole.runs[0], run=number) for number in (1, 2))
+    return replace(whole, runs=runs, probings=replace(both, run=run, sequence=sequence, readings=readings))
+
+
+def with_wrong_touch(campaign: Campaign, row: int, off: float) -> Campaign:
+    readings = dict(campaign.probings.readings)
+    readings["Y"] = readings["Y"].copy()
+    readings["Y"][row] += off
+    return replace(campaign, probings=replace(campaign.probings, readings=readings))
+
+
+def test_a_bar_that_is_touched_once_a_run_is_in_every_part(in_parts: None) -> None:
+    campaign = many_touches()
+    for _, part in parts.parts_of(campaign):
+        assert set(campaign.artefact.scale_bar.balls) <= set(part.probings.target.tolist())
+    row = int(np.flatnonzero(campaign.probings.run == 2)[40])
+    found = campaign_method(campaign).identify(with_wrong_touch(campaign, row, 0.5))
+    assert [reading.row for reading in found.gross] == [row]
+    assert found.gross[0].size == pytest.approx(0.5, abs=0.01)
+    assert found.unsearched == ()
+
+
+def test_a_run_that_cannot_be_searched_in_parts_is_identified_and_says_so(
+    in_parts: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run without the bar is none by itself; beside one that has it, it is identified but for its gains."""
+    monkeypatch.setattr(f"{CHAIN}.parts.FEWEST_TOGETHER", 1)
+    campaign = many_touches(names=())
+    row = int(np.flatnonzero(campaign.probings.run == 1)[40])
+    found = campaign_method(campaign).identify(with_wrong_touch(campaign, row, 0.5))
+    assert [reading.row for reading in found.gross] == [row]
+    assert found.unsearched == (2,)
+    assert [
+        note(campaign.machine, found, run).count("not looked at for wrong readings") for run in found.runs
+    ] == [0, 1]
+
+
+def test_the_refusal_of_a_fit_is_not_replaced_by_that_of_a_part(
+    in_parts: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{CHAIN}.parts.FEWEST_TOGETHER", 1)
+    campaign = many_touches(names=())
+
+    def refuse(problem: object) -> None:
+        raise DataError("the axes go the other way")
+
+    with pytest.raises(DataError, match="the axes go the other way"):
+        campaign_method(campaign).identify(campaign, solve=refuse)
 
 
 def test_effects_that_look_at_all_rows_are_fitted_at_once(in_parts: None) -> None:

@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
 
 from monitor.readers import read_campaign
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, P = "runs.csv", "probings.csv"
 ROW = "1,3,120.0,1,51.730164,-91.168911,115.032892,0,0,90,\n"
 
@@ -125,6 +129,27 @@ def test_format_1_misspelt_column_is_one_fault(spoil, faults_of, file, old, new)
     (fault,) = faults_of(spoil(file, old, new))
     assert (fault.line, fault.column) == (1, old)
     assert f"the column is missing; is it '{new}'? " in fault.message
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        *((R, "ambient_degC", new) for new in ("ambient_C", "ambient")),
+        *((P, "setup", new) for new in ("setups", "Setup", "setp")),
+        *((P, "target", new) for new in ("targets", "Target", "targt")),
+    ],
+)
+def test_format_1_a_misspelt_column_that_nobody_needs_is_refused(tmp_path, faults_of, file, old, new):
+    """It was taken for the likely name of a missing column, which none is, and dropped without a word."""
+    folder = tmp_path / "r-test"
+    shutil.copytree(EXAMPLES / "r-test", folder)
+    head, *lines = (folder / file).read_text().splitlines()
+    if old not in head:
+        head, lines = f"{head},{old}", [f"{line},T{number % 7}" for number, line in enumerate(lines)]
+    (folder / file).write_text("\n".join([head.replace(old, new), *lines]) + "\n")
+    (fault,) = faults_of(folder)
+    assert (fault.line, fault.column) == (1, new)
+    assert f"did you mean '{old}'? " in fault.message
 
 
 def test_format_1_columns_without_name_and_cells_are_not_there(small):

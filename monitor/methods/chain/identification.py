@@ -66,7 +66,8 @@ class Identification:
 
     ``parameters`` names the k base parameters, ``units`` their display units. ``added`` names the parameters
     common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units. ``gross``
-    readings are wrong beyond doubt, and so are the numbers of their runs: they have weight here like all others.
+    readings are wrong beyond doubt, and so are the numbers of their runs: they have weight here like all others; of
+    the runs ``unsearched`` some rows were not looked at for them.
     ``followed`` are the added effects as every run alone determines them. ``taken_up`` are errors without a number of
     their own, where the method says them, ``as_stated`` the stated places that its numbers count from.
     """
@@ -85,6 +86,7 @@ class Identification:
     iterations: int
     gross: tuple[GrossReading, ...]
     followed: FollowedEffects
+    unsearched: tuple[int, ...] = ()
     taken_up: tuple[TakenUp, ...] = ()
     as_stated: tuple[AsStated, ...] = ()
 

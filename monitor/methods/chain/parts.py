@@ -12,6 +12,8 @@ from monitor.records import Campaign
 
 #: So many rows are looked at together: the model takes 10 kB of memory for each, 250 MB. Plans have 60 to 10 000 a run.
 MOST_TOGETHER = 25_000
+#: The touches of the scale bar are in every part of their runs, where they are no more than this part of one.
+MOST_OF_BAR = 0.1
 #: Runs that are looked at together, where there are so many: what two or more of them read alike is no mistake of one.
 FEWEST_TOGETHER = 3
 
@@ -21,7 +23,8 @@ def parts_of(campaign: Campaign) -> Iterator[tuple[npt.NDArray[np.int64], Campai
     these are smaller, at least ``FEWEST_TOGETHER``.
 
     Of larger ones a part has the same rows of each run, drawn at random: each part has the poses and targets of the
-    plan in the plan's shares, and a touch is in the part of the same touch of the other runs.
+    plan in the plan's shares, and a touch is in the part of the same touch of the other runs. The few touches of the
+    scale bar, without which no part has a unit of length, are in all parts of their runs.
     """
     probings = campaign.probings
     if len(probings) <= MOST_TOGETHER:
@@ -34,13 +37,17 @@ def parts_of(campaign: Campaign) -> Iterator[tuple[npt.NDArray[np.int64], Campai
     order = np.argsort(run, kind="stable")
     within = np.empty(len(run), dtype=np.int64)
     within[order] = np.arange(len(run)) - np.repeat(np.cumsum(counts) - counts, counts)
+    bar = campaign.artefact.scale_bar
+    on_bar = np.isin(probings.target, () if bar is None else bar.balls)
     for group in np.array_split(np.arange(len(numbers)), groups):
         belongs = np.isin(run, group)
         pieces = -(-int(belongs.sum()) // MOST_TOGETHER)
         piece = np.random.default_rng(0).permutation(int(counts[group].max())) % pieces
         named = set(numbers[group].tolist())
+        rows_of_group = np.flatnonzero(belongs)
+        in_all = on_bar[rows_of_group]
+        in_all &= in_all.sum() <= MOST_OF_BAR * MOST_TOGETHER
         for number in range(pieces):
-            rows = np.flatnonzero(belongs)
-            rows = rows[piece[within[rows]] == number]
+            rows = rows_of_group[(piece[within[rows_of_group]] == number) | in_all]
             runs = tuple(each for each in campaign.runs if each.run in named)
             yield rows, replace(campaign, runs=runs, probings=probings.rows(rows))

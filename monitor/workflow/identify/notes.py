@@ -20,6 +20,7 @@ from monitor.reporting.run_notes import (
     GrossReadingNoted,
     OffsetNoted,
     ResidualsNoted,
+    UnsearchedNoted,
 )
 from monitor.units import DEGREE
 
@@ -40,9 +41,13 @@ def note(machine: Machine, identification: Identification, run: RunIdentificatio
         for reading in identification.gross
         if reading.run == run.run
     )
+    unsearched = (UnsearchedNoted(number) for number in identification.unsearched if number == run.run)
     displaced = (DisplacedNoted(run.run, point.setup, point.distance) for point in run.displaced)
     return "; ".join(
-        map(str, (*gross, *_residuals(run), *displaced, *_locations(machine, identification, run)))
+        map(
+            str,
+            (*gross, *unsearched, *_residuals(run), *displaced, *_locations(machine, identification, run)),
+        )
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from functools import partial
 
 import numpy as np
 
@@ -19,28 +19,24 @@ def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
     """
     # Loaded here: the methods take longer to load than a folder of curves to read.
     from monitor.methods import campaign_method
-    from monitor.methods.chain.deviation import MOST_ROWS
-    from monitor.methods.chain.gross import GrossReading, gross_readings
-    from monitor.methods.chain.parts import parts_of
+    from monitor.methods.chain.gross_in_parts import gross_in_parts
     from monitor.workflow.identify.notes import gross_noted
 
-    readings: list[GrossReading] = []
     try:
         method = campaign_method(campaign)
-        for _, part in parts_of(campaign):
-            with np.errstate(all="ignore"):
-                readings += gross_readings(method.problem_of(part, method.own_model))
-    except (MonitorError, np.linalg.LinAlgError):
+        with np.errstate(all="ignore"):
+            search = gross_in_parts(
+                campaign, partial(method.problem_of, model=method.own_model), is_fitted=False
+            )
+    except MonitorError:
         # What cannot be identified is said by the verb that is asked to.
         return ()
     if off_places(campaign) is not None:
         # Where the places do not fit, no single row is to blame; ``doubts`` says what is.
         return ()
     in_other_units = {odd.run for odd in runs_in_units(campaign)}
-    # So many in a run are no single mistakes, as within a part, which tells so many of each of two kinds.
-    counts = Counter(reading.run for reading in readings)
     return tuple(
         str(gross_noted(reading, method.nouns.target))
-        for reading in readings
-        if reading.run not in in_other_units and counts[reading.run] <= 2 * MOST_ROWS
+        for reading in search.readings
+        if reading.run not in in_other_units
     )
