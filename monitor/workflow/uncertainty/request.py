@@ -35,6 +35,10 @@ def check_coverage(p: float) -> None:
         )
 
 
+#: Each source is a line of the budget, and a column of it for each parameter.
+MOST_SOURCES = 200
+
+
 @dataclass(frozen=True)
 class Asked:
     """What decides the numbers of an evaluation by the GUM framework besides run and model; stored with its answer.
@@ -89,6 +93,8 @@ class UncertaintyRequest:
         if not 0 <= self.seed < 2**63:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
         check_coverage(self.p)
+        if len(self.sources or ()) > MOST_SOURCES:
+            raise InputError(f"--sources: {MOST_SOURCES} at most, not {len(self.sources or ())}")
         holds_for(self.holds_for)
 
     @property
