@@ -9,7 +9,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
 from monitor.reporting.budget import HoldsFor
-from monitor.sources import Source
+from monitor.sources import QUANTITIES, Source
 
 #: Coverage probability of what is certified, and of results where no other is asked for.
 COVERAGE = 0.95
@@ -37,6 +37,19 @@ def check_coverage(p: float) -> None:
 
 #: Each source is a line of the budget, and a column of it for each parameter.
 MOST_SOURCES = 200
+
+
+def check_source(source: Source) -> None:
+    """Raise InputError for a size or degrees of freedom that the file of sources would not take."""
+    size, most = source.unit.to_display(source.size), QUANTITIES[source.quantity].largest
+    # A size at the limit may lie a rounding beyond it.
+    if not 0.0 < size <= most * (1.0 + 1e-9):
+        raise InputError(
+            f"--sources {source.name}: its size is {size:g} {source.unit.name}; it lies above 0, up to {most:g}"
+        )
+    dof = source.degrees_of_freedom
+    if dof is not None and not dof > 0.0:
+        raise InputError(f"--sources {source.name}: {dof:g} degrees of freedom; there are more than 0")
 
 
 @dataclass(frozen=True)
@@ -95,6 +108,8 @@ class UncertaintyRequest:
         check_coverage(self.p)
         if len(self.sources or ()) > MOST_SOURCES:
             raise InputError(f"--sources: {MOST_SOURCES} at most, not {len(self.sources or ())}")
+        for source in self.sources or ():
+            check_source(source)
         holds_for(self.holds_for)
 
     @property
