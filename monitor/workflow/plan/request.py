@@ -10,8 +10,8 @@ from monitor.exceptions import InputError
 from monitor.methods.planning.search import MOST_BALLS
 from monitor.workflow.uncertainty.request import COVERAGE, check_coverage
 
-#: In the unit of the parameter (µm, µrad, µm/m): a millionth of a nanometre is no uncertainty of a machine.
-LEAST_WANTED = 1e-9
+#: In the unit of the parameter (µm, µrad, µm/m): from a millionth of a nanometre to a kilometre.
+LEAST_WANTED, MOST_WANTED = 1e-9, 1e9
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,10 @@ class PlanRequest:
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
         for name, u in self.wanted.items():
-            if 0.0 < u < LEAST_WANTED:
+            if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
+                limits = f"{LEAST_WANTED:g} to {MOST_WANTED:g} in its unit"
                 raise InputError(
-                    f"--wanted {name}: no plan reaches {u:g}; write {LEAST_WANTED:g} or more, in its unit"
+                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {limits}"
                 )
         if self.wanted and (self.balls is not None or self.poses is not None):
             raise InputError(

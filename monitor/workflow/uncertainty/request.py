@@ -37,6 +37,8 @@ def check_coverage(p: float) -> None:
 
 #: Each source is a line of the budget, and a column of it for each parameter.
 MOST_SOURCES = 200
+#: An uncertainty of an uncertainty of more than twice itself (JCGM 100:2008, G.3: 1/sqrt(2 dof)) says nothing.
+LEAST_DOF = 0.1
 
 
 def check_source(source: Source) -> None:
@@ -48,8 +50,8 @@ def check_source(source: Source) -> None:
             f"--sources {source.name}: its size is {size:g} {source.unit.name}; it lies above 0, up to {most:g}"
         )
     dof = source.degrees_of_freedom
-    if dof is not None and not dof > 0.0:
-        raise InputError(f"--sources {source.name}: {dof:g} degrees of freedom; there are more than 0")
+    if dof is not None and dof < LEAST_DOF:
+        raise InputError(f"--sources {source.name}: {dof:g} degrees of freedom; write {LEAST_DOF:g} or more")
 
 
 @dataclass(frozen=True)
