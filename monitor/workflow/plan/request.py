@@ -42,9 +42,9 @@ class PlanRequest:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
         for name, u in self.wanted.items():
             if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
-                limits = f"{LEAST_WANTED:g} to {MOST_WANTED:g} in its unit"
                 raise InputError(
-                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {limits}"
+                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {LEAST_WANTED:g} to "
+                    f"{MOST_WANTED:g} in its unit"
                 )
         if self.wanted and (self.balls is not None or self.poses is not None):
             raise InputError(
