@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, nullcontext
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -199,9 +201,27 @@ def request_of(question: str, document: Mapping[str, Any], files: Mapping[str, A
     if kind is None:
         return None
     try:
-        return _adapter(kind).validate_python({**with_moments(kind, document), **files})
+        request = _adapter(kind).validate_python({**with_moments(kind, document), **files})
     except ValidationError as error:
         raise InputError("; ".join(_fault(fault) for fault in error.errors())) from error
+    for path, number in _endless(request):
+        raise InputError(f"{path} is {number:g}: write a finite number")
+    return request
+
+
+def _endless(value: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield where a request holds a number that is none, or beyond all: no question means one."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield f"'{path}'", value
+    elif isinstance(value, Mapping):
+        for key, element in value.items():
+            yield from _endless(element, f"{path}.{key}")
+    elif isinstance(value, tuple | list):
+        for index, element in enumerate(value):
+            yield from _endless(element, f"{path}.{index}")
+    elif is_dataclass(value):
+        for part in fields(value):
+            yield from _endless(getattr(value, part.name), f"{path}.{part.name}".removeprefix("."))
 
 
 @cache

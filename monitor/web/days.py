@@ -7,6 +7,7 @@ import typing
 from collections.abc import Callable, Mapping
 from dataclasses import is_dataclass
 from datetime import date, datetime
+from functools import cache
 from types import NoneType, UnionType
 from typing import Any
 
@@ -47,11 +48,16 @@ def with_moments(kind: Any, document: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises InputError for what is none, a number too: pydantic would take it for seconds since 1970.
     """
-    hints = typing.get_type_hints(kind)
+    hints = _hints(kind)
     return {
         name: _read(hints[name], f"'{name}'", value) if name in hints else value
         for name, value in document.items()
     }
+
+
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    return typing.get_type_hints(kind)
 
 
 def _read(hint: Any, name: str, value: Any) -> Any:

@@ -66,8 +66,8 @@ class EndingServer(uvicorn.Server):
         unfinished = self._desk.end()
         if unfinished:
             self._say(
-                f"ending: {', '.join(map(asked_for, unfinished))} is stopped, at the latest within {ENDING_S:g} s; "
-                "Ctrl-C once more ends at once"
+                f"the server ends within {ENDING_S:g} s, at once with Ctrl-C once more; taken back: "
+                f"{', '.join(map(asked_for, unfinished))}"
             )
         while (unfinished := self._desk.end()) or self.server_state.connections:
             if self.force_exit or time.monotonic() > deadline:

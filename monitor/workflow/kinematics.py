@@ -14,6 +14,9 @@ from monitor.methods.chain.base_effects import base_effects
 from monitor.records import Array
 from monitor.units import DEGREE
 
+#: Beyond it lies no reading (mm, degrees), error (µm, µrad, µm/m) or length: a kilometre, in µm.
+LARGEST = 1e9
+
 
 @dataclass(frozen=True)
 class PosesRequest:
@@ -38,6 +41,13 @@ class PosesRequest:
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{axis} {count}" for axis, count in lengths.items())
             raise InputError(f"every axis needs the same number of readings; there are {listed}")
+        named = {**self.readings, **self.errors, "tool_mm": self.tool_mm, "target_mm": self.target_mm}
+        for name, numbers in named.items():
+            beyond = [number for number in numbers if not abs(number) <= LARGEST]
+            if beyond:
+                raise InputError(
+                    f"{name}: {beyond[0]:g} is nothing a machine reads or has; {LARGEST:g} is the most"
+                )
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from monitor.methods.chain.likeness import Likeness
 from monitor.readers import read_campaign, write_campaign
 from monitor.records import Array, Campaign, CurveCampaign
 from monitor.reporting import messages
+from monitor.stopping import checkpoint
 from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.file_names import file_name
@@ -32,7 +33,9 @@ from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
 
 #: The mean month of the Gregorian calendar, in days.
 DAYS_A_MONTH = 365.2425 / 12.0
-MOST_CAMPAIGNS = 1000
+MOST_CAMPAIGNS, MOST_CHANGES = 1000, 1000
+#: The most that a parameter changes by, in its display unit: a metre, a radian.
+LARGEST_CHANGE = 1e6
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,9 @@ class Drift:
     per_month: float
     machine: str | None = None
 
+    def __post_init__(self) -> None:
+        _check_size(self.parameter, self.per_month)
+
 
 @dataclass(frozen=True)
 class Step:
@@ -52,6 +58,16 @@ class Step:
     parameter: str
     size: float
     machine: str | None = None
+
+    def __post_init__(self) -> None:
+        _check_size(self.parameter, self.size)
+
+
+def _check_size(parameter: str, size: float) -> None:
+    if not abs(size) <= LARGEST_CHANGE:
+        raise InputError(
+            f"{parameter}: {size:g} is no change of a machine; {LARGEST_CHANGE:g} (µm, µrad, µm/m) is the most"
+        )
 
 
 @dataclass(frozen=True)
@@ -93,6 +109,8 @@ class LikeRequest:
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
         changes: tuple[Drift | Step, ...] = (*self.drifts, *self.events)
+        if len(changes) > MOST_CHANGES:
+            raise InputError(f"drifts and events: {MOST_CHANGES} at most together, not {len(changes)}")
         for machine in (change.machine for change in changes):
             if machine is not None and machine not in self.machines:
                 raise InputError(
@@ -167,6 +185,7 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
     folders, truth = [], []
     for machine in request.machines:
         for month in range(request.months):
+            checkpoint()
             name = f"{machine}-{_month(request.start, month):%Y-%m}"
             progress(name)
             dated = _dated(likeness.campaign, name, machine, _month(request.start, month))

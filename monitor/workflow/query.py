@@ -19,6 +19,8 @@ from monitor.store import (
     run_query,
 )
 
+#: More rows than any database of this product holds; DuckDB counts in 64 bits.
+MOST_ROWS = 10**12
 Cell = str | int | float | bool | datetime | date | None
 
 
@@ -30,8 +32,8 @@ class SqlRequest:
     limit: int | None = None
 
     def __post_init__(self) -> None:
-        if self.limit is not None and self.limit < 1:
-            raise InputError(f"--limit {self.limit}: a number of rows, 1 or more")
+        if self.limit is not None and not 1 <= self.limit <= MOST_ROWS:
+            raise InputError(f"--limit {self.limit}: a number of rows, 1 to {MOST_ROWS}")
 
 
 @dataclass(frozen=True)

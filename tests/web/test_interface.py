@@ -140,6 +140,8 @@ def test_an_answer_fits_the_schema_that_describes_it(
         ("map", {"campaign": "hidden-spindle-growth", "before": 1e9}, 400, "'before' is the number 1000000000.0"),
         ("event", {"machine": "HU40-T", "text": "x", "at": True}, 400, "'at' is True: write a day or a time as text"),
         ("periods", {"machine": "HU40-T", "earlier": {"since": 0, "until": []}, "later": {}}, 400, "'since' is the"),
+        ("map", {"campaign": "hidden-spindle-growth", "p": 1e-300}, 400, "a coverage probability lies between"),
+        ("plan", {"campaign": "hidden-spindle-growth", "p": 1e-300}, 400, "a coverage probability lies between"),
         ("model history", {"model": "samba@9"}, 404, "samba"),
         ("add effect", {"effect": "nonsense", "to": "samba"}, 400, "nonsense"),
         ("residuals", {"campaign": "load-cell"}, 400, "curve"),

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from monitor.exceptions import InputError
 
+#: Effects that are added at once; a step of the search adds a handful.
+MOST_AT_ONCE = 100
+
 
 @dataclass(frozen=True)
 class ShowModelRequest:
@@ -20,7 +23,7 @@ class AddEffectRequest:
 
     ``beside`` are further effects of the same version: of two that take each other's part neither shows what it is
     worth alone. ``campaign`` is where the error before and after is shown; with None it is that on which the model was
-    last used.
+    last used. Raises InputError for more effects than a campaign could tell apart.
     """
 
     effect: str
@@ -29,6 +32,10 @@ class AddEffectRequest:
     note: str = ""
     campaign: str | None = None
     beside: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.beside) >= MOST_AT_ONCE:
+            raise InputError(f"{MOST_AT_ONCE} effects at most are added at once, not {len(self.beside) + 1}")
 
     @property
     def effects(self) -> tuple[str, ...]:

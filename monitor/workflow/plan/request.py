@@ -10,6 +10,9 @@ from monitor.exceptions import InputError
 from monitor.methods.planning.search import MOST_BALLS
 from monitor.workflow.uncertainty.request import COVERAGE, check_coverage
 
+#: In the unit of the parameter (µm, µrad, µm/m): from a millionth of a nanometre to a kilometre.
+LEAST_WANTED, MOST_WANTED = 1e-9, 1e9
+
 
 @dataclass(frozen=True)
 class PlanRequest:
@@ -37,6 +40,12 @@ class PlanRequest:
         check_coverage(self.p)
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
+        for name, u in self.wanted.items():
+            if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
+                raise InputError(
+                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {LEAST_WANTED:g} to "
+                    f"{MOST_WANTED:g} in its unit"
+                )
         if self.wanted and (self.balls is not None or self.poses is not None):
             raise InputError(
                 "--wanted looks for the quickest plan that reaches an uncertainty, --balls and --poses for the best "

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from monitor.exceptions import InputError
+
 
 @dataclass(frozen=True)
 class StandardsRequest:
@@ -16,3 +18,7 @@ class StandardsRequest:
     figures: Path | None = None
     csv: Path | None = None
     seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")

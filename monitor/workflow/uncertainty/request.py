@@ -9,7 +9,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
 from monitor.reporting.budget import HoldsFor
-from monitor.sources import Source
+from monitor.sources import QUANTITIES, Source
 
 #: Coverage probability of what is certified, and of results where no other is asked for.
 COVERAGE = 0.95
@@ -33,6 +33,25 @@ def check_coverage(p: float) -> None:
         raise InputError(
             f"-p {p}: a coverage probability lies between {LEAST_COVERAGE} and {MOST_COVERAGE}; 0.95 is usual"
         )
+
+
+#: Each source is a line of the budget, and a column of it for each parameter.
+MOST_SOURCES = 200
+#: An uncertainty of an uncertainty of more than twice itself (JCGM 100:2008, G.3: 1/sqrt(2 dof)) says nothing.
+LEAST_DOF = 0.1
+
+
+def check_source(source: Source) -> None:
+    """Raise InputError for a size or degrees of freedom that the file of sources would not take."""
+    size, most = source.unit.to_display(source.size), QUANTITIES[source.quantity].largest
+    # A size at the limit may lie a rounding beyond it.
+    if not 0.0 < size <= most * (1.0 + 1e-9):
+        raise InputError(
+            f"--sources {source.name}: its size is {size:g} {source.unit.name}; it lies above 0, up to {most:g}"
+        )
+    dof = source.degrees_of_freedom
+    if dof is not None and dof < LEAST_DOF:
+        raise InputError(f"--sources {source.name}: {dof:g} degrees of freedom; write {LEAST_DOF:g} or more")
 
 
 @dataclass(frozen=True)
@@ -89,6 +108,10 @@ class UncertaintyRequest:
         if not 0 <= self.seed < 2**63:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
         check_coverage(self.p)
+        if len(self.sources or ()) > MOST_SOURCES:
+            raise InputError(f"--sources: {MOST_SOURCES} at most, not {len(self.sources or ())}")
+        for source in self.sources or ():
+            check_source(source)
         holds_for(self.holds_for)
 
     @property
