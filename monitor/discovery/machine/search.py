@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
@@ -12,6 +13,7 @@ from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.shapes.several_instead import several_instead
 from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.wander import with_base_instead
@@ -42,9 +44,22 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
             if not all_curves_were_searched(scene.fit):
                 scene, result = with_tables(scene, result, scanned)
             result = with_base_instead(scene, result, rate)
-            scene, result = with_unknown_shapes(scene, standing_out(scene, result))
+            plain, catalogued = scene, standing_out(scene, result)
+            scene, result = several_instead(
+                plain,
+                with_unknown_shapes(plain, catalogued),
+                partial(_in_their_own_shapes, plain, catalogued, drivers, rate),
+            )
             return scene, by_error_taken_away(scene, standing_out(scene, result))
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
+
+
+def _in_their_own_shapes(
+    scene: ChainScene, begin: ChainScan, drivers: Sequence[str], rate: float
+) -> ChainScan:
+    """A scan in which no error may have another shape than the one that was found."""
+    rules = ChainAcceptance(scene, drivers, rate, any_shape=False)
+    return standing_out(scene, scan(scene, rules, rate=rate, begin=begin.candidates))
 
 
 def _not_yet(variants: Sequence[ChainVariant], searched: set[str], most: int) -> list[ChainVariant]:

@@ -84,13 +84,13 @@ class Pool(Generic[CandidateT]):
 
     def _product(self, owner: object, columns: Array) -> Array:
         """The products of all columns with those of an owner."""
-        known = self._products.get(id(owner))
-        if known is None:
+        product = self._products.get(id(owner))
+        if product is None:
             if len(self._products) * len(self.rows) > MOST_PRODUCTS:
                 self._products.clear()
             # The owner is kept too: an identity is only that of an object that exists.
-            known = self._products[id(owner)] = owner, self.rows @ columns
-        return known[1]
+            product = self._products[id(owner)] = owner, self.rows @ columns
+        return product[1]
 
     @cached_property
     def by_size(self) -> dict[int, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]:
@@ -176,16 +176,16 @@ def weigh(
         return []
     basis = orthonormal(selected)
     remainder = without(basis, residual[:, None])[:, 0]
-    left = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
-    return _weighed(pool, pool.rows @ basis, pool.rows @ remainder, left)
+    squares = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
+    return _weighed(pool, pool.rows @ basis, pool.rows @ remainder, squares)
 
 
 def _weighed(
-    pool: Pool[CandidateT], overlap: Array, onto: Array, left: tuple[float, int]
+    pool: Pool[CandidateT], overlap: Array, onto: Array, squares: tuple[float, int]
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate of a pool by the products of its columns with an orthonormal basis (K, r) of what is
-    selected and with what that leaves (K,), of which ``left`` is the sum of squares with its degrees of freedom."""
-    total, dof = left
+    selected and with what that leaves (K,), of which ``squares`` is the sum of squares with its degrees of freedom."""
+    total, dof = squares
     onto = onto / pool.lengths
     overlap = overlap / pool.lengths[:, None]
     explained = np.zeros(len(pool.candidates))
@@ -209,15 +209,15 @@ def weigh_beside(
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate beside the selected ones, the most convincing first."""
     beside = scene.remainders.beside(selected)
-    left = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
     if isinstance(candidates, Pool):
         overlap = candidates.overlap(beside)
-        return _weighed(candidates, overlap, candidates.onto(beside, overlap), left)
+        return _weighed(candidates, overlap, candidates.onto(beside, overlap), squares)
     # Nothing is gained by products with each selected effect of candidates that are weighed once.
     pool = Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    return _weighed(pool, pool.rows @ beside.basis, pool.rows @ beside.residual, left)
+    return _weighed(pool, pool.rows @ beside.basis, pool.rows @ beside.residual, squares)
 
 
 def explained_by(

@@ -65,14 +65,21 @@ def rows_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
     """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
-    the scene takes for granted."""
+    the scene takes for granted. Larger errors may have any shape unless ``any_shape`` is false."""
 
     scene: ChainScene
 
     def __init__(
-        self, scene: ChainScene, drivers: Sequence[str], rate: float, shared: Sequence[ChainCandidate] = ()
+        self,
+        scene: ChainScene,
+        drivers: Sequence[str],
+        rate: float,
+        shared: Sequence[ChainCandidate] = (),
+        *,
+        any_shape: bool = True,
     ) -> None:
         super().__init__(scene)
+        self.any_shape = any_shape
         self.shared = shared
         self.drivers = drivers
         self.rate = rate
@@ -105,7 +112,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
             *self._larger_errors(others, candidate),
             *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
         ]
-        if not self._survives(others, candidate, self._flexible.competitors(named)):
+        in_any_shape = self._flexible.competitors(named) if self.any_shape else ()
+        if not self._survives(others, candidate, in_any_shape):
             return False
         if is_drift_of_machine(candidate) and not self._survives(others, candidate, self._wander):
             return False
