@@ -114,7 +114,7 @@ def read_head(top: Table) -> Head:
     probe = read_probe(
         top,
         required=rules is not None and not has_setups,
-        has_scale=rules is not None and rules.targets_are_reflectors,
+        has_scale=rules is None or rules.targets_are_reflectors,
     )
     if rules is None:
         top.tables("setups")

@@ -45,6 +45,10 @@ def _assert_same(one: StoredIdentification, other: StoredIdentification) -> None
             left, right = getattr(a, field.name), getattr(b, field.name)
             if isinstance(left, np.ndarray):
                 np.testing.assert_array_equal(left, right, strict=True)
+            elif field.name == "common_parts":
+                assert list(left) == list(right)
+                for quantity, part in left.items():
+                    np.testing.assert_array_equal(part, right[quantity], strict=True)
             else:
                 assert left == right
 
