@@ -125,8 +125,9 @@ class _Rows:
         same = is_equal[around[others[around] & others[around + distance]]]
         others[distance + begin : distance + begin + length] = False
         if len(same) < FEW_AROUND:
-            came_back = others & (_equal_before(self.poses)[0] >= 0)
-            same = np.concatenate([same, self.repeat[came_back]])
+            last_time = _equal_before(self.poses)[1]
+            came_back = others & (last_time >= 0)
+            same = np.concatenate([same, self.numbers[came_back] == self.numbers[last_time[came_back]]])
             if len(same) < FEW:
                 same = np.concatenate([same, self.repeat[others & ~came_back]])
         return _Block(
@@ -135,7 +136,9 @@ class _Rows:
             distance,
             int(np.count_nonzero(same)),
             len(same),
-            _log_chance(np.count_nonzero(self.series[distance:] == self.series[:-distance]), length, same),
+            _log_chance(
+                int(np.count_nonzero(self.series[distance:] == self.series[:-distance])), length, same
+            ),
         )
 
 
