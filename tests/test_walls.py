@@ -32,6 +32,7 @@ GROUND = {
     "stopping",
     "progress",
     "on_demand",
+    "formula_cells",
     "group_sums",
     "moments",
     "toml_text",

@@ -24,8 +24,9 @@ _TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
 _TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*|[A-Za-z0-9]+:\S+")
 _EFFECT_SIGN = ":"
-#: The letter O where a location error has a zero: ``ECOY`` would be of an axis OY.
-_LETTER_FOR_ZERO = re.compile(r"(E[XYZABC])[Oo]([A-Za-z][A-Za-z0-9]*)")
+#: The letter O where a location error has a zero, before an axis of ISO 841: ``ECOY`` would be of an axis OY. ``EXOP``
+#: may be of an axis OP; where no machine of the type has one, ``trend`` and ``fleet`` say so.
+_LETTER_FOR_ZERO = re.compile(r"(E[XYZABC])[Oo]([A-CU-Za-cu-z][0-9]*)")
 _AXIS_IN_SMALL_LETTERS = re.compile(r"(E[XYZABC]0?)([xyzabc][0-9]*)")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.

@@ -22,6 +22,7 @@ from rich.table import Table
 from rich.text import Text
 
 from monitor.documents import to_document
+from monitor.formula_cells import FORMULA
 
 # A table that goes to a file or a pipe is as wide as it needs: one line a row, whatever the window.
 PIPE_WIDTH = 10_000
@@ -57,11 +58,7 @@ def _plain(answer: object) -> Any:
 
 def csv_cell(cell: object) -> object:
     """Return a cell as CSV has it: a text that a spreadsheet would run as a formula begins with an apostrophe."""
-    if not isinstance(cell, str):
-        return cell
-    # With these begins what a spreadsheet runs (OWASP, CSV injection); some programs trim what stands before it.
-    is_formula = cell[:1] in ("\t", "\r") or cell.lstrip()[:1] in tuple("=+-@")
-    return f"'{cell}" if is_formula else cell
+    return f"'{cell}" if isinstance(cell, str) and re.match(FORMULA, cell) else cell
 
 
 def say(text: str = "") -> None:

@@ -1,51 +1,155 @@
 """Rows of a run that repeat rows before them in every number: a file that was joined with itself, or exported twice.
 
-Counted as independent they make u too small. Readings of one pose agree now and then, where they are rounded; several
-rows one behind the other, each as an earlier row and in the same order, do not.
+Counted as independent they make u too small. Readings of one pose agree where they are rounded, in most of the rows
+where a display is coarse and the machine stable. So a block of rows, each equal to the one so many rows before it, is
+judged by how often the rows around it equal theirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Campaign
 
-#: So many rows one behind the other, with so many different first readings among them, are no chance: a dial that shows
-#: whole micrometres repeats a pose in one of three.
+#: Fewer rows one behind the other, or fewer different first readings among them, say nothing.
 LEAST_ROWS, LEAST_DIFFERENT = 8, 4
+#: A block is told where rows as often equal as those around it have one in less than this part of all such files.
+CHANCE = 1e-6
+#: So many rows on either side are those around a block, or as many as it has: a machine that warmed up first repeats
+#: itself in no row, and later in nine of ten.
+AROUND = 50
+#: Where fewer are around, all rows of the series count whose pose came back; where these are few too, as in a file of
+#: one pass that is joined with itself, all rows of it.
+FEW_AROUND, FEW = 30, 10
+#: How often rows are equal is taken at the upper end of what the rows around allow with this probability.
+UPPER = 0.95
+#: Distances between rows that are tried: those of the longest blocks.
+MOST_DISTANCES = 20
 #: Numbers that mix the columns of a row into one (Knuth's multiplicative hashing, by the golden ratio).
 MIXING = 0x9E3779B97F4A7C15
 
 
+@dataclass(frozen=True)
+class _Block:
+    """``length`` rows from ``begin`` on that equal those ``distance`` rows before them, as do ``equal`` of ``others``;
+    ``chance`` is the natural logarithm of its probability."""
+
+    begin: int
+    length: int
+    distance: int
+    equal: int
+    others: int
+    chance: float
+
+
 def repeated_rows(campaign: Campaign) -> Iterator[str]:
-    """A sentence on the longest block of rows that repeats an earlier one in all but its times."""
+    """A sentence on the least likely block of rows that repeats an earlier one in all but its times."""
     probings = campaign.probings
-    count = len(probings)
-    if count < 2 * LEAST_ROWS:
+    if len(probings) < 2 * LEAST_ROWS:
         return
     columns = [*probings.readings.values(), *probings.channels.values()]
-    _, first, of_row = np.unique(_mixed(probings.run, columns), return_index=True, return_inverse=True)
-    earlier = first[of_row]
-    repeats = earlier < np.arange(count)
-    goes_on = repeats[1:] & repeats[:-1] & (np.diff(earlier) == 1)
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], goes_on.astype(np.int64), [0]])))
-    if not len(ends):
+    numbers = _mixed(probings.run, columns)
+    setup = [probings.channels["setup"]] if "setup" in probings.channels else []
+    poses = _mixed(probings.run, [*probings.readings.values(), *setup])
+    first, previous = _equal_before(numbers)
+    rows = _Rows(numbers, _mixed(probings.run, setup), poses, first >= 0)
+    distances = {distance for earlier in (first, previous) for distance in _distances(earlier)}
+    blocks = [block for distance in sorted(distances) if (block := rows.block(distance)) is not None]
+    block = min(blocks, key=lambda each: each.chance, default=None)
+    if block is None or block.chance > np.log(CHANCE):
         return
-    begins, lengths = ends[::2], np.diff(ends)[::2] + 1
-    longest = int(np.argmax(lengths))
-    begin, length = int(begins[longest]), int(lengths[longest])
-    rows = slice(begin, begin + length)
-    different = max(len(np.unique(column[rows])) for column in columns)
-    if length < LEAST_ROWS or different < LEAST_DIFFERENT:
+    begin = block.begin
+    different = max(len(np.unique(column[begin : begin + block.length])) for column in columns)
+    if different < LEAST_DIFFERENT:
         return
     yield (
-        f"{length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those from "
-        f"sequence {probings.sequence[earlier[begin]]} on in every number, which two measurements never do: were they "
-        "exported twice, or two files joined? Counted twice they make u too small"
+        f"{block.length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those "
+        f"from sequence {probings.sequence[begin - block.distance]} on in every number; of "
+        f"{block.others} other rows {block.equal} repeat one so: were they exported twice, or two files joined? "
+        "Counted twice they make u too small"
     )
+
+
+def _equal_before(rows: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The first and the last of the rows (n,) before each that equal it, -1 where none does."""
+    order = np.argsort(rows, kind="stable")
+    is_same = np.concatenate([[False], rows[order[1:]] == rows[order[:-1]]])
+    previous, first = np.full(len(rows), -1), np.full(len(rows), -1)
+    previous[order[is_same]] = order[np.flatnonzero(is_same) - 1]
+    begins = np.maximum.accumulate(np.where(is_same, 0, np.arange(len(rows))))
+    first[order[is_same]] = order[begins[is_same]]
+    return first, previous
+
+
+def _distances(earlier: npt.NDArray[np.int64]) -> list[int]:
+    """The distances of the longest blocks of rows whose ``earlier`` (n,) ones follow one another too."""
+    repeats = earlier >= 0
+    begins, lengths = _blocks(repeats[1:] & repeats[:-1] & (np.diff(earlier) == 1))
+    longest = begins[np.argsort(-lengths, kind="stable")[:MOST_DISTANCES]]
+    return [int(begin - earlier[begin]) for begin in longest]
+
+
+def _blocks(holds: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Where blocks of rows begin for which it ``holds`` (n,), and how many rows they have."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
+    return edges[::2], np.diff(edges)[::2]
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """What is the same in rows (n,): all their ``numbers``, their ``series`` (run and setup), their ``poses``; and
+    which of them ``repeat`` any row before."""
+
+    numbers: npt.NDArray[np.uint64]
+    series: npt.NDArray[np.uint64]
+    poses: npt.NDArray[np.uint64]
+    repeat: npt.NDArray[np.bool_]
+
+    def block(self, distance: int) -> _Block | None:
+        """The longest block at a distance, by the rows around it, or as many others as can speak; None where it is too
+        short."""
+        is_equal = self.numbers[distance:] == self.numbers[:-distance]
+        begins, lengths = _blocks(is_equal)
+        length = int(lengths.max(initial=0))
+        if length < LEAST_ROWS:
+            return None
+        begin = int(begins[int(lengths.argmax())])
+        reach = max(AROUND, length)
+        around = np.arange(max(begin - reach, 0), min(begin + length + reach, len(is_equal)))
+        around = around[(around < begin) | (around >= begin + length)]
+        others = self.series == self.series[begin]
+        same = is_equal[around[others[around] & others[around + distance]]]
+        others[distance + begin : distance + begin + length] = False
+        if len(same) < FEW_AROUND:
+            last_time = _equal_before(self.poses)[1]
+            came_back = others & (last_time >= 0)
+            same = np.concatenate([same, self.numbers[came_back] == self.numbers[last_time[came_back]]])
+            if len(same) < FEW:
+                same = np.concatenate([same, self.repeat[others & ~came_back]])
+        return _Block(
+            begin + distance,
+            length,
+            distance,
+            int(np.count_nonzero(same)),
+            len(same),
+            _log_chance(
+                int(np.count_nonzero(self.series[distance:] == self.series[:-distance])), length, same
+            ),
+        )
+
+
+def _log_chance(count: int, length: int, same: npt.NDArray[np.bool_]) -> float:
+    """The natural logarithm of how many blocks of a length so many rows begin, where ``same`` (m,) are equal."""
+    # Loaded here: of most files no row repeats another.
+    from scipy.special import betaincinv
+
+    equal, others = int(np.count_nonzero(same)), len(same)
+    rate = float(betaincinv(equal + 1, others - equal, UPPER)) if equal < others else 1.0
+    return float(np.log(count) + length * np.log(rate))
 
 
 def _mixed(run: npt.NDArray[np.int64], columns: list[npt.NDArray[np.float64]]) -> npt.NDArray[np.uint64]:

@@ -186,6 +186,12 @@ def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> 
     assert message in answer.err
 
 
+@pytest.mark.parametrize("term", ["EXOP", '"EXOT:reversal"', "ECO1"])
+def test_an_axis_whose_name_begins_with_the_letter_o_may_have_limits(typed: Any, term: str) -> None:
+    configured(f"[tolerances.x]\n{term} = 5")
+    assert typed("config", "check").status == 0
+
+
 def test_every_wrong_limit_of_every_table_is_named(typed: Any) -> None:
     """The first of a table alone was."""
     configured(

@@ -186,9 +186,54 @@ def test_free_memory_is_what_the_system_says(tmp_path: Path, monkeypatch: pytest
     free = free_memory()
     assert free is not None
     assert 0.0 < free < 1e15
-    for name, text in (("_LIMIT", "3000000\n"), ("_USED", "1000000\n")):
-        (tmp_path / name).write_text(text)
-        monkeypatch.setattr(f"{CHAIN}.memory.{name}", tmp_path / name)
-    assert free_memory() == 2e6
     monkeypatch.setattr(f"{CHAIN}.memory._MEMORY", tmp_path / "none")
     assert free_memory() is None
+
+
+#: What a container of 8 GB shows that read 6.8 GB of files, of which 6.5 GB may go.
+OF_GROUP = {
+    2: {
+        "memory.max": "8000000000",
+        "memory.current": "7800000000",
+        "memory.stat": "anon 1\ninactive_file 6500000000",
+    },
+    1: {
+        "memory.limit_in_bytes": "8000000000",
+        "memory.usage_in_bytes": "7800000000",
+        "memory.stat": "inactive_file 3\ntotal_inactive_file 6500000000",
+    },
+}
+
+
+@pytest.mark.parametrize("available_gb", [32.0, 3.0])
+@pytest.mark.parametrize("place", ["", "of-all", "of-all/own", "of-all/own/below", None])
+@pytest.mark.parametrize("version", [1, 2])
+def test_free_memory_is_what_the_control_groups_leave(
+    version: int, place: str | None, available_gb: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The limit may stand on the group of the process or on one around it; files that were read are no use."""
+    for name in ("_MEMORY", "_OWN_GROUPS", "_GROUPS"):
+        monkeypatch.setattr(f"{CHAIN}.memory.{name}", tmp_path / name)
+    (tmp_path / "_MEMORY").write_text(f"MemAvailable: {available_gb * 1e9 / 1024.0:.0f} kB\n")
+    controllers = {1: "12:cpu,cpuacct:/elsewhere\n4:memory:/of-all/own\n0::/\n", 2: "0::/of-all/own\n"}
+    (tmp_path / "_OWN_GROUPS").write_text(controllers[version])
+    root = tmp_path / "_GROUPS" / ("memory" if version == 1 else "")
+    (root / "of-all/own/below").mkdir(parents=True)
+    # The version 2 group around has no limit, as most have none.
+    (root / "memory.max").write_text("max\n")
+    if place is not None:
+        for name, text in OF_GROUP[version].items():
+            (root / place / name).write_text(text + "\n")
+    is_limited = place is not None and place != "of-all/own/below"
+    assert free_memory() == pytest.approx(min(6.7e9 if is_limited else np.inf, available_gb * 1e9), rel=1e-6)
+
+
+def test_a_control_group_that_is_full_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{CHAIN}.memory._OWN_GROUPS", tmp_path / "own")
+    monkeypatch.setattr(f"{CHAIN}.memory._GROUPS", tmp_path)
+    monkeypatch.setattr(f"{CHAIN}.memory._MEMORY", tmp_path / "memory")
+    (tmp_path / "memory").write_text("MemAvailable: 1000000 kB\n")
+    (tmp_path / "own").write_text("0::/../away\n")
+    for name, text in {"max": "1000", "current": "1100", "stat": "inactive_file 50"}.items():
+        (tmp_path / f"memory.{name}").write_text(text + "\n")
+    assert free_memory() == 0.0

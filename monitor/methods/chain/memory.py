@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from monitor.exceptions import TooManyRowsError
 from monitor.methods.chain.problem import ChainProblem
@@ -15,9 +16,7 @@ from monitor.progress import saying
 TIMES_OF_FIT, TIMES_OF_SEARCH = 5, 70
 #: Less is taken without a word, in bytes.
 SMALL = 2e9
-_MEMORY, _LIMIT, _USED = (
-    Path(name) for name in ("/proc/meminfo", "/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current")
-)
+_MEMORY, _OWN_GROUPS, _GROUPS = map(Path, ("/proc/meminfo", "/proc/self/cgroup", "/sys/fs/cgroup"))
 
 
 @contextmanager
@@ -51,8 +50,47 @@ def free_memory() -> float | None:
         free = 1024.0 * int(lines["MemAvailable"].split()[0])
     except (OSError, KeyError, ValueError):
         return None
+    return min([free, *_free_in_groups()])
+
+
+@dataclass(frozen=True)
+class _GroupFiles:
+    """What the kernel calls limit, use and the part of the use that files on disk hold (Linux,
+    admin-guide/cgroup-v2.rst and admin-guide/cgroup-v1/memory.rst), and the ``root`` of the groups."""
+
+    root: str
+    limit: str
+    used: str
+    of_files: str
+
+
+_VERSION_1 = _GroupFiles("memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+_VERSION_2 = _GroupFiles("", "memory.max", "memory.current", "inactive_file")
+
+
+def _free_in_groups() -> Iterator[float]:
+    """How many bytes each control group with a limit leaves: the process's own and those around it.
+
+    Files that were read stay in memory until it is needed, and are no use of it. In a container the path may be that
+    on the host, which is not there; the container's own group is the root then.
+    """
     try:
-        return min(free, float(_LIMIT.read_text()) - float(_USED.read_text()))
-    except (OSError, ValueError):
-        # No limit for this process ("max"), or none that can be read.
-        return free
+        lines = _OWN_GROUPS.read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        number, controllers, path = line.split(":", 2)
+        if number != "0" and "memory" not in controllers.split(","):
+            continue
+        files = _VERSION_2 if number == "0" else _VERSION_1
+        group = PurePosixPath(path.strip("/"))
+        for part in (group, *group.parents):
+            with suppress(OSError, KeyError, ValueError):
+                yield _free_in_group(_GROUPS / files.root / part, files)
+
+
+def _free_in_group(folder: Path, files: _GroupFiles) -> float:
+    """ValueError where the group has no limit ("max")."""
+    unused = float((folder / files.limit).read_text()) - float((folder / files.used).read_text())
+    counts = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+    return max(unused + float(counts[files.of_files]), 0.0)

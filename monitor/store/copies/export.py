@@ -19,11 +19,10 @@ from typing import Literal
 import duckdb
 
 from monitor.exceptions import InputError, NotFoundError, StoreError, did_you_mean
+from monitor.formula_cells import FORMULA
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
-#: Texts that spreadsheets run as formulas (OWASP, CSV injection), also those that trim what stands before one.
-_FORMULA = r"^([\t\r]|[\s\p{Z}]*[=+\-@])"
 #: Ends of names that are those of one file.
 _FILES = (".csv", ".parquet", ".xlsx", ".xls", ".json")
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
@@ -171,7 +170,7 @@ def _column(column: str, kind: str) -> str:
         return f'to_json("{column}") AS "{column}"'
     if kind == "VARCHAR":
         quote = "''''"  # one apostrophe, as SQL writes it
-        is_formula = f"regexp_matches(\"{column}\", '{_FORMULA}')"
+        is_formula = f"regexp_matches(\"{column}\", '{FORMULA}')"
         return f'CASE WHEN {is_formula} THEN {quote} || "{column}" ELSE "{column}" END AS "{column}"'
     return f'"{column}"'
 

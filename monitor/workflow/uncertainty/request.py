@@ -76,9 +76,9 @@ class UncertaintyRequest:
     ``method``: guf (GUM framework), mcm (Monte Carlo) or both, with the validation. The Monte Carlo result is stable to
     ``digits`` significant digits. ``select`` names a stored selection, or a campaign of the same plan: its runs give
     the covariance of the readings. ``model_uncertainty`` adds what lack of fit leaves. ``linear_axes`` adds what errors
-    of the linear axes do, for a method that takes those axes as known. Runs that began at or after ``before`` (local
-    time without a zone) take no part. The trials go to ``workers`` processes or the Dask scheduler at the address
-    ``cluster``, else to threads.
+    of the linear axes do, for a method that takes those axes as known. Runs that began at or after ``before`` (with an
+    offset, or by the clock of the shop) take no part. The trials go to ``workers`` processes or the Dask scheduler at
+    the address ``cluster``, else to threads.
 
     Raises InputError for a method, digits, seed or probability that cannot be.
     """
