@@ -201,9 +201,11 @@ def _p_value(change: DatedChange) -> str:
 
 
 def _change(name: str, change: DatedChange) -> str:
+    others = change.between_instruments
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
         f"({_interval(change.interval)}, {_p_value(change)})"
+        f"{'' if others is None else f'; {others.in_words(change.unit)}'}"
     )
 
 

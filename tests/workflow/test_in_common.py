@@ -18,9 +18,12 @@ from monitor.cli.rests_on_output import levels
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.sources import CommonQuantity
+from monitor.statistics import Change
 from monitor.store import Database, import_campaign, load_identification, machine_history
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.in_common import RestsOn, calibrated_alike
+from monitor.workflow.history.other_instruments import other_instruments
+from monitor.workflow.history.past import machine_past
 from monitor.workflow.history.series import Series, parameter_series
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
@@ -121,6 +124,30 @@ def test_levels_hold_what_all_runs_rest_on_and_weights_do_not(db: Database) -> N
     np.testing.assert_allclose(np.hypot(weights, series.u_common), series.u, rtol=1e-9)
     # With July by another calibration nothing is in all runs.
     assert np.all(parameter_series(history)["EXX"][0].u_common == 0.0)
+
+
+def test_a_step_between_instruments_has_what_their_calibrations_leave_open(db: Database) -> None:
+    """June and July are by two calibrations of 1 um/m each; January and June by one, and June by an R-test besides."""
+    history = machine_history(db, "CENTRE-9")
+    past = machine_past(history, ())["EXX"]
+    january, june, july = past.series.t
+    between = [
+        other_instruments(
+            history,
+            past,
+            Change("EXX", "step", 1, at=last, interval=(first, last), size=size, u=0.1, p_value=1e-4),
+        )
+        for first, last, size in ((june, july, 2.5), (june, july, 4.0), (january, june, 1.2))
+    ]
+    assert all(each is not None for each in between)
+    assert [each.may_be_all for each in between if each] == [True, False, False]
+    assert [each.u for each in between if each] == pytest.approx([np.sqrt(2.0) * U] * 2 + [0.0], abs=0.03)
+    assert between[0] is not None
+    assert (
+        between[0].in_words("µm/m").endswith("after it: their calibrations (u = 1.4 µm/m) can be all of it")
+    )
+    slope = Change("EXX", "slope", 1, at=july, interval=(june, july), size=2.5, u=0.1, p_value=1e-4)
+    assert other_instruments(history, past, slope) is None
 
 
 def test_the_page_says_what_all_runs_rest_on(db: Database) -> None:

@@ -18,18 +18,23 @@ from monitor.reporting.messages import DRIFT_OR_SEASON
 
 @dataclass(frozen=True)
 class ParameterChanged(Sentence):
-    """A parameter changed by ``size`` with ``u``; ``how`` is ``step``, ``slope`` (then a day) or another."""
+    """A parameter changed by ``size`` with ``u``; ``how`` is ``step``, ``slope`` (then a day) or another.
+
+    ``besides`` is a sentence on other instruments that measure from a step on, empty without any.
+    """
 
     parameter: str
     how: str
     size: float
     u: float
     unit: str
+    besides: str = ""
 
     def __str__(self) -> str:
         size, u = in_words(self.size, self.u, sign=True)
         if self.how == "step":
-            return f"{self.parameter} stepped by {size} {self.unit} (u = {u} {self.unit})"
+            besides = f"; {self.besides}" if self.besides else ""
+            return f"{self.parameter} stepped by {size} {self.unit} (u = {u} {self.unit}){besides}"
         if self.how == "slope":
             return f"{self.parameter} began to drift by {size} {self.unit} a day (u = {u} {self.unit} a day)"
         return f"{self.parameter}: {self.how} of {size} {self.unit} (u = {u} {self.unit})"

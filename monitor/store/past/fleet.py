@@ -22,7 +22,7 @@ from monitor.exceptions import NotFoundError
 from monitor.group_sums import GroupSums
 from monitor.records import Array
 from monitor.store.connection import Database
-from monitor.store.past import fleet_queries as queries
+from monitor.store.past import fleet_choice as choice, fleet_queries as queries
 from monitor.store.past.history import FEWEST_STEADY
 
 
@@ -177,11 +177,11 @@ def _summed(
 
     ``of`` are a model and its version.
     """
-    for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
+    for statement in (choice.MACHINES, choice.HEADINGS, choice.MODELS, choice.OWN):
         db.execute(statement)
     model, version = of
     db.set_variables({"model": model, "version": version, "steady": FEWEST_STEADY})
-    db.execute(queries.CHOSEN)
+    db.execute(choice.CHOSEN)
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
     if epoch_d is None:
         under = "" if model is None else f" with model {model}"

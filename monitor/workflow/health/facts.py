@@ -25,7 +25,7 @@ from monitor.reporting.health.sentences import BadPoint, ScatteringBall
 from monitor.reporting.health.settling import ParameterSettled
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
-from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
+from monitor.store import Database, MachineEvent, MachineHistory, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation, MovedTarget
 from monitor.workflow.health.forecast import stated_drift
@@ -33,6 +33,7 @@ from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
+from monitor.workflow.history.other_instruments import other_instruments
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -103,6 +104,7 @@ def moment_of(t: float, series: Series) -> datetime:
 
 
 def changes_noted(
+    history: MachineHistory,
     past: Mapping[str, ParameterPast],
     events: Sequence[MachineEvent],
     steps: Sequence[EventStep],
@@ -116,9 +118,9 @@ def changes_noted(
         for change in parameter.search.changes:
             at = moment_of(change.at, parameter.series)
             after = moment_of(change.interval[0], parameter.series)
-            what = ParameterChanged(
-                change.parameter, change.kind, change.size, change.u, parameter.series.unit
-            )
+            others, unit = other_instruments(history, parameter, change), parameter.series.unit
+            besides = "" if others is None else others.in_words(unit)
+            what = ParameterChanged(change.parameter, change.kind, change.size, change.u, unit, besides)
             noted.append(Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at)))
         noted += _settling(parameter, week)
     for step in steps:

@@ -185,6 +185,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
     unchanged = _unchanged(parameter_pasts, past.events, of_campaign)
     noted = changes_noted(
+        history,
         parameter_pasts,
         past.events,
         event_steps(parameter_pasts, past.events),

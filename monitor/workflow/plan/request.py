@@ -40,12 +40,7 @@ class PlanRequest:
         check_coverage(self.p)
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
-        for name, u in self.wanted.items():
-            if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
-                raise InputError(
-                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {LEAST_WANTED:g} to "
-                    f"{MOST_WANTED:g} in its unit"
-                )
+        self._check_wanted()
         if self.wanted and (self.balls is not None or self.poses is not None):
             raise InputError(
                 "--wanted looks for the quickest plan that reaches an uncertainty, --balls and --poses for the best "
@@ -59,6 +54,14 @@ class PlanRequest:
             raise InputError("the indexations to keep are numbers from 1 on, each once")
         if self.separate is not None and self.separate[0] == self.separate[1]:
             raise InputError(f"'{','.join(self.separate)}': name two different effects")
+
+    def _check_wanted(self) -> None:
+        for name, u in self.wanted.items():
+            if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
+                raise InputError(
+                    f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {LEAST_WANTED:g} to "
+                    f"{MOST_WANTED:g} in its unit"
+                )
 
     @staticmethod
     def two_effects(text: str) -> tuple[str, str]:

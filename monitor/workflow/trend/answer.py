@@ -15,6 +15,7 @@ from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.in_common import RestsOn
+from monitor.workflow.history.other_instruments import OtherInstruments
 from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.season import Season, SlopeVerdict
 
@@ -99,7 +100,7 @@ class DatedChange:
     ``days`` is the number of days that were searched. ``kind`` is ``step`` or ``slope``; of drifts ``trend``, or
     ``transient``: off by ``size`` at the first run, it settles with ``time_constant_days``.
     ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say;
-    they are fewer where one parameter is asked for.
+    they are fewer where one parameter is asked for. ``between_instruments``: other instruments measure from a step on.
     """
 
     at: str | None
@@ -112,6 +113,7 @@ class DatedChange:
     days: int
     time_constant_days: float | None = field(default=None, metadata=OMITTED)
     p_at_most: bool | None = field(default=None, metadata=OMITTED)
+    between_instruments: OtherInstruments | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.forecast import NEXT_CHECK_D
 from monitor.workflow.history.limits_of_type import limits_without_parameter
+from monitor.workflow.history.other_instruments import other_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
@@ -298,7 +299,13 @@ class _Page:
             unit=series.unit,
             drift=drift_statement(drift),
             mean=latest_mean(drift.whole),
-            changes=tuple(dated_change(change, series, search.least_p) for change in search.changes),
+            changes=tuple(
+                replace(
+                    dated_change(change, series, search.least_p),
+                    between_instruments=other_instruments(self.history, past, change),
+                )
+                for change in search.changes
+            ),
             drifts=tuple(dated_change(change, series, search.least_p) for change in search.drifts),
             why_no_changes=search.why_none,
             conditions=effects,

@@ -20,6 +20,7 @@ from monitor.store import (
     numbered_by,
 )
 from monitor.workflow.history.event_steps import EventStep, event_steps
+from monitor.workflow.history.other_instruments import other_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.trend.parameter import dated_change
 
@@ -35,7 +36,7 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         history = machine_history(db, name, followed_by=numbered_by(db, name))
         events = machine_events(db, name)
         past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-        changes = [row for parameter in past.values() for row in _changes(name, parameter)]
+        changes = [row for parameter in past.values() for row in _changes(name, history, parameter)]
         changes += [_at_event(name, step) for step in event_steps(past, events)]
         rows += changes
         if not changes and (past or not history.unidentified):
@@ -46,10 +47,10 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
     return tuple(rows)
 
 
-def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
+def _changes(machine: str, history: MachineHistory, past: ParameterPast) -> Iterator[ComputedChange]:
     search = past.search
     for change in (*search.changes, *search.drifts):
-        dated = dated_change(change, past.series)
+        dated, others = dated_change(change, past.series), other_instruments(history, past, change)
         at = (
             None
             if dated.at is None
@@ -57,7 +58,12 @@ def _changes(machine: str, past: ParameterPast) -> Iterator[ComputedChange]:
         )
         yield ComputedChange(
             machine, at, dated.kind, past.series.name, dated.size, dated.u, dated.unit, dated.p_value,
-            messages.change_in_words(dated.kind, change.kind == "trend" and past.is_maybe_season(change)),
+            "; ".join(
+                [
+                    messages.change_in_words(dated.kind, change.kind == "trend" and past.is_maybe_season(change)),
+                    *([] if others is None else [others.in_words(dated.unit)]),
+                ]
+            ),
         )  # fmt: skip
 
 
