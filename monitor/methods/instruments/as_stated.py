@@ -64,7 +64,7 @@ def _tool_points(problem: InstrumentProblem) -> tuple[AsStated, ...]:
 
 def _scales(problem: InstrumentProblem) -> Iterator[AsStated]:
     """The scales that are taken as exact, with what each moves: the fit with what is known beforehand of all others."""
-    exact = {setup.id: setup.instrument or setup.id for setup in problem.setups if setup.takes_scale}
+    exact = {setup.id: setup.exact_scale for setup in problem.setups if setup.exact_scale}
     groups = {
         name: tuple(part.id for part in problem.parts if len(part.at) and exact.get(part.id) == name)
         for name in dict.fromkeys(exact.values())

@@ -58,7 +58,10 @@ def part_tests(problem: InstrumentProblem) -> Iterator[PartTest]:
             # Points with names of their own are no paths: a part of them alone is none of this test.
             if features or paths or max(short.values(), default=0) >= FEWEST_OF_LINE:
                 u = float(np.sqrt(np.mean(problem.sigma[part.at[mine], 0] ** 2)))
-                yield PartTest(part.id, int(problem.runs[index]), features, paths, u, short, NEEDED)
+                yield PartTest(
+                    part.id, int(problem.runs[index]), features, paths, u, part.scale or 0.0,
+                    part.reading.setup.exact_scale, short, NEEDED,
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)
