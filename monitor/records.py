@@ -279,10 +279,9 @@ class Setup:
         return self.reading in FROM_TOOL_POINT and self.tool_point_uncertainty is None
 
     @property
-    def exact_scale(self) -> str:
-        """Whose unit of length is taken as exact without a word: the instrument, else the setup; empty of none."""
-        is_stated = self.scale_uncertainty is not None or "scale" in self.known
-        return "" if is_stated or self.reading not in BRINGS_SCALE else self.instrument or self.id
+    def takes_scale(self) -> bool:
+        """Whether its readings bring a unit of length that is taken as exact, without its being stated as known."""
+        return self.reading in BRINGS_SCALE and self.scale_uncertainty is None and "scale" not in self.known
 
 
 @dataclass(frozen=True)

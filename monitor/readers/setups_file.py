@@ -13,6 +13,7 @@ from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
+from monitor.readers.setups_agreement import DIRECTION, LENGTH, SCALE, check_agreement, check_one_statement
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
@@ -23,11 +24,11 @@ IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 LARGEST_URAD = 1e5
 #: A standard uncertainty of a scale beyond this is a slip of unit: 1 %, in µm/m.
 LARGEST_SCALE = 1e4
-_LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
-_DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
+_LENGTH_UNCERTAINTY = LENGTH.key
+_DIRECTION_UNCERTAINTY = DIRECTION.key
 _DRIFT_UNCERTAINTY = "drift_standard_uncertainty"
 _TOOL_UNCERTAINTY = "tool_point_standard_uncertainty_mm"
-_SCALE_UNCERTAINTY = "scale_standard_uncertainty_um_per_m"
+_SCALE_UNCERTAINTY = SCALE.key
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -89,6 +90,7 @@ def read_setups(top: Table) -> tuple[Setup, ...] | None:
     """Read the setups; None if anything in them is wrong, or there is none."""
     before = len(top.faults)
     setups: dict[str, Setup] = {}
+    read: list[tuple[Table, Setup]] = []
     rows = top.tables("setups")
     if not rows and len(top.faults) == before:
         top.fault(
@@ -100,6 +102,8 @@ def read_setups(top: Table) -> tuple[Setup, ...] | None:
             row.fault("id", f"setup {quoted(setup.id)} is listed twice; give every setup its own id")
         elif setup is not None:
             setups[setup.id] = setup
+            read.append((row, setup))
+    check_agreement(read, [kind for kind, form in FORMATS.items() if _SCALE_UNCERTAINTY in form.allows])
     return None if len(top.faults) > before else tuple(setups.values())
 
 
@@ -137,6 +141,7 @@ def _setup(table: Table) -> Setup | None:
         tool_point_uncertainty=_tool_uncertainty(table, form),
         scale_uncertainty=_scale_uncertainty(table, form),
     )
+    check_one_statement(table, setup.known)
     table.finish()
     return None if len(table.faults) > before else setup
 

@@ -20,7 +20,7 @@ import numpy as np
 from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE, eliminate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.part import TOOL_POINT, Part
+from monitor.methods.instruments.part import TOOL_POINT, Part, exact_scale_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import SCALE
 from monitor.methods.instruments.run_rows import inverse_of
@@ -64,7 +64,7 @@ def _tool_points(problem: InstrumentProblem) -> tuple[AsStated, ...]:
 
 def _scales(problem: InstrumentProblem) -> Iterator[AsStated]:
     """The scales that are taken as exact, with what each moves: the fit with what is known beforehand of all others."""
-    exact = {setup.id: setup.exact_scale for setup in problem.setups if setup.exact_scale}
+    exact = {setup.id: exact_scale_of(setup) for setup in problem.setups if setup.takes_scale}
     groups = {
         name: tuple(part.id for part in problem.parts if len(part.at) and exact.get(part.id) == name)
         for name in dict.fromkeys(exact.values())

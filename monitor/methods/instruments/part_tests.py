@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from monitor.machine import orientation
 from monitor.methods.instruments.frames import seen_points
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, exact_scale_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.point import Point
 from monitor.methods.standard_test import PartFeature, PartPath, PartTest
@@ -60,7 +60,7 @@ def part_tests(problem: InstrumentProblem) -> Iterator[PartTest]:
                 u = float(np.sqrt(np.mean(problem.sigma[part.at[mine], 0] ** 2)))
                 yield PartTest(
                     part.id, int(problem.runs[index]), features, paths, u, part.scale or 0.0,
-                    part.reading.setup.exact_scale, short, NEEDED,
+                    exact_scale_of(part.reading.setup), short, NEEDED,
                 )  # fmt: skip
 
 

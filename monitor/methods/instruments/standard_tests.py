@@ -18,7 +18,7 @@ import numpy.typing as npt
 from monitor.machine import Joint, evaluate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.interpolation_tests import interpolation_tests
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, exact_scale_of
 from monitor.methods.instruments.part_tests import part_tests
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, direction_of
@@ -102,7 +102,7 @@ def _travel(measured: _Measured, reading: Displacement) -> AxisTest | None:
     gain = float(np.hypot(beam, measured.part.scale or 0.0))
     return AxisTest(
         measured.part.id, measured.run, names, position, deviation, measured.u, gain, False,
-        reading.setup.exact_scale,
+        exact_scale_of(reading.setup),
     )  # fmt: skip
 
 
