@@ -144,6 +144,9 @@ class TestForecast(Protocol):
     def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
         """What several tests promise together."""
 
+    def limit(self, tests: Sequence[PlannedTest], parameter: str) -> tuple[float, tuple[str, ...]]:
+        """The u of a parameter that no repetition of the run and of tests goes below, and what limits it in words."""
+
 
 @dataclass(frozen=True)
 class InstrumentPlan(Able):

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Callable
 
 from monitor.exceptions import DataError
+from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.gross_in_parts import gross_of
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.chain.results import GrossReading
 from monitor.records import Campaign
 
 
