@@ -27,10 +27,10 @@ LENGTH = Stated("length", "length_standard_uncertainty_um")
 DIRECTION = Stated("direction", "direction_standard_uncertainty_urad")
 
 
-def check_one_statement(table: Table, known: Sequence[str]) -> None:
+def check_one_statement(table: Table, known_names: Sequence[str]) -> None:
     """Note a fault where a setup states a standard uncertainty of what it states as known."""
     for stated in (SCALE, LENGTH, DIRECTION):
-        if stated.key in table.data and stated.name in known:
+        if stated.key in table.data and stated.name in known_names:
             table.fault(
                 stated.key,
                 f"the {stated.name} is stated with an uncertainty and as known, which is without one; take "
@@ -46,14 +46,14 @@ def check_agreement(setups: Sequence[tuple[Table, Setup]], takes_scale: Sequence
     for table, setup in setups:
         for stated, length in _of_instrument(setup, takes_scale):
             other = first.setdefault((stated, setup.instrument or "", length), (table, setup))[0]
-            here, there = _in_words(stated, table), _in_words(stated, other)
-            if here != there:
+            own_words, other_words = _in_words(stated, table), _in_words(stated, other)
+            if own_words != other_words:
                 what = "scale" if length is None else f"length of {length:g} mm"
                 table.fault(
-                    "known" if here == "known" else stated.key,
-                    f"the {what} of {quoted(setup.instrument)} is one unknown of all its setups; it is {here} here "
-                    f"and {there} in setup {quoted(other.data['id'])}; write the same in each, or name "
-                    "another instrument where it is another one",
+                    "known" if own_words == "known" else stated.key,
+                    f"the {what} of {quoted(setup.instrument)} is one unknown of all its setups; it is "
+                    f"{own_words} here and {other_words} in setup {quoted(other.data['id'])}; write "
+                    "the same in each, or name another instrument where it is another one",
                 )
 
 

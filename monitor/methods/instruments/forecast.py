@@ -39,9 +39,9 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class _Known:
-    """A quantity that setups share: ``words`` for it, and the ``u`` to which it is known beforehand."""
+    """A quantity that setups share: what people call it (``called``), and the ``u`` to which it is known beforehand."""
 
-    words: str
+    called: str
     u: float
 
 
@@ -87,10 +87,12 @@ class _Information:
         better = replace(self, triangle=WITHOUT_NOISE * self.triangle)
         least = better.u().get(parameter, np.nan)
         limiting = []
-        for name, known in self.share.items():
-            exact = replace(better, share={**self.share, name: replace(known, u=known.u / WITHOUT_NOISE)})
-            if np.isfinite(known.u) and exact.u()[parameter] < (1.0 - LIMITS) * least:
-                limiting.append(known.words)
+        for name, quantity in self.share.items():
+            exact = replace(
+                better, share={**self.share, name: replace(quantity, u=quantity.u / WITHOUT_NOISE)}
+            )
+            if np.isfinite(quantity.u) and exact.u()[parameter] < (1.0 - LIMITS) * least:
+                limiting.append(quantity.called)
         return least, tuple(dict.fromkeys(limiting))
 
 
