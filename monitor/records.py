@@ -242,14 +242,14 @@ BRINGS_SCALE = frozenset({"displacement", "point", "pose"})
 class Setup:
     """One way in which an instrument is set up: what one of its readings is a statement about.
 
-    ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where
-    every row states its own; ``turn_uncertainty`` (rad) is that of the orientation of a kind that reads a place
-    besides. ``tool_point`` and ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors
+    ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where every row
+    states its own; ``turn_uncertainty`` (rad) is that of the orientation of a kind that reads a place besides.
+    ``tool_point`` and ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors
     ``direction`` and ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
     that in which a vector is read; ``known`` names the unknowns held as stated; ``drift_uncertainty`` (mm or rad) is
-    that of what its numbers drift over a run, ``tool_point_uncertainty`` (mm) of each coordinate of the tool point,
+    that of what its numbers drift over a run, ``tool_point_uncertainty`` (mm) of each tool-point coordinate,
     ``scale_uncertainty`` (mm/mm) of what its lengths are off in proportion to themselves."""
 
     id: str

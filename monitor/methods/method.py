@@ -7,7 +7,6 @@ and never for a name.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -24,7 +23,6 @@ from monitor.records import Array, Campaign, CurveCampaign, Setup
 from monitor.units import Unit
 
 if TYPE_CHECKING:
-    from monitor.methods.chain.gross import GrossReading
     from monitor.methods.chain.identification import AsStated, Identification, StepwiseCoefficient, TakenUp
     from monitor.methods.chain.least_squares import Solution
     from monitor.methods.chain.results import AdviceOf
@@ -145,6 +143,9 @@ class TestForecast(Protocol):
 
     def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
         """What several tests promise together."""
+
+    def limit(self, tests: Sequence[PlannedTest], parameter: str) -> tuple[float, tuple[str, ...]]:
+        """The u of a parameter that no repetition of the run and of tests goes below, and what limits it in words."""
 
 
 @dataclass(frozen=True)
@@ -299,21 +300,6 @@ class Method:
         return Model(self.name)
 
 
-def _suspected(problem: ChainProblem, gross: tuple[GrossReading, ...]) -> str:
-    """Which readings are grossly off, as the end of a refusal; empty where none stands out, or the same target in most
-    runs: then the file is wrong throughout, not a row."""
-    runs_of_target = Counter(target for _, target in {(reading.run, reading.target) for reading in gross})
-    if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
-        return ""
-    rows = ", ".join(
-        f"run {reading.run}, sequence {reading.sequence} ({reading.target})"
-        + "".join(f" or sequence {other} of that run" for other in reading.others)
-        for reading in gross
-    )
-    subject = "this reading" if len(gross) == 1 else "these readings"
-    return f". First look at {subject}, which the others contradict: {rows}" if gross else ""
-
-
 class ProblemOf(Protocol):
     """Makes the least-squares problem of a campaign under a model.
 
@@ -400,6 +386,7 @@ class ChainMethod(Method):
         from monitor.methods.chain.gross_in_parts import gross_of
         from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
         from monitor.methods.chain.results import identification
+        from monitor.methods.chain.suspects import with_suspects
 
         model = model or self.own_model
         problem = self.problem_of(campaign, model)
@@ -408,8 +395,9 @@ class ChainMethod(Method):
             try:
                 solution = solve(problem)
             except DataError as error:
-                gross = gross_of(campaign, problem, None, partial(self.problem_of, model=model)).readings
-                raise type(error)(f"{error}{problem.unsettled}{_suspected(problem, gross)}") from error
+                raise with_suspects(
+                    error, campaign, problem, partial(self.problem_of, model=model)
+                ) from error
         search = gross_of(campaign, problem, solution, partial(self.problem_of, model=model))
         return replace(
             identification(campaign, model, problem, solution, self.advice, search.readings),

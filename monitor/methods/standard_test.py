@@ -13,7 +13,8 @@ class AxisTest:
     """A test of positioning in one setup and run: ``position`` (n,) and ``deviation`` (n,) in mm, or in rad where
     ``angular``, in the order of measuring. ``axes`` are those that move: one, or several along a diagonal.
 
-    ``u_reading`` is the standard uncertainty of a reading, ``u_gain`` that of the instrument's unit.
+    ``u_reading`` is the standard uncertainty of a reading, ``u_gain`` that of the instrument's unit; ``exact_scale`` is
+    the instrument whose unit of length is taken as exact without its being stated, empty where none is.
     """
 
     setup: str
@@ -24,6 +25,7 @@ class AxisTest:
     u_reading: float
     u_gain: float
     angular: bool
+    exact_scale: str
 
 
 @dataclass(frozen=True)
@@ -114,14 +116,17 @@ class PartPath:
 @dataclass(frozen=True)
 class PartTest:
     """A part that the machine cut in one ``run``, measured by the instrument of ``setup``: ``features`` and ``paths``
-    in the order of cutting, ``u_reading`` mm of one coordinate; ``short`` are the points of paths that have too few, by
-    name, and ``needed`` how many a line, a circle and any other path need."""
+    in the order of cutting, ``u_reading`` mm of one coordinate, ``u_scale`` of its unit of length; ``exact_scale`` is
+    that of an axis; ``short`` are the points of paths that have too few, by name, and ``needed`` how many a line, a
+    circle and any other path need."""
 
     setup: str
     run: int
     features: tuple[PartFeature, ...]
     paths: tuple[PartPath, ...]
     u_reading: float
+    u_scale: float
+    exact_scale: str
     short: Mapping[str, int]
     needed: tuple[int, int, int]
 

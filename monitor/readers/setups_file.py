@@ -14,6 +14,7 @@ from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.scale_key import SCALE_UNCERTAINTY, read_scale_uncertainty
+from monitor.readers.setups_agreement import DIRECTION, LENGTH, check_agreement, check_one_statement
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
@@ -22,8 +23,8 @@ from monitor.units import METRE, MICROMETRE, MICRORADIAN
 IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 #: A standard uncertainty of an angle beyond this is a slip of unit: 0.1 rad.
 LARGEST_URAD = 1e5
-_LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
-_DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
+_LENGTH_UNCERTAINTY = LENGTH.key
+_DIRECTION_UNCERTAINTY = DIRECTION.key
 _DRIFT_UNCERTAINTY = "drift_standard_uncertainty"
 _TOOL_UNCERTAINTY = "tool_point_standard_uncertainty_mm"
 POINT = "[0.0, 0.0, -120.0]"
@@ -87,6 +88,7 @@ def read_setups(top: Table) -> tuple[Setup, ...] | None:
     """Read the setups; None if anything in them is wrong, or there is none."""
     before = len(top.faults)
     setups: dict[str, Setup] = {}
+    read: list[tuple[Table, Setup]] = []
     rows = top.tables("setups")
     if not rows and len(top.faults) == before:
         top.fault(
@@ -98,6 +100,8 @@ def read_setups(top: Table) -> tuple[Setup, ...] | None:
             row.fault("id", f"setup {quoted(setup.id)} is listed twice; give every setup its own id")
         elif setup is not None:
             setups[setup.id] = setup
+            read.append((row, setup))
+    check_agreement(read, [kind for kind, form in FORMATS.items() if SCALE_UNCERTAINTY in form.allows])
     return None if len(top.faults) > before else tuple(setups.values())
 
 
@@ -135,6 +139,7 @@ def _setup(table: Table) -> Setup | None:
         tool_point_uncertainty=_tool_uncertainty(table, form),
         scale_uncertainty=read_scale_uncertainty(table) if SCALE_UNCERTAINTY in form.allows else None,
     )
+    check_one_statement(table, setup.known)
     table.finish()
     return None if len(table.faults) > before else setup
 

@@ -172,3 +172,16 @@ class LengthWithoutUncertainty(Sentence):
 
     def __str__(self) -> str:
         return "the bar's length has no stated uncertainty: radial deviations F have none either"
+
+
+@dataclass(frozen=True)
+class ScaleTakenAsExact(Sentence):
+    """Nothing is stated of how well the unit of length of an instrument is known."""
+
+    instrument: str
+
+    def __str__(self) -> str:
+        return (
+            f"the scale of {self.instrument} is taken as exact: u does not say how well it is known "
+            "(state scale_standard_uncertainty_um_per_m)"
+        )

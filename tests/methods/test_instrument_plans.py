@@ -208,3 +208,18 @@ def test_what_an_instrument_shares_is_not_better_known_by_measuring_again(
     for test in same:
         promised = forecast.together([test]).u["EXX"]
         assert 0.98 * u < promised <= 1.0001 * present["EXX"]
+    least, limiting = forecast.limit(same, "EXX")
+    assert least == pytest.approx(u, rel=0.03)
+    assert limiting == ("the scale of laser interferometer",) * bool(keys) + ("the length of ball bar",) * (
+        not keys
+    )
+
+
+def test_a_wish_below_what_a_bar_is_calibrated_to_is_refused_with_what_limits_it(tmp_path: Path) -> None:
+    """0.3 um of a bar of 100 mm are 3 um/m, which no repetition lowers."""
+    with Database(tmp_path / "shop.duckdb") as db:
+        import_campaign(db, read_campaign(EXAMPLES / "ball-bar"))
+        with pytest.raises(
+            InputError, match=r"EXX cannot become better than \S+ µm/m: .*the length of ball bar limit"
+        ):
+            plan(db, PlanRequest("ball-bar", wanted={"EXX": 0.05}))

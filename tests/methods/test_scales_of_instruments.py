@@ -6,6 +6,7 @@ scale is u^2 L L^T of the lengths that were read; the simulator shares no code w
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -137,6 +138,59 @@ def test_a_scale_that_is_off_as_stated_is_held_and_one_that_is_not_stated_is_tol
     assert np.all(off["stated"] < 2.5)
 
 
+LASER, BAR = 'reading = "displacement"\n', 'reading = "distance"\n'
+LENGTH = "length_standard_uncertainty_um = 0.3\n"
+CONTRADICTIONS = (
+    (LASER, (KEY, KEY.replace("2.0", "3.0"), KEY), KEY.split(" ")[0], "known to 3 µm/m here and known to 2 µm/m in"),
+    (LASER, (KEY, KEY, ""), KEY.split(" ")[0], "without an uncertainty here and known to 2 µm/m in setup 'laser-X'"),
+    (LASER, ('known = ["scale"]\n', "", ""), KEY.split(" ")[0], "without an uncertainty here and known in setup"),
+    (LASER, (KEY, KEY, 'known = ["scale"]\n'), "known", "' is one unknown of all its setups; it is known here"),
+    (LASER, (KEY + 'known = ["scale"]\n',) * 3, KEY.split(" ")[0], "take 'scale' out of known, so that"),
+    (LASER, ('known = ["direction"]\n', "", ""),
+     "direction_standard_uncertainty_urad", "or leave this key out where the direction holds exactly"),
+    (BAR, ('known = ["length"]\n',) * 3, LENGTH.split(" ")[0], "the length is stated with an uncertainty and as known"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("of", "keys", "named", "words"), CONTRADICTIONS)
+def test_statements_that_contradict_each_other_are_refused(
+    tmp_path: Path, of: str, keys: tuple[str, ...], named: str, words: str
+) -> None:
+    rng = np.random.default_rng(3)
+    path = centre.campaign(
+        tmp_path / "shop", rng, centre.truth_of(rng), only="laser" if of == LASER else "bar"
+    )
+    file = path / "campaign.toml"
+    first, *others = file.read_text(encoding="utf-8").split(of)
+    text = first + "".join(of + key + other for key, other in zip(keys, others, strict=True))
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(CampaignError, match=re.escape(words)) as refused:
+        read_campaign(path)
+    lines = text.splitlines()
+    for fault in refused.value.faults:
+        assert fault.line is not None
+        assert fault.file == "campaign.toml"
+        assert lines[fault.line - 1].startswith((named, "[[setups]]"))
+
+
+@pytest.mark.parametrize("otherwise", ["length_mm = 100.0", "another instrument"])
+def test_another_bar_has_a_length_of_its_own(tmp_path: Path, otherwise: str) -> None:
+    rng = np.random.default_rng(3)
+    path = centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng), only="bar")
+    file = path / "campaign.toml"
+    head, rest = file.read_text(encoding="utf-8").split(LENGTH, 1)
+    if otherwise == "another instrument":
+        head = head.replace('instrument = "', 'instrument = "other ')
+    else:
+        head = re.sub("length_mm = .*", otherwise, head)
+    file.write_text(head + "length_standard_uncertainty_um = 0.9\n" + rest, encoding="utf-8")
+    campaign = read_campaign(path)
+    assert isinstance(campaign, Campaign)
+    assert sorted(1e3 * (setup.length_uncertainty or 0.0) for setup in campaign.artefact.setups)[
+        -1
+    ] == pytest.approx(0.9)
+
+
 def test_a_scale_that_is_stated_as_known_is_no_ground(tmp_path: Path) -> None:
     campaign, _ = _campaign(tmp_path, 9, 'known = ["scale"]\n')
     problem = _problem(campaign)
@@ -147,7 +201,9 @@ def test_a_scale_that_is_stated_as_known_is_no_ground(tmp_path: Path) -> None:
 def test_a_bar_that_states_its_scale_is_as_one_that_states_its_length(tmp_path: Path) -> None:
     """0.3 um of 150 mm are 2 um/m."""
     of = 'reading = "distance"\n'
-    campaign, _ = _campaign(tmp_path, 10, KEY + 'known = ["length"]\n', only="bar", of=of)
+    campaign, _ = _campaign(tmp_path, 10, KEY, only="bar", of=of)
+    bars = tuple(replace(setup, known=("length",)) for setup in campaign.artefact.setups)
+    campaign = replace(campaign, artefact=replace(campaign.artefact, setups=bars))
     _, by_scale = _gains(_problem(campaign))
     _, by_length = _gains(_problem(_campaign(tmp_path / "length", 10, only="bar")[0]))
     np.testing.assert_allclose(by_scale, by_length, rtol=1e-3, atol=1e-16)

@@ -12,6 +12,11 @@ from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.store import Database, import_campaign
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 
@@ -61,6 +66,19 @@ def test_a_laser_that_reads_no_travel_is_named_with_what_it_reads(
     with pytest.raises(DataError, match=said) as refused:
         campaign_method(campaign).identify(campaign)
     assert "laser-X" not in str(refused.value)
+
+
+def test_compare_refuses_in_the_words_of_identify(tmp_path: Path) -> None:
+    campaign = lasers(tmp_path, scaled(-1.0))
+    with Database(tmp_path / "shop.duckdb") as db:
+        import_campaign(db, campaign)
+        with pytest.raises(
+            DataError, match="the readings of setup laser-Z are its travel with the other sign"
+        ) as said:
+            compare(db, CompareRequest(campaign.name))
+        with pytest.raises(DataError, match="the readings of setup laser-Z are its travel") as identified:
+            identify(db, IdentifyRequest(campaign.name))
+    assert str(said.value) == str(identified.value)
 
 
 def test_right_lasers_are_not_named(tmp_path: Path) -> None:

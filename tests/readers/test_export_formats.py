@@ -79,6 +79,7 @@ def said(around: Path, name: str, old: str, new: str, count: int = 1) -> str:
         ("laser-X.rtl", "Targets :", "Goals :", "the file has no targets (Targets :)"),
         ("laser-X.rtl", "HEADER::", "HEADER", "line 1: 'HEADER' stands before the first section"),
         ("bar-xy.bar", "Radius: 100.0 mm", "Radius: 100.0", "line 3, column radius: nothing states the unit"),
+        ("bar-xy.bar", "Radius: 100.0 mm\n", "", "nothing states the radius of this circle; write it as radius_mm"),
         ("bar-xy.bar", "Radius: 100.0 mm", "Radius: ten", "column radius: 'ten' is no radius"),
         ("bar-xy.bar", "Direction: CCW", "Direction: CW", "the head says CW, the angles go CCW; are they counted"),
         ("bar-xy.bar", "\n10.0\t", "\n5.0\t", "column angle: the angle is that of the row before"),
@@ -122,6 +123,16 @@ def test_what_is_wrong_is_named_by_line_and_remedy(tmp_path, name, old, new, mes
 
 def sample(name: str) -> bytes:
     return (EXAMPLES / SAMPLES[name] / name).read_bytes()
+
+
+def test_a_head_of_a_ball_bar_holds_until_another_states_otherwise(tmp_path):
+    """The second circle has its sense alone: radius and feed are those of the first, not of the mapping's example."""
+    head = b"Radius: 100.0 mm\nFeed rate: 1000 mm/min\n"
+    first, second, third = sample("bar-xy.bar").split(head)
+    campaign = read_campaign(spoilt(tmp_path, "bar-xy.bar", first + head + second + third))
+    before = read_campaign(EXAMPLES / "files-as-they-come").probings
+    assert campaign.probings.readings["X"].tolist() == before.readings["X"].tolist()
+    assert campaign.probings.time.tolist() == before.time.tolist()
 
 
 def test_inches_are_inches(tmp_path):

@@ -198,6 +198,32 @@ def test_u_of_a_part_is_the_scatter_of_parts_measured_again(tmp_path: Path) -> N
         assert 0.6 < ratio < 1.6, figure.kind
 
 
+def test_the_stated_scale_of_a_cmm_is_in_u_of_places_alone(tmp_path: Path) -> None:
+    """The hole is 84.9 mm from the bore and off by some micrometres: its place moves by twice the scale's part along
+    where it is off, and no form does."""
+    elements = {
+        name: points for name, points in circle_diamond_square().items() if not name.startswith("diamond")
+    }
+    made = rows_of(THREE_AXES, elements)
+    scaled = SETUP.replace(
+        'instrument = "CMM"', 'instrument = "CMM"\nscale_standard_uncertainty_um_per_m = 30.0'
+    )
+    answers = {}
+    for name, setup in (("exact", SETUP), ("scaled", scaled)):
+        (tmp_path / name).mkdir()
+        (answers[name],) = answer_of(tmp_path / name, THREE_AXES, made, setup).tests
+    u = {name: {f"{f.symbol} {f.name}": f.u for f in answer.figures} for name, answer in answers.items()}
+    values = {f"{f.symbol} {f.name}": f.value for f in answers["exact"].figures}
+    (place,) = [name for name in values if name.startswith("hole position")]
+    by_unit = 2.0 * 30e-3 * np.hypot(60.0, 60.0)
+    assert 0.3 * by_unit < np.sqrt(u["scaled"][place] ** 2 - u["exact"][place] ** 2) < 1.1 * by_unit
+    for name in values:
+        if name != place and "concentricity" not in name:
+            assert u["scaled"][name] == pytest.approx(u["exact"][name], rel=0.15), name
+    assert any("the scale of CMM is taken as exact" in str(note) for note in answers["exact"].notes)
+    assert not any("scale" in str(note) for note in answers["scaled"].notes)
+
+
 def test_a_cone_frustum_of_five_axes_shows_its_angle_its_circles_and_how_they_lie(tmp_path: Path) -> None:
     """The table's axis is off by d: what the tool misses turns with the part, so that circles of the cone shift."""
     chain = machine(np.array([10e-3, 0.0, 0.0]), 0.0)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy
 
+from monitor.reporting.standard_tests import ScaleTakenAsExact
 from tests.simulator.instruments import SimulatedChain
 from tests.workflow.test_interpolation_standard import machine, readings_of
 from tests.workflow.test_part_standard import (
@@ -116,7 +117,7 @@ def test_a_wave_of_the_wall_is_the_profile_of_a_machine_without_errors(tmp_path:
     assert figures["S", f"{PROFILE}, {ZONE}"][0] == pytest.approx(2e3 * WAVE, rel=0.03)
     (test,) = answer_of(tmp_path / "again", chain, flat_s(chain)[0]).tests
     assert max(figure.value for figure in test.figures) < 0.02
-    assert test.notes == ()
+    assert [str(note) for note in test.notes] == [str(ScaleTakenAsExact("CMM"))]
 
 
 def leaning_s(chain: SimulatedChain, made: SimulatedChain) -> list[dict]:
@@ -193,8 +194,24 @@ def test_u_of_a_profile_is_the_scatter_of_parts_measured_again() -> None:
         profile = profile_of(wall + rng.normal(0.0, 2e-4, wall.shape), nominal, axes)
         assert profile is not None
         widths.append(profile.width)
-        u += profile.figures("S", 2e-4, rng)[0].u / 60
+        u += profile.figures("S", 2e-4, 0.0, rng)[0].u / 60
     assert u == pytest.approx(np.std(widths), rel=0.35)
+
+
+def test_u_of_a_profile_holds_the_scale_of_the_instrument() -> None:
+    """By profiles of the same wall in units of length drawn anew."""
+    from monitor.statistics.standards.profiles import profile_of
+
+    places, out, along = s_curve()
+    nominal = np.column_stack([places, np.zeros(len(places))])
+    normal = np.column_stack([out, np.zeros(len(out))])
+    wall = nominal + (CUTTER + WAVE * np.cos(2.0 * np.pi * WAVES * along))[:, None] * normal
+    axes, rng, scale = np.tile([0.0, 0.0, 1.0], (len(places), 1)), np.random.default_rng(8), 2e-5
+    drawn = [profile_of(wall * (1.0 + rng.normal(0.0, scale)), nominal, axes) for _ in range(60)]
+    profile = profile_of(wall, nominal, axes)
+    assert profile is not None
+    u = profile.figures("S", 0.0, scale, rng)[0].u
+    assert u == pytest.approx(np.std([each.width for each in drawn if each is not None]), rel=0.35)
 
 
 @pytest.mark.parametrize("repeated", [0, -1])

@@ -108,6 +108,59 @@ def test_the_same_seed_gives_the_same_uncertainties(db: Database) -> None:
     assert str(standards(db, StandardsRequest("shop"))) == str(standards(db, StandardsRequest("shop")))
 
 
+def answered(folder: Path, setups: str, made: list[dict[str, object]]) -> dict[str, StandardTest]:
+    folder.mkdir()
+    with Database(folder / "shop.duckdb") as db:
+        import_campaign(db, read_campaign(MACHINE.write(folder / "shop", setups, made)))
+        return {test.setup: test for test in standards(db, StandardsRequest("shop")).tests}
+
+
+def test_the_stated_scale_of_a_laser_is_in_u_of_its_axis_and_of_its_diagonal(tmp_path: Path) -> None:
+    """Its share is by how much the figures move where all readings are off by the stated 2 um/m."""
+    scale = "scale_standard_uncertainty_um_per_m = 2.0"
+    stated_setups = SETUPS.replace('direction = "Y"', f'direction = "Y"\n{scale}').replace(
+        "direction = [0.6", f"{scale}\ndirection = [0.6"
+    )
+    longer = [
+        {**each, "reading_um": (1.0 + 2e-6) * float(str(each["reading_um"]))}
+        if each["setup"] in ("laser-Y", "diagonal")
+        else each
+        for each in rows()
+    ]
+    exact = answered(tmp_path / "exact", SETUPS, rows())
+    stated = answered(tmp_path / "stated", stated_setups, rows())
+    moved = figures(answered(tmp_path / "moved", SETUPS, longer)["laser-Y"])
+    for setup, travel in (("laser-Y", 400.0), ("diagonal", 500.0)):
+        u = {figure.symbol: figure.u for figure in stated[setup].figures}
+        without = {figure.symbol: figure.u for figure in exact[setup].figures}
+        for symbol in ("M", "E"):
+            assert u[symbol] == pytest.approx(np.hypot(without[symbol], 2e-3 * travel), rel=0.12), symbol
+        assert u["B mean"] == pytest.approx(without["B mean"], rel=1e-9, abs=1e-12)
+    assert moved["M"] - figures(exact["laser-Y"])["M"] == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_scale_that_is_taken_as_exact_is_said_unless_it_holds_by_definition(tmp_path: Path) -> None:
+    known = SETUPS.replace('direction = "Y"', 'direction = "Y"\nknown = ["scale"]')
+    notes = {
+        name: [str(note) for note in test.notes]
+        for name, test in answered(tmp_path / "a", known, rows()).items()
+    }
+    said = "the scale of {} is taken as exact: u does not say how well it is known"
+    assert not any(said.format("laser-Y") in note for note in notes["laser-Y"])
+    assert any(said.format("diagonal") in note for note in notes["diagonal"])
+    assert not any("scale" in note for note in notes["bar"])
+
+
+def test_the_stated_scale_of_a_bar_is_in_u_of_its_radial_deviations(tmp_path: Path) -> None:
+    scaled = SETUPS.replace(
+        "length_mm = 150.0", "length_mm = 150.0\nscale_standard_uncertainty_um_per_m = 10.0"
+    )
+    u = {figure.symbol: figure.u for figure in answered(tmp_path / "a", scaled, rows())["bar"].figures}
+    without = {figure.symbol: figure.u for figure in answered(tmp_path / "b", SETUPS, rows())["bar"].figures}
+    assert u["F_XY max"] == pytest.approx(np.hypot(without["F_XY max"], 1.5), rel=1e-9)
+    assert u["G(b)"] == without["G(b)"]
+
+
 def test_a_setup_that_no_standard_evaluates_is_refused_and_a_wrong_name_too(db: Database) -> None:
     with pytest.raises(DataError, match="no setup of edge is a test of ISO 230-2, -4, -6, -7"):
         standards(db, StandardsRequest("shop", setup="edge"))

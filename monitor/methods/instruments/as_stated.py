@@ -19,7 +19,7 @@ from monitor.methods.chain.exact_scales import exact_scales
 from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.least_squares import MEMBER_SHARE, eliminate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.part import TOOL_POINT, Part
+from monitor.methods.instruments.part import TOOL_POINT, Part, exact_scale_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.records import FROM_TOOL_POINT, Array
 
@@ -58,7 +58,7 @@ def _tool_points(problem: InstrumentProblem) -> tuple[AsStated, ...]:
 
 def _scales(problem: InstrumentProblem) -> Iterator[AsStated]:
     """The scales that are taken as exact, with what each moves: the fit with what is known beforehand of all others."""
-    exact = {setup.id: setup.instrument or setup.id for setup in problem.setups if setup.takes_scale}
+    exact = {setup.id: exact_scale_of(setup) for setup in problem.setups if setup.takes_scale}
     groups = {
         name: tuple(part.id for part in problem.parts if len(part.at) and exact.get(part.id) == name)
         for name in dict.fromkeys(exact.values())

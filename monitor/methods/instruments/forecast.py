@@ -29,8 +29,20 @@ from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign, Probings, Setup
 from monitor.units import Unit
 
+#: How many times better readings count as without noise: what is left of u is what they cannot lower.
+WITHOUT_NOISE = 1e3
+#: A quantity that would lower that by less than this part, were it exact, does not limit it.
+LIMITS = 0.02
 #: What is left of a column without the unknowns of its setup, below this part of it, is rounding.
 ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A quantity that setups share: what people call it (``called``), and the ``u`` to which it is known beforehand."""
+
+    called: str
+    u: float
 
 
 @dataclass(frozen=True)
@@ -40,7 +52,7 @@ class _Information:
 
     names: tuple[str, ...]
     triangle: Array
-    share: Mapping[str, float]
+    share: Mapping[str, _Known]
 
     def joined(self, other: _Information) -> _Information:
         """Both together, among the coefficients of either: what one instrument does wrong is in its rows alone."""
@@ -59,7 +71,7 @@ class _Information:
 
     def u(self) -> dict[str, float]:
         """Standard uncertainties in internal units; NaN where the rows do not determine a coefficient."""
-        prior = np.diag([1.0 / self.share.get(name, np.inf) for name in self.names])
+        prior = np.diag([1.0 / self.share[name].u if name in self.share else 0.0 for name in self.names])
         rows = np.vstack([self.triangle, prior])
         scale = np.linalg.norm(rows, axis=0)
         scale[scale == 0.0] = 1.0
@@ -69,6 +81,19 @@ class _Information:
         is_open = np.abs(vectors[rank:]).max(axis=0, initial=0.0) >= MEMBER_SHARE
         u = zip(self.names, np.where(is_open, np.nan, spread).tolist(), strict=True)
         return {name: value for name, value in u if name not in self.share}
+
+    def limit(self, parameter: str) -> tuple[float, tuple[str, ...]]:
+        """The standard uncertainty that readings without noise would leave, and what limits it, in words."""
+        better = replace(self, triangle=WITHOUT_NOISE * self.triangle)
+        least = better.u().get(parameter, np.nan)
+        limiting = []
+        for name, quantity in self.share.items():
+            exact = replace(
+                better, share={**self.share, name: replace(quantity, u=quantity.u / WITHOUT_NOISE)}
+            )
+            if np.isfinite(quantity.u) and exact.u()[parameter] < (1.0 - LIMITS) * least:
+                limiting.append(quantity.called)
+        return least, tuple(dict.fromkeys(limiting))
 
 
 class InstrumentForecast:
@@ -126,12 +151,21 @@ class InstrumentForecast:
         """What several tests promise together; the last one is named."""
         return self._expected(tuple(test for test in tests if isinstance(test, CandidateTest)))
 
+    def limit(self, tests: Sequence[PlannedTest], parameter: str) -> tuple[float, tuple[str, ...]]:
+        """The u that no repetition of the run and of ``tests`` goes below, and what limits it."""
+        return self._together(tuple(test for test in tests if isinstance(test, CandidateTest))).limit(
+            parameter
+        )
+
     def _expected(self, tests: tuple[CandidateTest, ...]) -> ExpectedTest:
+        return ExpectedTest(tests[-1], self._together(tests).u())
+
+    def _together(self, tests: tuple[CandidateTest, ...]) -> _Information:
         base = self._base(*(test.setup for test in tests))
         information = self._measured(base)
         for test in tests:
             information = information.joined(self._of(test, base))
-        return ExpectedTest(tests[-1], information.u())
+        return information
 
     def _base(self, *setups: Setup) -> tuple[str, ...]:
         """The base of a campaign with further setups."""
@@ -224,7 +258,7 @@ def _information(problem: InstrumentProblem) -> _Information:
     return _Information(names, _triangle(rows), dict(share.values()))
 
 
-def _shared(problem: InstrumentProblem) -> dict[int, tuple[str, float]]:
+def _shared(problem: InstrumentProblem) -> dict[int, tuple[str, _Known]]:
     """What setups of one instrument share, by its place among the own unknowns: what it is in words, and the u to which
     it is known beforehand."""
     share = {}
@@ -233,7 +267,10 @@ def _shared(problem: InstrumentProblem) -> dict[int, tuple[str, float]]:
         for index, (name, column) in enumerate(zip(part.unknowns, columns.tolist(), strict=True)):
             what = part.shared(name, None)
             if what is not None:
-                share[column] = (f"{name} of {what}", u_of.get(index, float("inf")))
+                share[column] = (
+                    f"{name} of {what}",
+                    _Known(f"the {name} of {part.instrument}", u_of.get(index, float("inf"))),
+                )
     return share
 
 

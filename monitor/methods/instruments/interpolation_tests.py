@@ -225,10 +225,9 @@ def _swing(path: _Path, reading: DistanceReading, run: int, u: float) -> CircleT
     angle = np.arctan2(bars @ np.cross(normal, along), bars @ along)
     if np.ptp(np.unwrap(angle)) < np.pi:
         return None
-    bar = 0.0 if reading.holds("length") else (reading.setup.length_uncertainty or np.nan)
     names = tuple(path.part.rows.chain.joints[joint].name for joint in (*path.rotary, *path.linear))
     plane = ("XYZ"[first], "XYZ"[second])
     return CircleTest(
         path.part.id, run, names, True, plane, angle, path.part.rows.measured[path.at, 0], reading.setup.length,
-        u, bar,
+        u, reading.u_length,
     )  # fmt: skip

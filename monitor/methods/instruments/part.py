@@ -41,6 +41,11 @@ def scale_id_of(setup: Setup) -> Hashable:
     return (setup.instrument, setup.scale_uncertainty) if setup.instrument else None
 
 
+def exact_scale_of(setup: Setup) -> str:
+    """Whose unit of length is taken as exact without a word: the instrument, else the setup; empty of none."""
+    return (setup.instrument or setup.id) if setup.takes_scale else ""
+
+
 @dataclass(frozen=True)
 class Part:
     """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, their indices ``at`` (m,) among all

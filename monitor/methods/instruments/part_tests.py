@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from monitor.machine import orientation
 from monitor.methods.instruments.frames import seen_points
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, exact_scale_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.point import Point
 from monitor.methods.standard_test import PartFeature, PartPath, PartTest
@@ -58,7 +58,10 @@ def part_tests(problem: InstrumentProblem) -> Iterator[PartTest]:
             # Points with names of their own are no paths: a part of them alone is none of this test.
             if features or paths or max(short.values(), default=0) >= FEWEST_OF_LINE:
                 u = float(np.sqrt(np.mean(problem.sigma[part.at[mine], 0] ** 2)))
-                yield PartTest(part.id, int(problem.runs[index]), features, paths, u, short, NEEDED)
+                yield PartTest(
+                    part.id, int(problem.runs[index]), features, paths, u, part.scale or 0.0,
+                    exact_scale_of(part.reading.setup), short, NEEDED,
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)

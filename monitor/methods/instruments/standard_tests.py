@@ -18,7 +18,7 @@ import numpy.typing as npt
 from monitor.machine import Joint, evaluate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.interpolation_tests import interpolation_tests
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, exact_scale_of
 from monitor.methods.instruments.part_tests import part_tests
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, direction_of
@@ -99,7 +99,11 @@ def _travel(measured: _Measured, reading: Displacement) -> AxisTest | None:
     beam = 0.0 if reading.holds("direction") else reading.beam**2
     names = tuple(joint.name for joint in measured.joints)
     deviation = sense * (measured.values - travel)
-    return AxisTest(measured.part.id, measured.run, names, position, deviation, measured.u, beam, False)
+    gain = float(np.hypot(beam, measured.part.scale or 0.0))
+    return AxisTest(
+        measured.part.id, measured.run, names, position, deviation, measured.u, gain, False,
+        exact_scale_of(reading.setup),
+    )  # fmt: skip
 
 
 def _turn(measured: _Measured, reading: Angle) -> AxisTest | None:
@@ -113,7 +117,7 @@ def _turn(measured: _Measured, reading: Angle) -> AxisTest | None:
     deviation = sense * measured.values / LEVER
     u = measured.u / LEVER
     return AxisTest(
-        measured.part.id, measured.run, (joint.name,), measured.axis_reading, deviation, u, 0.0, True
+        measured.part.id, measured.run, (joint.name,), measured.axis_reading, deviation, u, 0.0, True, ""
     )
 
 
@@ -125,12 +129,11 @@ def _circle(measured: _Measured, reading: DistanceReading) -> CircleTest | None:
     arm = _nominal(measured.part, measured.mine) - np.array(reading.centre)
     first, second = _plane(along)
     angle = np.arctan2(arm[:, second], arm[:, first])
-    bar = 0.0 if reading.holds("length") else (reading.setup.length_uncertainty or np.nan)
     plane = ("XYZ"[first], "XYZ"[second])
     names = tuple(joint.name for joint in measured.joints)
     return CircleTest(
         measured.part.id, measured.run, names, False, plane, angle, measured.values, reading.setup.length,
-        measured.u, bar,
+        measured.u, reading.u_length,
     )  # fmt: skip
 
 

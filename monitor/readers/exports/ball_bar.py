@@ -1,8 +1,8 @@
 """Ball bar, text: a head of ``key: value`` lines and a table of angle and deviation, once for each circle.
 
-``Radius``, ``Feed rate``, ``Direction`` (CW, CCW, clockwise, G02, G03) and ``Date`` of a head hold for the table below
-it. Where the axes stood follows from the centre of the circle, its radius and the angle, counted from the first axis
-of the plane towards the second.
+``Radius`` and ``Feed rate`` of a head hold for all tables below it until another head states them, ``Direction`` (CW,
+CCW, clockwise, G02, G03) for the next one, ``Date`` of the first for the file. Where the axes stood follows from the
+centre of the circle, its radius and the angle, counted from the first axis of the plane towards the second.
 """
 
 from __future__ import annotations
@@ -64,12 +64,22 @@ class BallBarSettings:
 
 @dataclass
 class _Circle:
-    """One circle: its head, the line that its table begins on, and the lines of the table."""
+    """One circle: its head, the circle before it, the line that its table begins on, and the lines of the table."""
 
     facts: list[tuple[str, str]] = field(default_factory=list)
     facts_at: list[int] = field(default_factory=list)
     begin: int = 0
     lines: list[str] = field(default_factory=list)
+    before: _Circle | None = None
+
+    def stating(self, what: str) -> _Circle:
+        """Return the circle whose head states a thing: this one, or the last before it; this one where none does."""
+        circle: _Circle | None = self
+        while circle is not None:
+            if circle.value(what) is not None:
+                return circle
+            circle = circle.before
+        return self
 
     def value(self, what: str) -> str | None:
         """Return what the head says of a thing."""
@@ -183,7 +193,7 @@ def _circles(lines: Sequence[str], style: Style) -> list[_Circle]:
             circle.lines += [""] * (number - 1 - circle.begin - len(circle.lines)) + [line]
             continue
         if circle.lines:
-            circle, names = _Circle(), None
+            circle, names = _Circle(before=circle), None
         fact = fact_of(line) if ":" in line or "=" in line else None
         if fact is not None:
             circle.facts.append(fact)
@@ -275,13 +285,14 @@ def _unit(export: Export, names: Sequence[str]) -> str | None:
 
 def _radius(name: str, circle: _Circle, how: BallBarSettings, faults: Faults) -> float | None:
     """Return the radius in mm as the file states it, with its unit; the mapping's must be the same."""
-    text = circle.value("radius")
+    head = circle.stating("radius")
+    text = head.value("radius")
     wrong = None
     radius = how.radius
     if text is None and radius is None:
-        wrong = "nothing states the radius; write radius_mm = 100.0 in the mapping"
+        wrong = "nothing states the radius of this circle; write it as radius_mm in the mapping, in mm"
     elif text is not None:
-        number, unit = _length(circle, text)
+        number, unit = _length(head, text)
         if number is None:
             wrong = f"{quoted(text)} is no radius; write for example Radius: 100.0 mm"
         elif unit is None and radius is None:
@@ -299,7 +310,7 @@ def _radius(name: str, circle: _Circle, how: BallBarSettings, faults: Faults) ->
                     f"the file says {read_radius:g} mm, the mapping {radius:g} mm{hint}: correct one of them"
                 )
     if wrong is not None:
-        faults.add(name, circle.line_of("radius"), "radius", wrong)
+        faults.add(name, head.line_of("radius"), "radius", wrong)
     return None if wrong is not None else radius
 
 
@@ -332,9 +343,10 @@ def _sense(name: str, circle: _Circle, turns: Sequence[float], at: Sequence[int]
 
 def _times(circle: _Circle, turns: Sequence[float], radius: float, clock: float) -> list[str]:
     """Return the times of the rows from the feed, a second a row where nobody states it."""
-    match = _QUANTITY.match(circle.value("feed") or "")
+    head = circle.stating("feed")
+    match = _QUANTITY.match(head.value("feed") or "")
     feed = 0.0 if match is None else float(match[1].replace(",", "."))
-    text = f"{circle.value('feed') or ''} {[key for key, _ in circle.facts if _plain(key) in _KEYS['feed']]}".casefold()
+    text = f"{head.value('feed') or ''} {[key for key, _ in head.facts if _plain(key) in _KEYS['feed']]}".casefold()
     if feed <= 0.0 or "mm/min" not in text:
         return [repr(clock + row) for row in range(len(turns))]
     seconds = 60.0 * radius / feed

@@ -42,6 +42,10 @@ class FormKind(StrEnum):
     FLATNESS_ZONE = "flatness_zone"
 
 
+#: What another unit of length changes: the others are of one size, or compare directions.
+FROM_SCALE = frozenset({FormKind.POSITION, FormKind.PROFILE, FormKind.PROFILE_ZONE})
+
+
 @dataclass(frozen=True)
 class Element:
     """A line or circle (``is_circle``): points ``measured`` (n, 3) and programmed (n, 3) mm in one frame.
@@ -73,34 +77,36 @@ class FormFigure:
 
 
 def part_figures(
-    elements: Sequence[Element], *, u_reading: float, rng: np.random.Generator
+    elements: Sequence[Element], *, u_reading: float, u_scale: float = 0.0, rng: np.random.Generator
 ) -> tuple[FormFigure, ...]:
     """Every figure of the elements of one part, in their order.
 
-    ``u_reading`` mm is the standard uncertainty of one coordinate; u is the standard deviation of a figure over parts
-    measured again. Widths grow with noise, and u does not correct that.
+    ``u_reading`` mm is the standard uncertainty of one coordinate, ``u_scale`` that of the unit of length; u is the
+    standard deviation of a figure over parts measured again. Widths grow with noise, and u does not correct that.
     """
     if not elements:
         return ()
     plane = _plane(elements)
     elements = _levelled(elements, plane)
     values = list(_figures(elements, [each.measured for each in elements], plane))
-    draws = np.array([
-        [
-            value
-            for *_, value in _figures(
-                elements,
-                [each.measured + u_reading * rng.standard_normal(each.measured.shape) for each in elements],
-                plane,
-            )
-        ]
-        for _ in range(DRAWS)
-    ])  # fmt: skip
+    again = (_measured_again(elements, u_reading, u_scale * rng.standard_normal(), rng) for _ in range(DRAWS))
+    draws = np.array([[value for *_, value in _figures(elements, points, plane)] for points in again])
     figures = [
         FormFigure(kind, element, datum, value, float(u))
         for (kind, element, datum, value), u in zip(values, draws.std(axis=0), strict=True)
     ]
     return tuple(_with_zones(elements, figures, plane))
+
+
+def _measured_again(
+    elements: Sequence[Element], u_reading: float, off: float, rng: np.random.Generator
+) -> list[Array]:
+    """The points (n, 3) of the elements with new noise, in a unit of length that is ``off`` in proportion."""
+    middle = np.concatenate([each.measured for each in elements]).mean(axis=0)
+    return [
+        each.measured + off * (each.measured - middle) + u_reading * rng.standard_normal(each.measured.shape)
+        for each in elements
+    ]
 
 
 def _plane(elements: Sequence[Element]) -> Array:

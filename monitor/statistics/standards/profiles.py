@@ -36,12 +36,14 @@ SEPARATED = 1e-3
 @dataclass(frozen=True)
 class Profile:
     """Wall points as fitted: ``deviation`` (n,) mm along ``outward`` (n, 3), and an orthonormal basis ``columns``
-    (n, q) of what moving the part and another radius do to it. ``radius`` mm is that of the cutter, 0 of a face."""
+    (n, q) of what moving the part and another radius do to it. ``radius`` mm is that of the cutter, 0 of a face;
+    ``by_scale`` (n,) mm is what is left of another unit of length in it."""
 
     deviation: Array
     outward: Array
     columns: Array
     radius: float
+    by_scale: Array
 
     @property
     def is_face(self) -> bool:
@@ -58,12 +60,15 @@ class Profile:
         """The least width (mm) of a zone."""
         return minimum_zone(self.columns, self.deviation)
 
-    def figures(self, name: str, u_reading: float, rng: np.random.Generator) -> tuple[FormFigure, FormFigure]:
+    def figures(
+        self, name: str, u_reading: float, u_scale: float, rng: np.random.Generator
+    ) -> tuple[FormFigure, FormFigure]:
         """The width and the least width; u is the standard deviation of the first over parts measured again, with
-        ``u_reading`` mm of one coordinate."""
+        ``u_reading`` mm of one coordinate and a unit of length that is off by ``u_scale``."""
         noise = u_reading * rng.standard_normal((DRAWS, len(self.deviation)))
         noise -= noise @ self.columns @ self.columns.T
-        u = float(np.std(np.ptp(self.deviation + noise, axis=1)))
+        off = u_scale * rng.standard_normal((DRAWS, 1)) * self.by_scale
+        u = float(np.std(np.ptp(self.deviation + noise + off, axis=1)))
         kinds = (FormKind.PROFILE, FormKind.PROFILE_ZONE)
         if self.is_face:
             kinds = (FormKind.FLATNESS, FormKind.FLATNESS_ZONE)
@@ -122,7 +127,9 @@ def _face(measured: Array, nominal: Array, axes: Array) -> Profile | None:
 def _profile(outward: Array, about: Array, distance: Array, radius: float) -> Profile:
     basis, strength, _ = np.linalg.svd(_columns(outward, about) / _scale(about), full_matrices=False)
     basis = basis[:, strength > SEPARATED * strength[0]]
-    return Profile(distance - basis @ (basis.T @ distance), outward, basis, radius)
+    in_length = np.sum(outward * about, axis=1)
+    deviation, by_scale = (each - basis @ (basis.T @ each) for each in (distance, in_length))
+    return Profile(deviation, outward, basis, radius, by_scale)
 
 
 def _tangents(path: Array) -> Array:

@@ -35,7 +35,7 @@ from monitor.workflow.explain.measurements import with_measurements
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
-from monitor.workflow.identify.mistaken_columns import with_mistake
+from monitor.workflow.identify.mistaken_columns import refusal_of
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
@@ -54,7 +54,7 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
         with within_memory(problem, times):
             return robust_fit(problem)
     except DataError as refusal:
-        raise with_mistake(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
+        raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def explanation_of(

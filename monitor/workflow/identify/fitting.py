@@ -12,7 +12,7 @@ from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel
-from monitor.workflow.identify.mistaken_columns import with_mistake
+from monitor.workflow.identify.mistaken_columns import refusal_of
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, resolve_for, subject_of
 
@@ -46,7 +46,7 @@ def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | Curv
     try:
         return fit(machine_problem(campaign, model))
     except DataError as refusal:
-        raise with_mistake(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
+        raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:

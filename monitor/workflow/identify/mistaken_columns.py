@@ -7,8 +7,22 @@ from collections.abc import Callable, Sequence
 from monitor.exceptions import DataError, MistakenUnitError, TooManyRowsError
 from monitor.methods.chain.parts import parts_of
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
+
+
+def refusal_of(
+    refusal: DataError, campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
+) -> DataError:
+    """The refusal of a fit in the words of ``identify``: what is suspected, and the mistake of the file behind it."""
+    if isinstance(refusal, TooManyRowsError):
+        return refusal
+    try:
+        problem = problem_of(campaign)
+    except DataError:
+        return with_mistake(refusal, campaign, problem_of)
+    return with_mistake(with_suspects(refusal, campaign, problem, problem_of), campaign, problem_of)
 
 
 def with_mistake(

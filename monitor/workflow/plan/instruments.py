@@ -49,7 +49,7 @@ def plan_instruments(
     asked = _asked(request, present, expected)
     internal = {name: forecast.unit_of(name).to_internal(u) for name, u in request.wanted.items()}
     in_turn = _in_turn(forecast, expected, asked, count or (MOST_TESTS if internal else 0), internal)
-    _refuse_unreached(request, present, in_turn, internal)
+    _refuse_unreached(request, forecast, in_turn, internal)
     joints = chain_of(campaign.machine).joints
     ranked = _best_of_setups(expected, asked)[:LISTED]
     return InstrumentPlanAnswer(
@@ -146,12 +146,21 @@ def _count(request: PlanRequest) -> int:
 
 def _refuse_unreached(
     request: PlanRequest,
-    present: Mapping[str, float],
+    forecast: TestForecast,
     in_turn: Sequence[ExpectedTest],
     limits: Mapping[str, float],
 ) -> None:
     """InputError where the wanted uncertainties are not reached."""
-    if limits and not _reached(in_turn[-1].u if in_turn else present, limits):
+    if limits and not _reached(in_turn[-1].u if in_turn else forecast.present(), limits):
+        for name, wanted in limits.items():
+            least, limiting = forecast.limit([test.test for test in in_turn], name)
+            if limiting and least > wanted:
+                unit = forecast.unit_of(name)
+                raise InputError(
+                    f"{name} cannot become better than {unit.to_display(least):.2g} {unit.name}: "
+                    f"{' and '.join(limiting)} limit{'s' if len(limiting) == 1 else ''} it, however often is "
+                    f"measured; have {'it' if len(limiting) == 1 else 'these'} calibrated better"
+                )
         raise InputError(
             f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
             "ask for more modest uncertainties, or repeat tests in several runs"

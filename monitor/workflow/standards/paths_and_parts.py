@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,20 @@ from monitor.reporting.standard_tests import (
     NoDatum,
     NoProfile,
     OneSenseOfTurning,
+    ScaleTakenAsExact,
     followed_figure,
     part_figure,
 )
 from monitor.statistics.standards.interpolation import followed
-from monitor.statistics.standards.parts import Element, FormKind, forms, part_figures, plan_of
+from monitor.statistics.standards.parts import (
+    FROM_SCALE,
+    Element,
+    FormFigure,
+    FormKind,
+    forms,
+    part_figures,
+    plan_of,
+)
 from monitor.statistics.standards.profiles import Profile, profile_of
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import save_figure
@@ -54,10 +64,10 @@ def interpolation_answer(test: InterpolationTest, rng: np.random.Generator) -> S
 
 def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
     """Forms, orientations and places of the elements of a part."""
-    measures = list(part_figures(_elements(test), u_reading=test.u_reading, rng=rng))
+    measures = list(part_figures(_elements(test), u_reading=test.u_reading, u_scale=test.u_scale, rng=rng))
     profiles = _profiles(test)
     for name, profile in profiles.items():
-        measures += profile.figures(name, test.u_reading, rng)
+        measures += profile.figures(name, test.u_reading, test.u_scale, rng)
     figures = []
     for figure in measures:
         unit = MICRORADIAN if figure.kind is FormKind.HALF_ANGLE else MICROMETRE
@@ -70,16 +80,26 @@ def part_answer(test: PartTest, rng: np.random.Generator) -> StandardTest:
                 unit.name,
             )
         )
+    of_part = [*(feature.name for feature in test.features), *(path.name for path in test.paths)]
+    names = ", ".join(of_part or test.short)
+    notes = tuple(_notes(test, measures, profiles))
+    return StandardTest(test.setup, test.run, "part", names, MICROMETRE.name, tuple(figures), (), notes)
+
+
+def _notes(test: PartTest, measures: Sequence[FormFigure], profiles: Mapping[str, Profile]) -> Iterator[Said]:
+    """What figures are missing of a part, and what u does not hold."""
     circles = sum(feature.kind == "circle" for feature in test.features)
     coaxial = sum(figure.kind is FormKind.CONCENTRICITY for figure in measures)
     has_side = circles < len(test.features)
-    notes: tuple[Said, ...] = (NoDatum(),) if circles > 1 + coaxial and not has_side else ()
+    if circles > 1 + coaxial and not has_side:
+        yield NoDatum()
     without = tuple(path.name for path in test.paths if path.name not in profiles)
-    few = FewPoints(tuple(test.short), tuple(test.short.values()), *test.needed)
-    notes = (*notes, *((NoProfile(without),) if without else ()), *((few,) if test.short else ()))
-    of_part = [*(feature.name for feature in test.features), *(path.name for path in test.paths)]
-    names = ", ".join(of_part or test.short)
-    return StandardTest(test.setup, test.run, "part", names, MICROMETRE.name, tuple(figures), (), notes)
+    if without:
+        yield NoProfile(without)
+    if test.short:
+        yield FewPoints(tuple(test.short), tuple(test.short.values()), *test.needed)
+    if test.exact_scale and any(figure.kind in FROM_SCALE for figure in measures):
+        yield ScaleTakenAsExact(test.exact_scale)
 
 
 def _profiles(test: PartTest) -> dict[str, Profile]:

@@ -28,6 +28,7 @@ from monitor.reporting.standard_tests import (
     OneRevolution,
     OneSenseOfRotation,
     OneSideApproached,
+    ScaleTakenAsExact,
     circle_figure,
     rotation_figure,
 )
@@ -174,17 +175,19 @@ def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
         unit.name,
         figures,
         targets,
-        tuple(_lacks(evaluated)),
+        tuple(_notes(test, evaluated)),
     )
 
 
-def _lacks(evaluated: Positioning) -> Iterator[Said]:
-    """What the standard asks for and the plan does not have."""
+def _notes(test: AxisTest, evaluated: Positioning) -> Iterator[Said]:
+    """What the standard asks for and the plan does not have, and what u does not hold."""
     fewest = int(evaluated.runs.min())
     if fewest == 0:
         yield OneSideApproached()
     if fewest < USUAL_RUNS:
         yield FewRunsEachWay(fewest, USUAL_RUNS)
+    if test.exact_scale:
+        yield ScaleTakenAsExact(test.exact_scale)
 
 
 def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:

@@ -175,8 +175,9 @@ def _condition(
         inseparable.append("time")
     low, high = coefficient.interval
     per = "K" if channel == DEGREE_CELSIUS else channel.name
+    unit = series.unit if channel == ONE else f"{series.unit}/{per}"
     return ConditionEffect(
-        name, coefficient.value, coefficient.u, (low, high), f"{series.unit}/{per}", number(coefficient.p_value),
+        name, coefficient.value, coefficient.u, (low, high), unit, number(coefficient.p_value),
         len(values), float(values.min()), float(values.max()), tuple(inseparable), None,
     )  # fmt: skip
 

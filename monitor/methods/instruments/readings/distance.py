@@ -84,6 +84,13 @@ class DistanceReading(AtWorkPoint):
         return self.shown_directions == 1 and not self.holds("work_point")
 
     @property
+    def u_length(self) -> float:
+        """The standard uncertainty (mm) of its length as stated and of its scale along it; NaN where none is stated."""
+        assert self.setup.length is not None  # the reader asks for it
+        stated = 0.0 if self.holds("length") else (self.setup.length_uncertainty or np.nan)
+        return float(np.hypot(stated, self.setup.length * (self.setup.scale_uncertainty or 0.0)))
+
+    @property
     def numbers(self) -> tuple[str, ...]:
         return ("reading",)
 
