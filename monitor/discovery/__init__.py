@@ -10,7 +10,13 @@ from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes.cures import Mistake
-from monitor.discovery.machine.mistakes.mistakes import find_mistakes, find_other_names, is_far, is_gross
+from monitor.discovery.machine.mistakes.mistakes import (
+    find_mistakes,
+    find_other_names,
+    find_reading_mistakes,
+    is_far,
+    is_gross,
+)
 from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict
@@ -28,6 +34,7 @@ __all__ = [
     "explain",
     "find_mistakes",
     "find_other_names",
+    "find_reading_mistakes",
     "find_run_mistakes",
     "fit",
     "is_far",

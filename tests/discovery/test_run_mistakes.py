@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import Explanation, find_mistakes, find_run_mistakes, fit
+from monitor.discovery import Explanation, find_reading_mistakes, find_run_mistakes, fit
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
@@ -134,4 +134,4 @@ def test_nothing_is_said_of_files_that_are_right(
         problem_of = maker(found)
         first = fit(problem_of(found))
         assert not find_run_mistakes(found, problem_of, first)
-        assert not find_mistakes(found, problem_of, first)
+        assert not find_reading_mistakes(found, problem_of, first)

@@ -50,9 +50,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
         yield MIRRORED, _of_channels(_scaled(DIRECTION[1:2], -1.0))
     yield from _exchanged_axes(linear, turning)
     yield from _turned_axes(linear, turning)
-    yield from _exchanged_channels(measured)
-    for name in measured:
-        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
+    yield from reading_mistakes(campaign)
     yield from _axes_in_other_units(linear, turning)
     if directed:
         yield from _angles_of_mounts(turning)
@@ -65,6 +63,14 @@ def measured_columns(campaign: Campaign) -> list[str]:
     """The columns of what was measured, directions aside."""
     channels = campaign.probings.channels
     return [name for name in channels if name.startswith(MEASURED) and name not in DIRECTION]
+
+
+def reading_mistakes(campaign: Campaign) -> Iterator[Trial]:
+    """Exchanged columns of what was measured, and their signs."""
+    measured = measured_columns(campaign)
+    yield from _exchanged_channels(measured)
+    for name in measured:
+        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
 
 
 def unit_mistakes(measured: Sequence[str]) -> Iterator[Trial]:

@@ -7,11 +7,18 @@ of them lets the residual fall to the noise, it is reported, and nothing else is
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 
 from monitor.discovery.machine.evidence.robust import RobustFit
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.mistakes.column_mistakes import Undo, column_mistakes, direction_mistakes
+from monitor.discovery.machine.mistakes.column_mistakes import (
+    Trial,
+    column_mistakes,
+    direction_mistakes,
+    reading_mistakes,
+)
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms
 from monitor.discovery.machine.mistakes.run_mistakes import run_alone
 from monitor.discovery.machine.mistakes.target_mistakes import relabelled
@@ -40,20 +47,33 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
     ``fit`` is that of the campaign as recorded, None where it does not converge. Several are reported where data
     cannot say which it was. Empty where none of those tried is enough.
     """
-    before = float("inf") if fit is None else fit.rms
     # Quick, and what it finds no exchange of whole columns would bring to the noise.
     other_names = relabelled(campaign, problem_of, fit)
     if other_names is not None:
         return (other_names,)
-    part = _worst_run(campaign, fit)
-    cures: list[tuple[str, Undo, float]] = []
+    mistakes: tuple[Mistake, ...] = ()
     for trials in (column_mistakes, direction_mistakes):
-        if not cures:
-            cures = [
-                (what, undo, rms)
-                for what, undo in trials(campaign)
-                if (rms := cured_rms(undo(part), problem_of, before)) is not None
-            ]
+        mistakes = mistakes or _cures(campaign, problem_of, fit, trials)
+    return mistakes
+
+
+def find_reading_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit) -> tuple[Mistake, ...]:
+    """The mistakes of the columns of what was measured, as ``find_mistakes``: deviations of micrometres with another
+    sign leave no more than micrometres."""
+    return _cures(campaign, problem_of, fit, reading_mistakes)
+
+
+def _cures(
+    campaign: Campaign, problem_of: Maker, fit: Fit | None, trials: Callable[[Campaign], Iterable[Trial]]
+) -> tuple[Mistake, ...]:
+    """Those of the trials that let the residual fall to the noise: in the worst run, and in all of them."""
+    before = float("inf") if fit is None else fit.rms
+    part = _worst_run(campaign, fit)
+    cures = [
+        (what, undo, rms)
+        for what, undo in trials(campaign)
+        if (rms := cured_rms(undo(part), problem_of, before)) is not None
+    ]
     best = min((rms for *_, rms in cures), default=0.0)
     mistakes = [
         Mistake(what, before, after)
