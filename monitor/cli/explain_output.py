@@ -6,7 +6,7 @@ from monitor.cli import output, residual_output
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.cli.verbs.plan_instruments import where
-from monitor.reporting.runs_that_tell import runs_that_tell
+from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -160,8 +160,7 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     if tie.broken_by is TieBreak.INSTRUMENT:
         return f"to tell {rivals} apart, measure the same movements with another instrument"
     if tie.broken_by is TieBreak.MORE_POSES:
-        axes = " and ".join(tie.axes)
-        return f"to tell {rivals} apart, measure more poses over the whole range of {axes}, and some under another load"
+        return f"to tell {rivals} apart, measure {poses_that_tell(tie.axes, (effect, *tie.rivals))}"
     if tie.setup is not None:
         return f"no pose of this set-up tells {rivals} apart: measure a run more {IN_WORDS[tie.setup]}"
     return (

@@ -10,7 +10,14 @@ from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes.cures import Mistake
-from monitor.discovery.machine.mistakes.mistakes import find_mistakes, find_other_names, is_gross
+from monitor.discovery.machine.mistakes.mistakes import (
+    find_mistakes,
+    find_other_names,
+    find_reading_mistakes,
+    is_far,
+    is_gross,
+)
+from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict
 
@@ -27,7 +34,10 @@ __all__ = [
     "explain",
     "find_mistakes",
     "find_other_names",
+    "find_reading_mistakes",
+    "find_run_mistakes",
     "fit",
+    "is_far",
     "is_gross",
     "robust_fit",
     "version_error",

@@ -72,7 +72,8 @@ class Context:
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
-    nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone.
+    nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
+    (n,) numbers what was measured without a break, None where that is the run.
     """
 
     chain: Chain
@@ -88,9 +89,16 @@ class Context:
     expected: Array | None = None
     sight: Array | None = None
     instruments: InstrumentRows | None = None
+    stretch: npt.NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.run)
+
+    @property
+    def stretches(self) -> tuple[npt.NDArray[np.int64], ...]:
+        """The rows of each stretch without a break: before it nobody knows where the axes were."""
+        of = self.run if self.stretch is None else self.stretch
+        return tuple(np.flatnonzero(of == number) for number in np.unique(of))
 
     @property
     def places(self) -> Array:
@@ -158,9 +166,9 @@ class Context:
             turning, SMALLEST_MOVE_RAD, np.where(stops, SMALLEST_MOVE_BETWEEN_STOPS_MM, SMALLEST_MOVE_MM)
         )
         signs = np.zeros_like(places)
-        for run in np.unique(self.run):
+        for rows in self.stretches:
             ended, last = np.zeros(places.shape[1]), np.zeros(places.shape[1])
-            for row in np.flatnonzero(self.run == run):
+            for row in rows:
                 moved = np.abs(places[row] - ended) > smallest
                 last = np.where(moved, np.sign(places[row] - ended), last)
                 ended = np.where(moved, places[row], ended)
@@ -174,8 +182,7 @@ class Context:
         Zero at the first pose of a run: nobody recorded where the axes were before.
         """
         moves = np.zeros_like(self.places)
-        for run in np.unique(self.run):
-            rows = np.flatnonzero(self.run == run)
+        for rows in self.stretches:
             steps = np.diff(self.places[rows], axis=0)
             last = np.zeros(self.places.shape[1])
             for row, step in zip(rows[1:], steps, strict=True):
@@ -187,8 +194,7 @@ class Context:
     def run_order(self) -> Array:
         """From 0 at a run's first row to 1 at its last, by their order (n,)."""
         order = np.zeros(len(self))
-        for run in np.unique(self.run):
-            rows = np.flatnonzero(self.run == run)
+        for rows in self.stretches:
             order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
         return order
 

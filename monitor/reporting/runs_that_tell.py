@@ -1,4 +1,5 @@
-"""Words for the runs that tell effects apart which go with time, the order of readings, or a recorded column."""
+"""Words for what tells effects apart: runs, of those that go with time, the order of readings or a recorded column;
+poses, of those that go with where the axes stand."""
 
 from __future__ import annotations
 
@@ -26,6 +27,9 @@ OF_TIMES = {
     ),
 }
 
+#: What names of effects have that weight makes.
+OF_WEIGHT = ("gravity", "compliance", "link_weights")
+
 
 def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
     """Return which runs give one or two ``drivers`` other values, and what has to be recorded of them.
@@ -45,3 +49,10 @@ def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
     if not recorded:
         return runs
     return f"{runs}, and record {recorded[0] if len(recorded) == 1 else 'both'}"
+
+
+def poses_that_tell(axes: Sequence[str], effects: Sequence[str]) -> str:
+    """Return which poses of ``axes`` tell ``effects`` apart; of what weight bends another load does, too."""
+    poses = f"more poses over the whole range of {' and '.join(axes)}"
+    bends = any(word in effect for effect in effects for word in OF_WEIGHT)
+    return f"{poses}, and some under another load" if bends else f"{poses}, between the present ones"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from monitor.exceptions import MonitorError
 from monitor.records import SecondSetup
 from monitor.reporting.numbers import round_result, written
-from monitor.reporting.runs_that_tell import runs_that_tell
+from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
@@ -306,9 +306,7 @@ def what_breaks(tie: Tie) -> str:
         TieBreak.DRIVERS: f"measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs).replace('_', ' ')}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
-        TieBreak.MORE_POSES: (
-            f"measure more poses over the whole range of {' and '.join(tie.axes)}, and some under another load"
-        ),
+        TieBreak.MORE_POSES: f"measure {poses_that_tell(tie.axes, tie.rivals)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.SETUP: f"measure a run more {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
         TieBreak.NOTHING: (

@@ -104,7 +104,7 @@ def main() -> None:
                 if len(names) < 2 or family(hidden) not in map(family, names):
                     continue
                 counts["tied"] += 1
-                ties = ties_of(found, names[1:], is_touched=True)
+                ties = ties_of(found, names[1:], is_planned=True)
                 told = {tie.broken_by for tie in ties}
                 aimed = {
                     family(name)

@@ -34,7 +34,7 @@ def test_what_the_runs_take_up_has_to_change_within_them(virtual_campaigns) -> N
     found = SimpleNamespace(
         effect="EZC1:const@x_axis_degC", separation=Separation((), 0.0, 0.0), within_runs=True
     )
-    (tie,) = ties_of(found, ("EZC1:const@warmup",), is_touched=True)
+    (tie,) = ties_of(found, ("EZC1:const@warmup",), is_planned=True)
     assert tie.within_runs
     sentence = (
         "measure runs within which x_axis_degC and the time since the day's first run change, not together, and record "

@@ -40,6 +40,16 @@ def run(options: Namespace) -> int:
     )
     if answer.resting_rms_um is not None:
         output.say(f"targets beside the machine: RMS {output.micrometres(answer.resting_rms_um)} µm")
+    if answer.taken_over:
+        output.say(
+            f"{', '.join(answer.taken_over)}: of another size in every run, so that of {answer.campaign} says nothing "
+            f"of {answer.of}; it was taken over"
+        )
+    if answer.from_own_start:
+        output.say(
+            f"{', '.join(answer.from_own_start)}: counted from the start of {answer.of}, as in {answer.campaign}; what "
+            "went before a start is in no reading"
+        )
     rows = [
         [name, output.micrometres(part.rms_um), output.micrometres(part.largest_um), str(part.n)]
         for name, part in answer.by_target.items()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.discovery.machine.shapes.curves import Curve, curve_of
-from monitor.discovery.machine.shapes.refine import Refined
+from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_period
 from monitor.discovery.machine.surroundings import Surroundings
@@ -159,13 +160,76 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
     weak = []
     for index, part in enumerate(_parts(candidates)):
         effect = candidates[index].effect
-        size, u = _amplitude(effect, sizes.estimate[part], sizes.covariance[part, part])
+        is_small = _is_small(effect, sizes.estimate[part], sizes.covariance[part, part])
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
         peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
         cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)
-        if (u > 0 and abs(size) / u < SMALLEST_RATIO) or cancels:
+        if is_small or cancels:
             weak.append(index)
     return max(weak, key=lambda index: -findings[index].evidence.score, default=None)
+
+
+def told_apart(scene: ChainScene, result: ChainScan) -> tuple[ChainScan, list[Refined]]:
+    """The findings at their best values, without those that are one with another that follows a driver of its own.
+
+    A searched time constant widens what the sizes may be: a warm-up and an even drift of one error may each be taken
+    for the other's opposite. Of such a pair one stays, which alone explains more, and the other is its rival.
+    """
+    while True:
+        refined = refine_all(scene, result.candidates)
+        index = _one_with_another(scene, refined)
+        if index is None:
+            return result, refined
+        rest = refine_all(scene, except_for(result.candidates, index))
+        findings = [finding for number, finding in enumerate(result.findings) if number != index]
+        candidates = [each.candidate for each in rest]
+        # What was weighed beside the other is weighed without it.
+        result = replace(
+            result,
+            findings=tuple(
+                replace(finding, evidence=weigh_beside(scene, [candidate], except_for(candidates, number))[0])
+                for number, (finding, candidate) in enumerate(zip(findings, candidates, strict=True))
+            ),
+        )
+
+
+def _one_with_another(scene: ChainScene, refined: Sequence[Refined]) -> int | None:
+    """Index of a finding that is below twice its standard uncertainty beside another of the same error, and without
+    which that explains no less than it would without that; None where there is none."""
+    candidates = [each.candidate for each in refined]
+    if len(candidates) < 2:
+        return None
+    slopes = np.concatenate([each.slope for each in refined], axis=1)
+    sizes = amplitudes(scene, candidates, slopes)
+    weak = [
+        index
+        for index, part in enumerate(_parts(candidates))
+        if _is_small(candidates[index].effect, sizes.estimate[part], sizes.covariance[part, part])
+    ]
+    for first, second in combinations(weak, 2):
+        names = [candidates[index].family.partition("@") for index in (first, second)]
+        if names[0][0] == names[1][0] and all(driver for _, _, driver in names):
+            alone = [
+                _likelihood_without(scene, candidates, *pair) for pair in ((second, first), (first, second))
+            ]
+            return second if alone[0] >= alone[1] else first
+    return None
+
+
+def _is_small(effect: MachineEffect, coefficients: Array, covariance: Array) -> bool:
+    """Whether a size is below twice its standard uncertainty."""
+    size, u = _amplitude(effect, coefficients, covariance)
+    return u > 0 and abs(size) / u < SMALLEST_RATIO
+
+
+def _likelihood_without(
+    scene: ChainScene, candidates: Sequence[ChainCandidate], removed: int, kept: int
+) -> float:
+    """What the data say of one candidate at its best value without another."""
+    rest = except_for(candidates, removed)
+    index = kept - (removed < kept)
+    best = refine(scene, rest, index).candidate
+    return weigh_beside(scene, [best], except_for(rest, index))[0].likelihood
 
 
 def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) -> tuple[float, float]:

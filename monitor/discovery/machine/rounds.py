@@ -16,10 +16,11 @@ from monitor.discovery.machine.joints.robot_search import (
     MOST_EFFECTS as MOST_BESIDE_CURVES,
     search_beside_curves,
 )
+from monitor.discovery.machine.missing import told_apart
 from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
-from monitor.discovery.machine.shapes.refine import Refined, refine_all
+from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.machine.suspects.suspects import (
@@ -178,7 +179,7 @@ class _Rounds:
         if not suspects.same_as(self.initial):
             current = fit(with_effects(suspects.weighed(problem), single), out, self.first)
         scene, result = self._scan(current.with_correlation(self.correlation))
-        refined = refine_all(scene, result.candidates)
+        result, refined = told_apart(scene, result)
         effects = [finding.candidate.effect for finding in refined]
         under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
         unable = tuple(finding.candidate.family for finding in refined if finding.candidate.effect in without)

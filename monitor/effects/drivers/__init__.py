@@ -12,6 +12,7 @@ from monitor.effects.drivers.channel import Channel
 from monitor.effects.drivers.each_run import EachRun
 from monitor.effects.drivers.lagged import LaggedTemperature
 from monitor.effects.drivers.run_time import RunTime
+from monitor.effects.drivers.sequence import Sequence
 from monitor.effects.drivers.settling import Settling
 from monitor.effects.drivers.warmup import WarmUp
 from monitor.effects.registry import parse, plug_in_patterns, plug_ins
@@ -25,6 +26,7 @@ __all__ = [
     "EachRun",
     "LaggedTemperature",
     "RunTime",
+    "Sequence",
     "Settling",
     "SettlingDriver",
     "WarmUp",

@@ -120,8 +120,7 @@ def way_since_reversal(context: Context, joint: int) -> Array:
     """The way (n,) that an axis went since it last reversed, from zero at the begin of every run."""
     way = np.zeros(len(context))
     position, direction = context.places[:, joint], context.travel[:, joint]
-    for run in np.unique(context.run):
-        rows = np.flatnonzero(context.run == run)
+    for rows in context.stretches:
         steps = np.abs(np.diff(position[rows], prepend=0.0))
         reversals = np.concatenate([[True], np.diff(direction[rows]) != 0.0])
         total = np.cumsum(steps)

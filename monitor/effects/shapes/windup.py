@@ -65,9 +65,8 @@ def wound_up(context: Context, joint: int, width: float) -> Array:
     half = width / 2.0
     ahead = np.zeros(len(context))
     position = context.places[:, joint]
-    for run in np.unique(context.run):
+    for rows in context.stretches:
         dragged = 0.0
-        rows = np.flatnonzero(context.run == run)
         for row, at in zip(rows.tolist(), position[rows].tolist(), strict=True):
             dragged = min(max(dragged, at - half), at + half)
             ahead[row] = (at - dragged) / half

@@ -16,6 +16,9 @@ from monitor.discovery import (
     explain as search,
     find_mistakes,
     find_other_names,
+    find_reading_mistakes,
+    find_run_mistakes,
+    is_far,
     is_gross,
     robust_fit,
 )
@@ -67,8 +70,12 @@ def explanation_of(
         return machine_problem(changed, model)
 
     mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
+    if not mistakes:
+        mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes and is_gross(campaign, first):
         mistakes = find_mistakes(campaign, maker, first)
+    elif not mistakes and is_far(first):
+        mistakes = find_reading_mistakes(campaign, maker, first)
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING

@@ -13,6 +13,7 @@ from monitor.discovery.machine.suspects.steps import Step
 from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
 from monitor.machine import Chain
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.touch import TouchProblem
 from monitor.records import FrameKind, FrameOfReference, Verdict
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
@@ -120,7 +121,12 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
     )
 
 
-def _machine_missing(effect: ChainMissing, chain: Chain, *, is_touched: bool) -> MachineMissing:
+def has_plan_of_pairs(problem: ChainProblem) -> bool:
+    """Whether `monitor plan --separate` selects poses for a pair of effects: it does of balls that are touched."""
+    return isinstance(problem, TouchProblem)
+
+
+def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) -> MachineMissing:
     unit, um = effect.unit or effect.units[0], MICROMETRE.to_display
     return MachineMissing(
         rank=effect.rank,
@@ -158,7 +164,7 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_touched: bool) ->
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
-        ties=ties_of(effect, rivals(effect), is_touched=is_touched),
+        ties=ties_of(effect, rivals(effect), is_planned=is_planned),
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
     )
 
@@ -253,9 +259,8 @@ def _undecided(explanation: Explanation) -> tuple[str, ...]:
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
-    is_touched = problem.touches_centres or problem.touch_normals is not None
     missing = tuple(
-        _machine_missing(effect, problem.context.chain, is_touched=is_touched)
+        _machine_missing(effect, problem.context.chain, is_planned=has_plan_of_pairs(problem))
         for effect in explanation.missing
     )
     comparison = machine_comparison(explanation.comparison, problem)

@@ -31,7 +31,7 @@ class TieBreak(Enum):
     INDEXATIONS = "indexations"
     #: Poses that `monitor plan --separate` selects for one pair.
     PLAN = "plan"
-    #: More poses over the whole range of ``axes``, or another load: what is seen from outside has no plan of touches.
+    #: More poses over the whole range of ``axes``, of what gives way another load: the method has no plan for pairs.
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
     INSTRUMENT = "instrument"
@@ -56,9 +56,9 @@ class Tie:
     setup: SecondSetup | None = field(default=None, metadata=OMITTED)
 
 
-def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) -> tuple[Tie, ...]:
-    """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_touched`` says that touches
-    are planned, and are not poses that something outside sees."""
+def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) -> tuple[Tie, ...]:
+    """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_planned`` says that
+    `monitor plan --separate` selects poses for the campaign."""
     actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None], list[str]] = {}
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
@@ -67,7 +67,7 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) ->
             kind = TieBreak.SETUP
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
-        if kind is TieBreak.PLAN and not is_touched:
+        if kind is TieBreak.PLAN and not is_planned:
             kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
         actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(

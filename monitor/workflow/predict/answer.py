@@ -24,7 +24,9 @@ class PredictAnswer:
 
     ``rms_um`` is that of targets that the machine moves, ``resting_rms_um`` that of those beside it (None without
     any), ``fitted_rms_um`` that of the rows of the fit. ``blocks`` parts were left out in turn, 1
-    where the rows are another campaign's; ``components`` names the numbers of a row.
+    where the rows are another campaign's; ``components`` names the numbers of a row. Of another campaign's run nobody
+    knows the size of the effects ``taken_over`` from the run of the fit, which differ from run to run, nor what those
+    ``from_own_start``, which count from its first reading, had come to before.
     """
 
     campaign: str
@@ -38,3 +40,5 @@ class PredictAnswer:
     components: tuple[str, ...]
     by_target: Mapping[str, MachinePart]
     rows: tuple[PredictedRow, ...]
+    taken_over: tuple[str, ...] = ()
+    from_own_start: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.evidence.held_out import poses_of
+from monitor.effects.drivers import EachRun, RunTime, Sequence, SettlingDriver
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array, Campaign, CurveCampaign, Probings
@@ -23,6 +24,8 @@ from monitor.workflow.predict.request import PredictRequest
 
 # Blocks of neighbouring poses, which share drifts, are dealt out to so many parts at random, always in the same way.
 PARTS, BLOCKS, DEAL = 10, 50, 20260302
+#: Drivers that begin at nothing with every run or day.
+FROM_START = (RunTime, Sequence, SettlingDriver)
 
 
 def predict(db: Database, request: PredictRequest) -> PredictAnswer:
@@ -37,13 +40,18 @@ def predict(db: Database, request: PredictRequest) -> PredictAnswer:
         return _by_parts(campaign, model)
     other = _machine_campaign(db, request.of)
     joined, rows = beside(campaign, other)
-    fitted = fit(machine_problem(joined, model), rows)
-    residual = fitted.vectors[rows]
-    problem = fitted.problem
-    answer = _answer(campaign, model, problem, rows, residual)
+    problem = _of_one_set_up(machine_problem(joined, model))
+    fitted = fit(problem, rows)
+    answer = _answer(campaign, model, problem, rows, fitted.vectors[rows])
     # The joined rows are numbered on; a reader looks for those of the other file.
-    sequences = _numbered_as(answer.rows, other)
-    return replace(answer, of=other.name, blocks=1, fitted_rms_um=_rms(fitted, ~rows), rows=sequences)
+    return replace(
+        answer,
+        of=other.name,
+        fitted_rms_um=_rms(fitted, ~rows),
+        rows=_numbered_as(answer.rows, other),
+        taken_over=_driven_by(problem, (EachRun,)),
+        from_own_start=_driven_by(problem, FROM_START),
+    )
 
 
 def _machine_campaign(db: Database, name: str) -> Campaign:
@@ -56,7 +64,8 @@ def _machine_campaign(db: Database, name: str) -> Campaign:
 
 
 def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[np.bool_]]:
-    """The campaign with the rows of another one of the same set-up behind its own, and marks (n,) of these.
+    """The campaign with the run of another one of the same set-up behind its own, and marks (n,) of the rows of that
+    one. It is on a day of its own, so that its times count from its own start.
 
     Raises DataError where they are not of one run each, or not of the same machine and targets.
     """
@@ -78,11 +87,13 @@ def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[n
             f"{other.name} measured {', '.join(unknown)}, whose place {campaign.name} does not determine; it has "
             f"{', '.join(sorted(set(probings.target.tolist())))}"
         )
+    (run,), (later,) = campaign.runs, other.runs
+    behind = replace(later, run=run.run + 1, day=run.day + 1)
     count = len(more)
     joined = Probings(
-        run=np.concatenate([probings.run, np.full(count, probings.run[0])]),
+        run=np.concatenate([probings.run, np.full(count, behind.run)]),
         sequence=np.concatenate([probings.sequence, int(probings.sequence.max()) + 1 + np.arange(count)]),
-        time=np.concatenate([probings.time, float(probings.time.max()) + more.time]),
+        time=np.concatenate([probings.time, more.time]),
         target=np.concatenate([probings.target, more.target]),
         readings={
             axis: np.concatenate([values, more.readings[axis]]) for axis, values in probings.readings.items()
@@ -93,7 +104,22 @@ def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[n
             if name in more.channels
         },
     )
-    return replace(campaign, probings=joined), np.arange(len(joined)) >= len(probings)
+    return replace(campaign, runs=(run, behind), probings=joined), joined.run == behind.run
+
+
+def _of_one_set_up(problem: ChainProblem) -> ChainProblem:
+    """The problem of two runs as one of a single run, with one frame and one place of every target; times and
+    conditions stay those of each, and nothing goes on from the one to the other."""
+    context = problem.context
+    apart = replace(problem, context=replace(context, stretch=context.run))
+    return apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0]))
+
+
+def _driven_by(problem: ChainProblem, drivers: tuple[type, ...]) -> tuple[str, ...]:
+    """The added effects that follow one of the drivers."""
+    return tuple(
+        effect.text for effect in problem.added if isinstance(getattr(effect, "driver", None), drivers)
+    )
 
 
 def _by_parts(campaign: Campaign, model: StoredModel) -> PredictAnswer:

@@ -13,7 +13,7 @@ from monitor.records import Array, Campaign
 
 #: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
 MOST_TARGETS = 12
-MEASURED = ("tracker_", "plane_", "paraboloid_")
+MEASURED = ("tracker_", "plane_", "paraboloid_", "point_", "dx_um", "dy_um", "dz_um", "reading_")
 DIRECTION = ("direction_x", "direction_y", "direction_z")
 #: What a left-handed frame of the directions is, where they are mapped and where they are written.
 MIRRORED = (
@@ -23,6 +23,12 @@ MIRRORED = (
 #: Columns of a sensor of two spots, and the columns of its spots.
 SPOTS = (("plane_u_um", "plane_v_um"), ("paraboloid_u_um", "paraboloid_v_um"))
 ACROSS = (("plane_u_um", "paraboloid_u_um"), ("plane_v_um", "paraboloid_v_um"))
+
+#: Units that deviations are written in, by the ending of the column, and how much of its unit each is.
+IN_UNITS = {
+    "_um": {"mm": 1e3, "nm": 1e-3, "thousandths of an inch": 25.4, "inches": 25.4e3},
+    "_urad": {"mrad": 1e3, "nrad": 1e-3, "arc seconds": 1e6 * np.pi / 648e3, "degrees": 1e6 * np.pi / 180.0},
+}
 
 #: A campaign with a mistake undone.
 Undo = Callable[[Campaign], Campaign]
@@ -37,24 +43,43 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
     machine, readings = campaign.machine, campaign.probings.readings
     linear = [axis for axis in readings if machine.is_linear(axis)]
     turning = [axis for axis in readings if not machine.is_linear(axis) and np.ptp(readings[axis]) > 0]
-    measured = [
-        name for name in campaign.probings.channels if name.startswith(MEASURED) and name not in DIRECTION
-    ]
+    measured = measured_columns(campaign)
     directed = DIRECTION[0] in campaign.probings.channels
     if directed:
         # Any of the three columns will do: the frame of what is seen turns as it likes.
         yield MIRRORED, _of_channels(_scaled(DIRECTION[1:2], -1.0))
     yield from _exchanged_axes(linear, turning)
     yield from _turned_axes(linear, turning)
-    yield from _exchanged_channels(measured)
-    for name in measured:
-        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
+    yield from reading_mistakes(campaign)
     yield from _axes_in_other_units(linear, turning)
     if directed:
         yield from _angles_of_mounts(turning)
     if measured and measured[0].startswith("tracker_"):
         yield f"{', '.join(measured)} were in metres", _of_channels(_scaled(measured, 1e3))
     yield from _exchanged_targets(campaign)
+
+
+def measured_columns(campaign: Campaign) -> list[str]:
+    """The columns of what was measured, directions aside."""
+    channels = campaign.probings.channels
+    return [name for name in channels if name.startswith(MEASURED) and name not in DIRECTION]
+
+
+def reading_mistakes(campaign: Campaign) -> Iterator[Trial]:
+    """Exchanged columns of what was measured, and their signs."""
+    measured = measured_columns(campaign)
+    yield from _exchanged_channels(measured)
+    for name in measured:
+        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
+
+
+def unit_mistakes(measured: Sequence[str]) -> Iterator[Trial]:
+    """Deviations in another unit than their columns say."""
+    for ending, units in IN_UNITS.items():
+        columns = [name for name in measured if name.endswith(ending)]
+        for unit, factor in units.items() if columns else ():
+            verb = "was" if len(columns) == 1 else "were"
+            yield f"{', '.join(columns)} {verb} in {unit}", _of_channels(_scaled(columns, factor))
 
 
 def direction_mistakes(campaign: Campaign) -> Iterator[Trial]:

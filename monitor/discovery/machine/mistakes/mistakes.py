@@ -7,25 +7,38 @@ of them lets the residual fall to the noise, it is reported, and nothing else is
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from monitor.discovery.machine.evidence.robust import RobustFit
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.mistakes.column_mistakes import Undo, column_mistakes, direction_mistakes
+from monitor.discovery.machine.mistakes.column_mistakes import (
+    Trial,
+    column_mistakes,
+    direction_mistakes,
+    reading_mistakes,
+)
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms
+from monitor.discovery.machine.mistakes.run_mistakes import run_alone
 from monitor.discovery.machine.mistakes.target_mistakes import relabelled
 from monitor.methods import campaign_method
 from monitor.records import Campaign
 
 #: So many mm are left by no effect that a search should begin with, whatever the stated standard uncertainty.
 GROSS_MM = 0.3
+#: A statement is seldom wrong by a factor of three; a column with the other sign leaves more.
+FAR_TIMES = 3.0
 
 
 def is_gross(campaign: Campaign, fit: Fit) -> bool:
     """Whether a residual is beyond what effects of a machine leave."""
     return fit.rms > campaign_method(campaign).gross_times * fit.sigma or fit.rms > GROSS_MM
+
+
+def is_far(fit: Fit) -> bool:
+    """Whether a residual is so far beyond what is stated that a wrong column may be why, as well as an effect."""
+    return fit.rms > FAR_TIMES * fit.sigma
 
 
 def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tuple[Mistake, ...]:
@@ -34,20 +47,33 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
     ``fit`` is that of the campaign as recorded, None where it does not converge. Several are reported where data
     cannot say which it was. Empty where none of those tried is enough.
     """
-    before = float("inf") if fit is None else fit.rms
     # Quick, and what it finds no exchange of whole columns would bring to the noise.
     other_names = relabelled(campaign, problem_of, fit)
     if other_names is not None:
         return (other_names,)
-    part = _worst_run(campaign, fit)
-    cures: list[tuple[str, Undo, float]] = []
+    mistakes: tuple[Mistake, ...] = ()
     for trials in (column_mistakes, direction_mistakes):
-        if not cures:
-            cures = [
-                (what, undo, rms)
-                for what, undo in trials(campaign)
-                if (rms := cured_rms(undo(part), problem_of, before)) is not None
-            ]
+        mistakes = mistakes or _cures(campaign, problem_of, fit, trials)
+    return mistakes
+
+
+def find_reading_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit) -> tuple[Mistake, ...]:
+    """The mistakes of the columns of what was measured, as ``find_mistakes``: deviations of micrometres with another
+    sign leave no more than micrometres."""
+    return _cures(campaign, problem_of, fit, reading_mistakes)
+
+
+def _cures(
+    campaign: Campaign, problem_of: Maker, fit: Fit | None, trials: Callable[[Campaign], Iterable[Trial]]
+) -> tuple[Mistake, ...]:
+    """Those of the trials that let the residual fall to the noise: in the worst run, and in all of them."""
+    before = float("inf") if fit is None else fit.rms
+    part = _worst_run(campaign, fit)
+    cures = [
+        (what, undo, rms)
+        for what, undo in trials(campaign)
+        if (rms := cured_rms(undo(part), problem_of, before)) is not None
+    ]
     best = min((rms for *_, rms in cures), default=0.0)
     mistakes = [
         Mistake(what, before, after)
@@ -71,20 +97,9 @@ def find_other_names(campaign: Campaign, problem_of: Maker, first: RobustFit) ->
 
 def _worst_run(campaign: Campaign, fit: Fit | None) -> Campaign:
     """The run that is fitted worst, and of very many poses some, spread over the run."""
-    probings = campaign.probings
-    worst = probings.run[0]
+    worst = int(campaign.probings.run[0])
     if fit is not None:
         squares, run = np.sum(fit.vectors**2, axis=1), fit.problem.context.run
-        runs = np.unique(probings.run)
-        worst = runs[int(np.argmax([squares[run == number].mean() for number in runs]))]
-    rows = np.flatnonzero(probings.run == worst)
-    most_rows = campaign_method(campaign).trial_rows
-    if most_rows is not None and len(rows) > most_rows:
-        joints = np.column_stack(list(probings.readings.values()))[rows]
-        _, pose = np.unique(joints, axis=0, return_inverse=True)
-        pose = pose.reshape(-1)
-        step = int(np.ceil(len(rows) / most_rows))
-        rows = rows[pose % step == 0]
-    return replace(
-        campaign, runs=tuple(run for run in campaign.runs if run.run == worst), probings=probings.rows(rows)
-    )
+        runs = np.unique(run)
+        worst = int(runs[int(np.argmax([squares[run == number].mean() for number in runs]))])
+    return run_alone(campaign, worst)

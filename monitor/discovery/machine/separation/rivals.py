@@ -22,7 +22,8 @@ from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
-from monitor.effects import ChainEffect
+from monitor.effects import ChainEffect, with_time_constant
+from monitor.effects.drivers import SettlingDriver
 from monitor.effects.shapes import Cyclic, Harmonic
 from monitor.effects.shapes.free import Free
 from monitor.machine import COMPONENTS, MOTION
@@ -75,7 +76,8 @@ class RivalSearch:
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))
         driven = scene_of(self.scene.fit, variants).candidates
-        return pool + [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
+        pool += [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
+        return [*pool, *scene_of(self.scene.fit, _below_grid(candidate.effect, pool)).candidates]
 
     def _at_best_value(self, index: int, evidence: Evidence[ChainCandidate]) -> Evidence[ChainCandidate]:
         """Evidence for a rival of the effect at an index with its searched value at its best."""
@@ -101,6 +103,25 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
         if index != effect.term.component
     ]
     return [Variant(other.text, other) for other in others]
+
+
+def _below_grid(effect: MachineEffect, pool: Sequence[ChainCandidate]) -> list[ChainVariant]:
+    """Rivals with the time constant of an effect where that is shorter than any of the grid, on which they lose far
+    more than between two values of it."""
+    driver = effect.driver
+    if not isinstance(driver, SettlingDriver) or driver.time_constant_s is None:
+        return []
+    shortest: dict[str, tuple[float, ChainVariant]] = {}
+    for rival in pool:
+        other = rival.effect.driver
+        if isinstance(other, SettlingDriver) and other.time_constant_s is not None:
+            pair = (other.time_constant_s, rival.variant)
+            shortest[rival.family] = min(shortest.get(rival.family, pair), pair, key=lambda each: each[0])
+    return [
+        replace(variant, effect=with_time_constant(variant.effect, driver.time_constant_s))
+        for time_constant_s, variant in shortest.values()
+        if driver.time_constant_s < time_constant_s
+    ]
 
 
 def _same_cycle(rival: ChainCandidate, candidate: ChainCandidate) -> bool:

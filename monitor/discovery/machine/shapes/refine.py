@@ -33,6 +33,9 @@ STEP = 1e-3
 LIMIT = 3.84
 # Values that are tried for a limit differ by this factor.
 LIMIT_FACTOR = 2.0**0.25
+# So often it goes on below the grid, to a 250th of its shortest; an optimum as near to an end, as a part of the range,
+# is that end.
+MOST_BELOW_GRID, AT_END = 8, 0.02
 # A warm-up has settled after so few readings that no data show how.
 SETTLED_READINGS = 1.0
 
@@ -151,14 +154,7 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
         (evidence,) = weigh([trial], scene.residual, others, scene.degrees_of_freedom)
         return -evidence.explained
 
-    start = np.log(searched.start)
-    best = scipy.optimize.minimize_scalar(
-        badness,
-        bounds=(start - searched.width, start + searched.width),
-        method="bounded",
-        options={"xatol": searched.tolerance, "maxiter": 30},
-    )
-    value = float(np.exp(best.x))
+    value = float(np.exp(_best_logarithm(badness, searched)))
     refined = at(value)
     estimate = amplitudes(scene, [refined]).estimate
     high, low = at(value * (1.0 + STEP)), at(value * (1.0 - STEP))
@@ -173,6 +169,24 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if searched.unit == "min" and counts_readings(scene.fit.problem.context):
         return Refined(refined, None, slope)
     return Refined(refined, Searched(searched.name, value, u if u < value else None, searched.unit), slope)
+
+
+def _best_logarithm(badness: Callable[[float], float], searched: _Range) -> float:
+    """The logarithm of the best value between the neighbours on the grid. Below the grid's shortest time constant there
+    is no neighbour: it goes on by that factor as long as shorter ones are better."""
+    middle = float(np.log(searched.start))
+    for _ in range(MOST_BELOW_GRID if searched.unit == "min" else 1):
+        low = middle - searched.width
+        best = scipy.optimize.minimize_scalar(
+            badness,
+            bounds=(low, middle + searched.width),
+            method="bounded",
+            options={"xatol": searched.tolerance, "maxiter": 30},
+        )
+        middle = float(best.x)
+        if middle - low > AT_END * searched.width:
+            break
+    return middle
 
 
 def _with_limit(
