@@ -75,6 +75,11 @@ def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
     return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))
 
 
+def of_single_touches() -> tuple[str, ...]:
+    """Return the effects of the probe, for methods whose rows are single touches along a normal."""
+    return tuple(f"probe:lobing{lobes}" for lobes in (2, 3))
+
+
 def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     """Return what grows beyond the last axis of the tool where no spindle stands in the chain: a shift of the tool."""
     if not chain.tool or chain.of_kind("spindle"):
