@@ -43,9 +43,12 @@ class ProbeLobing(BuiltIn):
 
     def shifts(self, context: Context) -> Array:
         normals = normals_of(context, self.text)
-        seen = _from_tool(context, normals)
+        direction = _from_tool(context, normals)
         # The tool points along the Z of its frame at all axes zero, as the chain is described.
-        across, angle = np.hypot(seen[:, 0], seen[:, 1]), self.lobes * np.arctan2(seen[:, 1], seen[:, 0])
+        across, angle = (
+            np.hypot(direction[:, 0], direction[:, 1]),
+            self.lobes * np.arctan2(direction[:, 1], direction[:, 0]),
+        )
         lobes = across[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         shifts: Array = normals[:, :, None] * lobes[:, None, :]
         return shifts
