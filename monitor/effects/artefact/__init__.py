@@ -21,7 +21,7 @@ def parse_artefact(body: str) -> ArtefactChange:
     if change is None:
         raise EffectError(
             f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
-            "artefact:expansion@ambient_degC, stem:gravity, shape, probe:lobing2, probe:lobing3, tracker:shift@run_time "
-            "and tracker:turn@run_time"
+            "artefact:expansion@ambient_degC, stem:gravity, shape, probe:lobing2, probe:lobing3, "
+            "tracker:shift@run_time and tracker:turn@run_time"
         )
     return change
