@@ -88,6 +88,21 @@ def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
 
 
+def of_head(chain: Chain) -> tuple[str, ...]:
+    """Return the constant errors of a head: of its turning axes, and of what it carries in place of the stated tool
+    point.
+
+    No run has them of its own, because a tool point that is not known takes them up; one that is stated does not.
+    """
+    turning = [joint.name for joint in chain.tool if joint.kind == "rotary"]
+    if not turning or not chain.of_kind("linear"):
+        return ()
+    return (
+        *(f"E{component}0{name}" for name in turning for component in COMPONENTS),
+        *(f"E{axis}{chain.tool[-1].name}:const" for axis in "XYZ"),
+    )
+
+
 def of_tracker(
     chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None
 ) -> tuple[str, ...]:
