@@ -44,7 +44,7 @@ WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
 
 # Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
 # some to spare.
-GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.1, 6
+GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.5, 6
 # A wave of fewer periods over the travel, as the positions show it, is a bend.
 FEWEST_PERIODS = 2.0
 
