@@ -152,7 +152,7 @@ def test_a_plate_that_grows_is_no_screw_that_warms_up(seed: int, tmp_path: Path)
 
 
 def test_a_plate_that_lies_askew_stands_on_a_grid_still(tmp_path: Path) -> None:
-    """Was: EXX:cyclic32mm as the only finding, of which the balls show 0.75 of a wave: 0.3 mrad are 0.1 mm over them."""
+    """Was: EXX:cyclic32mm as the only finding, of which the balls show 0.75 of a wave: 0.3 mrad are 0.1 mm over it."""
     campaign = read_campaign(plate(tmp_path, 0, bow, pitch=60.0, askew=5e-4))
     context = campaign_method(campaign).problem_of(campaign).context
     assert np.ptp(np.sort(context.positions[:, context.chain.index("X")])[:7]) > 0.1
