@@ -104,17 +104,19 @@ def of_head(chain: Chain) -> tuple[str, ...]:
 
 
 def of_tracker(
-    chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None
+    chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None, runs: int = 1
 ) -> tuple[str, ...]:
     """Return effects that hundreds of poses, observed from outside, can show: of drives, gears, read-out and tracker.
 
-    ``ratios`` are gear ratios by axis, as for ``of_drives``.
+    ``ratios`` are gear ratios by axis, as for ``of_drives``; between several ``runs`` the payload may have changed.
     """
     frame = [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
     # Only reflectors beside the robot tell a base that moves from a tracker that does.
     first = chain.tool[0].name
     base = [f"E{component}0{first}@{driver}" for driver in drivers for component in COMPONENTS]
-    return (*of_drives(chain, ratios), *frame, *base)
+    turning = [joint for joint in chain.tool if joint.turns and runs > 1]
+    loads = [f"E{COMPONENTS[joint.main + 3]}{joint.name}:compliance@load_each_run" for joint in turning]
+    return (*of_drives(chain, ratios), *loads, *frame, *base)
 
 
 def of_drives(chain: Chain, ratios: Mapping[str, float] | None = None) -> tuple[str, ...]:

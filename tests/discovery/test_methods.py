@@ -91,7 +91,10 @@ def test_lobes_of_the_probe_are_no_play_of_the_machine(trial, lobes, beside):
     hidden = named(trial, beside) if beside else None
     probe = trial.lobed(lobes, 3e-3, 0.7)
     told = trial.explained(trial.rotary(np.random.default_rng(6), 3, hidden, "spheres", pre_travel=probe))
-    assert {one.effect for one in told.missing} == {f"probe:lobing{lobes}", *([beside] if beside else [])}
+    groups = trial.groups(told)
+    assert len(groups) == (2 if beside else 1)
+    # Indexed at four angles a first harmonic is a third one.
+    assert not beside or any(beside in group for group in groups)
     (found,) = (one for one in told.missing if one.effect == f"probe:lobing{lobes}")
     np.testing.assert_allclose(np.abs(found.amplitude), 3e-3, atol=4 * found.u)
 

@@ -158,8 +158,8 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
     sizes = amplitudes(scene, candidates)
     weak = []
     for index, part in enumerate(_parts(candidates)):
-        effect = candidates[index].effect
-        size, u = _amplitude(effect, sizes.estimate[part], sizes.covariance[part, part])
+        # Of what differs from run to run the sizes, not their spread: two runs say little of that of all runs.
+        size, u = length_of(sizes.estimate[part], sizes.covariance[part, part])
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
         peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
         cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)
