@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from monitor.cli import output
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.records import FrameOfReference
+from monitor.reporting import messages
 from monitor.reporting.curve_finding import correlation
 from monitor.reporting.frames import frame_words
+from monitor.workflow.history.refuted import REFUTED_P
 from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
 # A screen holds so many runs beside the names of the parameters.
@@ -41,6 +43,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         output.say(f"no number: {why}")
     _taken_up(answer)
     _as_stated(answer)
+    _refuted(answer)
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
@@ -79,6 +82,18 @@ def _as_stated(answer: IdentifyAnswer) -> None:
         output.say(
             f"tool_point_mm of {stated.name} is taken as stated: {moved} {'moves' if _is_one(stated.moved) else 'move'}"
             ", and u does not say how well it is known (state tool_point_standard_uncertainty_mm)"
+        )
+
+
+def _refuted(answer: IdentifyAnswer) -> None:
+    """That the readings refute the model, though the residuals may be within three times what is stated."""
+    if answer.lack_of_fit_p is None or answer.lack_of_fit_p >= REFUTED_P:
+        return
+    output.say(messages.model_refuted([answer.campaign], 1, answer.model, answer.lack_of_fit_p))
+    if any("scale" not in stated.moved for stated in answer.as_stated or ()):
+        output.say(
+            "a tool point that is not known to a few micrometres can be all of it where a head turns: "
+            "tool_point_standard_uncertainty_mm makes it an unknown, which takes up the head's zero as well"
         )
 
 

@@ -75,6 +75,11 @@ def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
     return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))
 
 
+def of_single_touches() -> tuple[str, ...]:
+    """Return the effects of the probe, for methods whose rows are single touches along a normal."""
+    return tuple(f"probe:lobing{lobes}" for lobes in (2, 3))
+
+
 def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     """Return what grows beyond the last axis of the tool where no spindle stands in the chain: a shift of the tool."""
     if not chain.tool or chain.of_kind("spindle"):
@@ -83,18 +88,35 @@ def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
 
 
+def of_head(chain: Chain) -> tuple[str, ...]:
+    """Return the constant errors of a head: of its turning axes, and of what it carries in place of the stated tool
+    point.
+
+    No run has them of its own, because a tool point that is not known takes them up; one that is stated does not.
+    """
+    turning = [joint.name for joint in chain.tool if joint.kind == "rotary"]
+    if not turning or not chain.of_kind("linear"):
+        return ()
+    return (
+        *(f"E{component}0{name}" for name in turning for component in COMPONENTS),
+        *(f"E{axis}{chain.tool[-1].name}:const" for axis in "XYZ"),
+    )
+
+
 def of_tracker(
-    chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None
+    chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None, runs: int = 1
 ) -> tuple[str, ...]:
     """Return effects that hundreds of poses, observed from outside, can show: of drives, gears, read-out and tracker.
 
-    ``ratios`` are gear ratios by axis, as for ``of_drives``.
+    ``ratios`` are gear ratios by axis, as for ``of_drives``; between several ``runs`` the payload may have changed.
     """
     frame = [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
     # Only reflectors beside the robot tell a base that moves from a tracker that does.
     first = chain.tool[0].name
     base = [f"E{component}0{first}@{driver}" for driver in drivers for component in COMPONENTS]
-    return (*of_drives(chain, ratios), *frame, *base)
+    turning = [joint for joint in chain.tool if joint.turns and runs > 1]
+    loads = [f"E{COMPONENTS[joint.main + 3]}{joint.name}:compliance@load_each_run" for joint in turning]
+    return (*of_drives(chain, ratios), *loads, *frame, *base)
 
 
 def of_drives(chain: Chain, ratios: Mapping[str, float] | None = None) -> tuple[str, ...]:

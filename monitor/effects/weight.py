@@ -5,6 +5,7 @@ A drive gives way in proportion to the torque about its axis, a bearing in propo
 takes the weight of everything between, wherever its centre of mass lies: for each axis further out the moments of
 the mass that it carries along the three directions of its frame. Multipliers are the torques of a unit weight, mm,
 and for ``@link_weights`` those of a unit weight 1 mm off the axis's origin.
+``@load_each_run`` is the load of ``@gravity``, of another size in every run.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.effects.context import Context
+from monitor.effects.description import OF_RUNS, ROBOTS, Explanation
 from monitor.effects.driver import DescribedDriver
+from monitor.effects.drivers.each_run import EachRun
 from monitor.effects.joint_error import JointError
 from monitor.effects.shapes.compliance import example_of
 from monitor.exceptions import EffectError
@@ -64,6 +67,26 @@ class Load(DescribedDriver):
 
 
 @dataclass(frozen=True)
+class LoadEachRun(EachRun, Load):
+    """The same torque, of another load in every run: what hangs at the flange was changed in between."""
+
+    @property
+    def phrase(self) -> str:
+        return f"{Load.phrase.fget(self)}, of another size in every run"  # type: ignore[attr-defined]
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        return Load.columns(self, context, joint) * EachRun.columns(self, context, joint)
+
+    def explanation(self, error: JointError) -> Explanation:
+        return Explanation(
+            f"another load hung at the flange in each run: {error.name} gives way by another amount",
+            "enter the payload and its centre of mass of every run in the control, and measure one payload at a time",
+            ROBOTS,
+            OF_RUNS,
+        )
+
+
+@dataclass(frozen=True)
 class LinkWeights(DescribedDriver):
     """The torques of weights fixed to the axis itself and to each one further out, each anywhere on its link.
 
@@ -107,13 +130,20 @@ class LinkWeights(DescribedDriver):
         return MILLIMETRE
 
 
+#: What a compliance answers to, by the names of the drivers.
+WEIGHTS: dict[str, type[Load | LinkWeights]] = {
+    "gravity": Load,
+    "load_each_run": LoadEachRun,
+    "link_weights": LinkWeights,
+}
+
+
 def weight_driver(effect_text: str, driver_text: str, error: JointError) -> Load | LinkWeights:
     """Return the driver that a compliance is written with. Raises EffectError for any other name."""
-    if driver_text == "gravity":
-        return Load(error)
-    if driver_text == "link_weights":
-        return LinkWeights(error)
-    raise EffectError(
-        f"'{effect_text}': a compliance answers to weights: write @gravity (a load at the flange) or @link_weights "
-        f"(the weight of every link), for example {example_of(error)}"
-    )
+    weight = WEIGHTS.get(driver_text)
+    if weight is None:
+        raise EffectError(
+            f"'{effect_text}': a compliance answers to weights: write @gravity (a load at the flange), @load_each_run "
+            f"(another load in every run) or @link_weights (the weight of every link), for example {example_of(error)}"
+        )
+    return weight(error)

@@ -10,7 +10,14 @@ from pathlib import Path
 
 from monitor.documents import INLINED, OMITTED
 from monitor.effects import ParsedEffect
-from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tool_end, of_tracker
+from monitor.effects.catalogue import (
+    catalogue,
+    drivers_of,
+    of_balls,
+    of_single_touches,
+    of_tool_end,
+    of_tracker,
+)
 from monitor.effects.curve import CurveEffect
 from monitor.effects.curve.words import describe_curve
 from monitor.effects.description import Description
@@ -93,7 +100,12 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
     assert request.topology is not None  # the request has one of the two
     chain = parse_topology(request.topology)
     base = tuple(base_effects(chain))
-    others = (*of_balls(DRIVERS), *of_tool_end(chain, DRIVERS), *of_tracker(chain, DRIVERS))
+    others = (
+        *of_balls(DRIVERS),
+        *of_single_touches(),
+        *of_tool_end(chain, DRIVERS),
+        *of_tracker(chain, DRIVERS),
+    )
     described = _described(catalogue(chain, base, DRIVERS, more=others))
     return _selected(EffectsAnswer(topology=chain.topology, base=base, effects=described), request.text)
 

@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,36 @@ ROTARY = (
 )  # fmt: skip
 
 
+def lobed(lobes: int, peak: float, phase: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Pre-travel (n,) mm of a probe along Z by the directions (n, 3) in which it touches."""
+    return lambda seen: (
+        peak * np.hypot(seen[:, 0], seen[:, 1]) * np.cos(lobes * np.arctan2(seen[:, 1], seen[:, 0]) + phase)
+    )
+
+
+#: Spheres on the table that are touched on the equator, at 45 degrees and on top.
+SPHERES = [
+    feature
+    for name, centre in {
+        "S1": (90.0, -180.0, 60.0),
+        "S2": (-30.0, -280.0, 100.0),
+        "S3": (-40.0, -110.0, 40.0),
+    }.items()
+    for feature in touches.sphere(name, centre)
+]
+
+
+PLANS: dict[str, Callable[[], list[tuple[touches.Feature, dict[str, float]]]]] = {
+    "source": touches.paper_plan,
+    "every 30 degrees": lambda: touches.every_pose(touches.block(), EVERY_30),
+    "spheres": lambda: touches.paper_plan(SPHERES),
+}
+
+
+#: Errors that lobes could be taken for, or hide.
+BESIDE_LOBES = ("ECC:harmonic1", "EXC:harmonic1", "EYY:cyclic40mm")
+
+
 def rotary(
     rng: np.random.Generator,
     runs: int,
@@ -97,13 +128,15 @@ def rotary(
     plan: str = "source",
     perfect: bool = False,
     walk: float = 0.0,
+    pre_travel: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Campaign:
-    """Runs of 154 touches (the source's plan) or of 28 points at 36 poses, with 0.7 µm of noise, as printed (0.1 µm).
+    """Runs of 154 touches (the source's plan), of three spheres at the same poses or of 28 points at 36 poses, with
+    0.7 µm of noise, as printed (0.1 µm).
 
     A ``perfect`` piece stands where it should on a steady machine: only noise tells one touch of a face from another.
     From touch to touch the tool goes astray along each axis by ``walk`` times that noise.
     """
-    poses = touches.paper_plan() if plan == "source" else touches.every_pose(touches.block(), EVERY_30)
+    poses = PLANS[plan]()
     chain, stands = read_topology(PAPER), touches.Piece() if perfect else piece(rng)
     signs = {axis.name: axis.sign for axis in chain.axes}
     motion = {
@@ -115,7 +148,7 @@ def rotary(
         errors = location(TRUTH) if perfect else location_of(rng)
         told = touches.touch(
             chain, poses, errors, rng, piece=stands, noise_mm=0.7e-3,
-            linear=hidden.linear if hidden else None, motion=motion,
+            linear=hidden.linear if hidden else None, motion=motion, pre_travel=pre_travel,
         )  # fmt: skip
         if walk:
             for axis in chain.linear:
@@ -209,10 +242,37 @@ def one_hidden(campaigns: int, first: int, plans: Sequence[str]) -> None:
             )
 
 
+def with_lobes(campaigns: int, first: int, plans: Sequence[str]) -> None:
+    """How often a probe's lobes of 2 to 4 µm are told, alone and beside an error of 8 µm."""
+    print("| plan | lobes | beside | campaigns | lobes first | lobes named | error first | also told |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    besides = (None, *(hidden for hidden in ROTARY if hidden.name in BESIDE_LOBES))
+    for plan, lobes, hidden in product(plans, (2, 3), besides):
+        right = among = error = more = 0
+        for seed in range(first, first + campaigns):
+            rng = np.random.default_rng([seed, lobes, 11])
+            probe = lobed(lobes, rng.uniform(2e-3, 4e-3), rng.uniform(0.0, 2.0 * np.pi))
+            found = groups(explained(rotary(rng, 4, hidden, plan, pre_travel=probe)))
+            expected = {f"probe:lobing{lobes}", *([hidden.name] if hidden else [])}
+            right += any(group[0] == f"probe:lobing{lobes}" for group in found)
+            among += any(f"probe:lobing{lobes}" in group for group in found)
+            error += hidden is not None and any(group[0] == hidden.name for group in found)
+            more += any(not expected & set(group) for group in found)
+            if {group[0] for group in found} != expected:
+                print(
+                    f"{plan} lobes {lobes} beside {hidden} seed {seed}: {found}", file=sys.stderr, flush=True
+                )
+        name = hidden.name if hidden else "nothing"
+        print(
+            f"| {plan} | {lobes} | {name} | {campaigns} | {right} | {among} | {error} | {more} |", flush=True
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--campaigns", type=int, default=100)
     parser.add_argument("--hidden", type=int, default=10, help="campaigns with each hidden effect")
+    parser.add_argument("--lobes", type=int, default=5, help="campaigns with each lobing")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--runs", type=int, nargs="+", default=[4, 10])
     parser.add_argument("--only", choices=NOTHING, nargs="*", default=list(NOTHING))
@@ -222,6 +282,9 @@ def main() -> None:
     if options.hidden:
         print()
         one_hidden(options.hidden, options.first, ("source", "every 30 degrees"))
+    if options.lobes:
+        print()
+        with_lobes(options.lobes, options.first, ("source", "spheres"))
 
 
 if __name__ == "__main__":

@@ -137,3 +137,14 @@ def test_the_unknowns_of_the_setups_do_the_same_and_one_error_does() -> None:
     assert _doing_the_same(("the unknowns of the setups",)) == "the unknowns of the setups do the same"
     assert _doing_the_same(("EC0AZ",)) == "EC0AZ does the same"
     assert _doing_the_same(("EC0AZ", "the unknowns of the setups")).endswith("together do the same")
+
+
+@pytest.mark.slow
+def test_identify_says_that_readings_refute_the_model(typed: Any, tmp_path: Path) -> None:
+    """The residuals are less than three times what is stated; the scatter of the runs is a tenth of them."""
+    db = tmp_path / "x.duckdb"
+    for name, refuted in (("hidden-reversal-x", True), ("nothing-hidden", False)):
+        assert typed("import", EXAMPLES / name, db=db).status == 0
+        said = typed("identify", name, db=db).out
+        assert (f"the readings of {name} refute the model samba beyond noise" in said) == refuted
+        assert "times what the stated uncertainties leave" not in said

@@ -82,6 +82,23 @@ def test_hidden_effects_of_8_um_are_found(trial, effect):
     assert effect in group
 
 
+@pytest.mark.parametrize(
+    ("lobes", "beside"),
+    [(3, None), *(pytest.param(lobes, "ECC:harmonic1", marks=pytest.mark.slow) for lobes in (2, 3))],
+)
+def test_lobes_of_the_probe_are_no_play_of_the_machine(trial, lobes, beside):
+    """An oval pre-travel was told EYY:reversal, EXX:reversal and EXX:cyclic5.0157mm (radius of ball and tip)."""
+    hidden = named(trial, beside) if beside else None
+    probe = trial.lobed(lobes, 3e-3, 0.7)
+    told = trial.explained(trial.rotary(np.random.default_rng(6), 3, hidden, "spheres", pre_travel=probe))
+    groups = trial.groups(told)
+    assert len(groups) == (2 if beside else 1)
+    # Indexed at four angles a first harmonic is a third one.
+    assert not beside or any(beside in group for group in groups)
+    (found,) = (one for one in told.missing if one.effect == f"probe:lobing{lobes}")
+    np.testing.assert_allclose(np.abs(found.amplitude), 3e-3, atol=4 * found.u)
+
+
 def test_expected_places_leave_nothing_and_are_their_own(trial):
     """What is expected holds no part of a row's residual: read there, the fit leaves nothing and expects the same."""
     campaign = trial.rotary(np.random.default_rng([4, 1]), 3)

@@ -62,6 +62,32 @@ def test_one_joint_that_gives_way(robots, tmp_path, seed):
     assert found.held_out_after < 0.022 < found.held_out_before
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("loads", [(2e-4, 6e-4), (3e-4, 3e-4)])
+def test_a_payload_that_was_changed_between_two_runs(robots, tmp_path, loads):
+    """Nothing was told: one size of both predicts either run by the other badly. Of one load it is no rival."""
+    location = robots.errors_of_robot(np.random.default_rng(60))
+    rows: list[str] = []
+    for run, load in enumerate(loads, 1):
+        hidden = robots.Hidden(compliance={"J2": load})
+        made = robots.track(np.random.default_rng([61, run]), hidden, poses=100, location=location)
+        folder = robots.write_tracked(tmp_path / f"robot-{run}", made)
+        header, *of_run = (folder / "probings.csv").read_text().splitlines()
+        rows += [f"{run}{line[1:]}" for line in of_run]
+    (folder / "probings.csv").write_text("\n".join([header, *rows]) + "\n")
+    with (folder / "runs.csv").open("a") as runs:
+        runs.write("2,2026-03-02T12:30:00+01:00,1,false,21.3\n")
+    campaign = read_campaign(folder)
+    told = explain(campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(1))
+    (found,) = told.missing
+    changed = loads[0] != loads[1]
+    assert found.effect == f"EBJ2:compliance@{'load_each_run' if changed else 'gravity'}"
+    assert not any(rival.effect == "EBJ2:compliance@load_each_run" for rival in found.rivals)
+    u = np.sqrt(np.diag(found.covariance))
+    expected = 1e-3 * np.array(loads if changed else loads[:1])
+    assert np.all(np.abs(found.coefficients - expected) < 5.0 * u)
+
+
 def test_two_at_once(robots, tmp_path):
     hidden = robots.Hidden(compliance={"J2": 3e-4}, harmonic={"J3": (1, 1.5e-4, 0.7)})
     told = explained(robots, tmp_path, 5, hidden)

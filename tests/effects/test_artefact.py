@@ -77,6 +77,32 @@ def test_without_a_work_branch_stems_do_not_turn(make: Callable[..., Context]) -
     np.testing.assert_array_equal(shifts("stem:gravity", context), np.zeros((2, 3, 2)))
 
 
+def test_lobes_of_a_probe_shift_touched_points_by_the_direction_seen_from_the_tool(
+    make: Callable[..., Context],
+) -> None:
+    """B has turned the piece by a quarter about Y: its X is the machine's -Z, its Z the machine's X. The spindle, with
+    the probe, has turned by 30 degrees: the machine's X lies at -30 and its Y at 60 degrees of the probe."""
+    columns = {"normal_x": [0.0, 0.0, 1.0], "normal_y": [0.0, 1.0, 0.0], "normal_z": [1.0, 0.0, 0.0]}
+    turned = {"B": [np.pi / 2] * 3, "C1": [np.pi / 6] * 3}
+    context = make(turned, topology="w B b X Y Z (C1) t", columns=columns)
+    three = shifts("probe:lobing3", context)
+    np.testing.assert_allclose(three[0], [[0, 0], [0, 0], [0.0, -1.0]], atol=1e-12)
+    np.testing.assert_allclose(three[1], [[0, 0], [-1.0, 0.0], [0, 0]], atol=1e-12)
+    # Along the probe nothing is across.
+    np.testing.assert_allclose(three[2], 0.0, atol=1e-12)
+    two = shifts("probe:lobing2", context)
+    np.testing.assert_allclose(two[0, 2], [0.5, -np.sqrt(0.75)], atol=1e-12)
+    assert parse_effect("probe:lobing2", context.chain).parameters(context) == (
+        "probe:lobing2.cos",
+        "probe:lobing2.sin",
+    )
+
+
+def test_lobes_need_normals(make: Callable[..., Context]) -> None:
+    with pytest.raises(EffectError, match=r"'probe:lobing2' needs the normal of the surface"):
+        shifts("probe:lobing2", make({"X": [0.0]}))
+
+
 def test_displacement_is_against_the_target(make: Callable[..., Context]) -> None:
     context = make({"X": [0.0]}, nominal=[[10.0, 0.0, 0.0]])
     basis = parse_effect("artefact:expansion", context.chain).basis(context)

@@ -76,6 +76,18 @@ def test_a_nest_drifts_in_three_directions(context: Context) -> None:
     assert not drift[:7].any()
 
 
+def test_a_plate_that_grows_does_so_for_all_its_setups(make: Callable[..., Context]) -> None:
+    """Two setups of one plate, one after the other: the second finds it grown. What is stated shows less growth."""
+    setups = (ReadBy("plate-0", "plate", "point", 2), ReadBy("plate-90", "plate", "point", 2))
+    ideal = np.array([[100.0, 0.0], [0.0, -50.0], [100.0, 0.0], [0.0, -50.0]])
+    rows = InstrumentRows(setups, np.array([0, 0, 1, 1]), ideal, np.zeros((4, 2, 3)), 1000.0)
+    context = replace(make({"X": [0.0] * 4}, run_time=[0.0, 0.2, 0.6, 1.0]), instruments=rows)
+    grown = shown("instrument:plate:expansion@run_time", context)[:, :, 0]
+    np.testing.assert_allclose(grown, [[0.0, 0.0], [0.0, 10.0], [-60.0, 0.0], [0.0, 50.0]], atol=1e-12)
+    with pytest.raises(EffectError, match=r"name what it follows: instrument:plate:expansion@run_time"):
+        shown("instrument:plate:expansion", context)
+
+
 def test_lobes_follow_the_direction_in_the_frame_of_the_tool(context: Context) -> None:
     """Each number lies along X, Y, Z of the tool in the first row; in the second X lies at -30 and Y at 60 degrees."""
     lobes = shown("instrument:nest:lobing3", context)

@@ -78,6 +78,19 @@ def test_compliance_follows_the_torque_of_a_load_at_the_flange(robots, elbow, re
         np.testing.assert_allclose(angle, 1e-6 * arms[joint.name], atol=1e-18)
 
 
+def test_a_load_of_each_run_is_the_load_of_its_rows(elbow, readings):
+    """Columns of zeros where another run was measured; the sum is the load that all runs share."""
+    now = dataclasses.replace(context(elbow, readings), run=np.repeat([1, 2], 15))
+    effect = parse_effect("EBJ2:compliance@load_each_run", elbow)
+    assert effect.parameters(now) == tuple(f"EBJ2:compliance@load_each_run.run{run}" for run in (1, 2))
+    columns = effect.basis(now).columns
+    assert not columns[15:, 0].any()
+    assert not columns[:15, 1].any()
+    shared = parse_effect("EBJ2:compliance@gravity", elbow).basis(now).columns
+    np.testing.assert_allclose(columns.sum(axis=1, keepdims=True), shared)
+    assert effect.unit.name == "µrad/m"
+
+
 def test_link_weights_hold_any_mass_anywhere(robots, elbow, readings):
     frames = importlib.import_module("simulator.robot").frames(robots.JOINTS, readings)
     rng = np.random.default_rng(2)
@@ -159,7 +172,7 @@ def test_a_gear_has_any_order(elbow, readings):
     [
         (
             "EBJ2:compliance",
-            "a compliance answers to weights: write @gravity (a load at the flange) or @link_weights",
+            "a compliance answers to weights: write @gravity (a load at the flange), @load_each_run",
         ),
         ("EBJ2:compliance@run_time", "a compliance answers to weights"),
         (

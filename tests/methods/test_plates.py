@@ -43,17 +43,29 @@ standard_uncertainty_um = 0.5
 
 
 def plate(
-    folder: Path, seed: int, error: Callable[[np.ndarray], np.ndarray], *, pitch: float = 50.0, count: int = 7
+    folder: Path,
+    seed: int,
+    error: Callable[[np.ndarray], np.ndarray],
+    *,
+    pitch: float = 50.0,
+    count: int = 7,
+    growth: float = 0.0,
+    askew: float = 0.0,
 ) -> Path:
     """Balls on a square grid, read once in serpentines, 10 to 20 µm/m of gains, 15 µrad out of square; ``error`` (n, 2)
-    mm of x (n,) mm is hidden."""
+    mm of x (n,) mm is hidden. The plate grows by ``growth`` while it is read, and lies ``askew`` (rad) on the table."""
     rng = np.random.default_rng(seed)
     i, j = np.meshgrid(np.arange(count), np.arange(count))
     i[1::2] = i[1::2, ::-1]
     x = 100.0 + pitch * i.ravel() + np.round(rng.normal(0.0, 0.002, count**2), 4)
     y = 50.0 + pitch * j.ravel() + np.round(rng.normal(0.0, 0.002, count**2), 4)
+    x, y = x - askew * (y - 200.0), y + askew * (x - 250.0)
+    middle, grown = np.array([250.0, 200.0]), growth * np.linspace(0.0, 1.0, count**2)
+    x, y = x + grown * (x - middle[0]), y + grown * (y - middle[1])
     place = np.stack([x * (1.0 + 20e-6) - 15e-6 * y, y * (1.0 - 12e-6)], axis=1) + error(x)
     place += rng.normal(0.0, 0.5e-3, place.shape)
+    # What the plate's certificate states: it has not grown.
+    place -= grown[:, None] * (place - middle)
     turn = rng.normal(0.0, 0.3)
     seen = place @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) + [12.0, -30.0]
     target = folder / f"plate-{seed}"
@@ -129,3 +141,20 @@ def test_an_axis_that_stands_still_shows_no_lead(tmp_path: Path) -> None:
     lead = Variant("EXX:cyclic12mm", parse_effect("EXX:cyclic12mm", context.chain))
     still = replace(context, positions=np.zeros_like(context.positions))
     assert [variant.odds for variant in without_aliases([lead], still, {})] == [NEVER_FOUND]
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 4))])
+def test_a_plate_that_grows_is_no_screw_that_warms_up(seed: int, tmp_path: Path) -> None:
+    """Was: EYY:poly1@run_time alone."""
+    (finding,) = missing(plate(tmp_path, seed, lambda x: np.zeros((len(x), 2)), growth=25e-6))
+    assert finding.effect == "instrument:plate:expansion@run_time"
+    assert abs(finding.amplitude - 25e-6) < 4.0 * finding.u
+
+
+def test_a_plate_that_lies_askew_stands_on_a_grid_still(tmp_path: Path) -> None:
+    """Was: EXX:cyclic32mm as the only finding, of which the balls show 0.75 of a wave: 0.3 mrad are 0.1 mm over it."""
+    campaign = read_campaign(plate(tmp_path, 0, bow, pitch=60.0, askew=5e-4))
+    context = campaign_method(campaign).problem_of(campaign).context
+    assert np.ptp(np.sort(context.positions[:, context.chain.index("X")])[:7]) > 0.1
+    lead = Variant("EXX:cyclic32mm", parse_effect("EXX:cyclic32mm", context.chain))
+    assert [variant.odds for variant in without_aliases([lead], context, {})] == [NEVER_FOUND]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from monitor.discovery import explain
 from monitor.exceptions import CampaignError, NotConvergedError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
@@ -198,3 +199,23 @@ def test_a_bar_off_the_plane_of_its_swing_has_the_derivatives_of_its_readings(tm
         np.testing.assert_allclose(
             by_local[rows.start * numbers : rows.stop * numbers : numbers, index], expected, atol=2e-3
         )
+
+
+@pytest.mark.parametrize(
+    ("off", "key", "told"),
+    [
+        ((0.0, 0.0, 0.01), "", {"EZA:const"}),
+        ((0.0, 0.0, 0.01), KEY, set()),
+        pytest.param((0.0, -0.006, 0.0), "", {"EA0A"}, marks=pytest.mark.slow),
+    ],
+)
+def test_what_a_head_carries_elsewhere_than_stated_is_a_constant(
+    tmp_path: Path, off: tuple[float, ...], key: str, told: set[str]
+) -> None:
+    """Was a free shape of the head, "bearing of A is worn": its zero and its spindle's offset were no candidates."""
+    campaign = _read(_campaign(tmp_path, 9001, np.array(off), key)[0])
+    problem = campaign_method(campaign).problem_of(campaign)
+    answer = explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
+    assert {effect.effect for effect in answer.missing} == told
+    # What free errors take up is no blind spot.
+    assert "EZ0A" not in answer.blind

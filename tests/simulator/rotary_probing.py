@@ -131,12 +131,14 @@ def touch(
     tip_radius: float = 3.0,
     linear: Callable[[np.ndarray], np.ndarray] | None = None,
     motion: Mapping[str, np.ndarray] | None = None,
+    pre_travel: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> dict[str, np.ndarray]:
     """Readings (n,) of every axis (mm, degrees) of one run. ``location`` holds (6,) X Y Z A B C of axes by name,
     ``motion`` their error motions (n, 6) at every touch, which act behind the axis's own turn.
 
     ``linear`` maps readings (n, 3) X Y Z to the shift (n, 3) mm of the tip against the work side that the errors of
-    the linear axes cause, in the machine's directions.
+    the linear axes cause, in the machine's directions. ``pre_travel`` maps outward normals (n, 3) in the machine's
+    directions to what the probe, which does not turn, travels on (n,) mm before it triggers.
     """
     piece = piece or Piece()
     count = len(plan)
@@ -184,6 +186,9 @@ def touch(
             break
     else:
         raise RuntimeError("a touch was not found")
+    if pre_travel is not None:
+        turned = branch_matrix(chain.work, readings, {}, {}, count)[:, :3, :3]
+        travel = travel - pre_travel(np.einsum("nij,nj->ni", turned, normal))
     travel = travel + noise_mm * rng.standard_normal(count)
     seen = _moved(readings, chain, commanded, approach, travel)
     return {name: np.degrees(v) if name[0] in "ABC" else v for name, v in seen.items()}

@@ -21,7 +21,7 @@ from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
-from monitor.discovery.machine.scene import ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
@@ -39,7 +39,9 @@ from monitor.discovery.machine.suspects.scatter import Scatter
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
+from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
+from monitor.effects.shapes import Const
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, Verdict
@@ -222,5 +224,14 @@ def _blind(scene: ChainScene, missing: Sequence[ChainMissing]) -> tuple[str, ...
     named = {
         name for effect in missing for name in (effect.effect, *(rival.effect for rival in effect.rivals))
     }
-    hidden = [candidate.family for candidate in scene.candidates if not candidate.detectable]
+    # A constant that leaves nothing is taken up by what is free in every run; ``taken_up`` names what does.
+    hidden = [
+        candidate.family
+        for candidate in scene.candidates
+        if not candidate.detectable and not _is_constant(candidate.effect)
+    ]
     return tuple(dict.fromkeys(family for family in hidden if family not in named))
+
+
+def _is_constant(effect: MachineEffect) -> bool:
+    return isinstance(effect, ChainEffect) and isinstance(effect.shape, Const) and not effect.driver_text

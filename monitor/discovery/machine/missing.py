@@ -159,8 +159,9 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
     sizes = amplitudes(scene, candidates)
     weak = []
     for index, part in enumerate(_parts(candidates)):
-        effect = candidates[index].effect
-        is_small = _is_small(effect, sizes.estimate[part], sizes.covariance[part, part])
+        # Of what differs from run to run the sizes, not their spread: two runs say little of that of all runs.
+        size, u = length_of(sizes.estimate[part], sizes.covariance[part, part])
+        is_small = u > 0 and abs(size) / u < SMALLEST_RATIO
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
         peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
         cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)

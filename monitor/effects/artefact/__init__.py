@@ -1,4 +1,5 @@
-"""Changes of the artefact, one a file: a ball that moved, an artefact that grows, bending stems, a tracker's drift."""
+"""Changes of the artefact, one a file: a ball that moved, an artefact that grows, bending stems, a probe's lobes, a
+tracker's drift."""
 
 from __future__ import annotations
 
@@ -7,10 +8,11 @@ from monitor.effects.artefact_change import ArtefactChange
 from monitor.effects.registry import parse
 from monitor.exceptions import EffectError
 
-__all__ = ["HEADS", "ArtefactChange", "normals_of", "parse_artefact"]
+__all__ = ["HEADS", "PROBE_HEAD", "ArtefactChange", "normals_of", "parse_artefact"]
 
 #: What the texts of these changes begin with, before a colon; no term of a chain is called so.
-HEADS = ("ball", "artefact", "stem", "shape", "tracker")
+PROBE_HEAD = "probe"
+HEADS = ("ball", "artefact", "stem", "shape", "tracker", PROBE_HEAD)
 
 
 def parse_artefact(body: str) -> ArtefactChange:
@@ -19,6 +21,7 @@ def parse_artefact(body: str) -> ArtefactChange:
     if change is None:
         raise EffectError(
             f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
-            "artefact:expansion@ambient_degC, stem:gravity, shape, tracker:shift@run_time and tracker:turn@run_time"
+            "artefact:expansion@ambient_degC, stem:gravity, shape, probe:lobing2, probe:lobing3, "
+            "tracker:shift@run_time and tracker:turn@run_time"
         )
     return change

@@ -40,19 +40,22 @@ class WorkpieceShape(BuiltIn):
         )
 
 
-def normals_of(context: Context) -> Array:
+def normals_of(context: Context, asking: str = "shape") -> Array:
     """Return unit normals (n, 3) of the surface at every probing, in the frame of the last work axis.
 
-    A component that was not recorded is zero. Raises EffectError where none was, or where one is empty.
+    A component that was not recorded is zero. Raises EffectError, for the effect that is ``asking``, where none was, or
+    where one is empty.
     """
     columns = [context.columns.get(f"normal_{axis}") for axis in "xyz"]
     if all(column is None for column in columns):
-        raise EffectError("'shape' needs the normal of the surface: the columns normal_x, normal_y, normal_z")
+        raise EffectError(
+            f"'{asking}' needs the normal of the surface: the columns normal_x, normal_y, normal_z"
+        )
     zero = np.zeros(len(context))
     normals = np.column_stack([zero if column is None else column for column in columns])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     if not np.all(length > 0.0):
-        raise EffectError("'shape' needs the normal of the surface at every probing; some have none")
+        raise EffectError(f"'{asking}' needs the normal of the surface at every probing; some have none")
     unit: Array = normals / length
     return unit
 

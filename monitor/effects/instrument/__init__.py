@@ -23,7 +23,8 @@ def parse_instrument(body: str) -> InstrumentChange:
         raise EffectError(
             f"there is no effect '{body}' of an instrument; after instrument: and the id of a setup there are "
             ":scale, :cosine and :dead_path@... (laser), :length (bar), :lobing2 and :lobing3 (probe, sphere), "
-            ":drift@... (lengths) and :tilt@... (angles), as in instrument:laser-x:scale"
+            ":expansion@... (points of a plate), :drift@... (lengths) and :tilt@... (angles), as in "
+            "instrument:laser-x:scale"
         )
     return change
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import ChainEffect, Context, Effect
-from monitor.effects.catalogue import of_balls, of_tool_end
+from monitor.effects.catalogue import of_balls, of_single_touches, of_tool_end
 from monitor.machine import ChainPose
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.sessions import Stays
@@ -226,7 +226,8 @@ class MeasuredChain(ABC):
 
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
-        return (*of_balls(drivers), *of_tool_end(self.context.chain, drivers))
+        of_probe = () if self.touch_normals is None else of_single_touches()
+        return (*of_balls(drivers), *of_probe, *of_tool_end(self.context.chain, drivers))
 
     @property
     def unsettled(self) -> str:

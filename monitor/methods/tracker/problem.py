@@ -97,7 +97,7 @@ class TrackingProblem(ChainProblem):
 
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """What poses seen from outside can show besides the errors of every chain."""
-        return of_tracker(self.context.chain, drivers, dict(self.gear_ratios))
+        return of_tracker(self.context.chain, drivers, dict(self.gear_ratios), len(self.runs))
 
     @cached_property
     def _fixed(self) -> npt.NDArray[np.bool_]:

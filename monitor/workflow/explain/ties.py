@@ -9,6 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from monitor.documents import OMITTED
+from monitor.effects.artefact import PROBE_HEAD
 from monitor.effects.instrument import HEADS as INSTRUMENT_HEADS
 from monitor.records import SecondSetup
 from monitor.workflow.plan.test_answer import TestAnswer
@@ -83,8 +84,8 @@ def _setup(effect: ChainMissing, rival: str) -> SecondSetup | None:
 
 
 def is_of_instrument(text: str) -> bool:
-    """Whether an effect is an error of an instrument."""
-    return text.partition(":")[0] in INSTRUMENT_HEADS
+    """Whether an effect is an error of an instrument, or of the probe."""
+    return text.partition(":")[0] in (*INSTRUMENT_HEADS, PROBE_HEAD)
 
 
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:

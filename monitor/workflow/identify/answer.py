@@ -108,7 +108,7 @@ class ResponseOverInputs:
 class IdentifyAnswer:
     """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
     no plan gives a number of their own, where the method names them, ``as_stated`` the stated tool points that numbers
-    count from.
+    count from; ``lack_of_fit_p`` is that of runs of one plan over their scatter, where there are several.
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
     each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
@@ -127,6 +127,7 @@ class IdentifyAnswer:
     reversal_values: Mapping[str, Estimate] | None = field(default=None, metadata=OMITTED)
     taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
     as_stated: tuple[AsStated, ...] | None = field(default=None, metadata=OMITTED)
+    lack_of_fit_p: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,8 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
             raise with_mistake(
                 refusal, measured, lambda changed: machine_problem(changed, model)
             ) from refusal
-        return Identified(machine_answer(measured.machine, identification), stored)
+        judged = None if stored.lack_of_fit is None else stored.lack_of_fit.p_value
+        return Identified(machine_answer(measured.machine, identification, judged), stored)
 
 
 def store(

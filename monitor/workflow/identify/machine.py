@@ -41,7 +41,9 @@ def identified(
     return identification, replace(_stored(campaign, identification, model), lack_of_fit=judged)
 
 
-def machine_answer(machine: Machine, identification: Identification) -> IdentifyAnswer:
+def machine_answer(
+    machine: Machine, identification: Identification, lack_of_fit_p: float | None = None
+) -> IdentifyAnswer:
     """The identification of a machine in display units, with notes."""
     added = _estimates(
         identification.added,
@@ -64,6 +66,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
         reversal_values=values or None,
         taken_up=identification.taken_up or None,
         as_stated=identification.as_stated or None,
+        lack_of_fit_p=lack_of_fit_p,
     )
 
 

@@ -35,6 +35,7 @@ from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import FEWEST, p_value_by_flips
+from monitor.effects.drivers import EachRun
 
 # Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
 BLOCK = 15
@@ -136,7 +137,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         of a bar, a beam) is what it takes the contradiction from: no reading is predicted better by that."""
         if self._is_of_statements(candidate):
             return True
-        if self._is_of_one_run(others, candidate):
+        # What has another size in every run says nothing of a run left out.
+        if isinstance(candidate.effect.driver, EachRun) or self._is_of_one_run(others, candidate):
             before, after = (
                 self.scene.held_out_error_by_poses(self.scene.columns(some))
                 for some in (others, [*others, candidate])

@@ -23,8 +23,8 @@ from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, with_time_constant
-from monitor.effects.drivers import SettlingDriver
-from monitor.effects.shapes import Cyclic, Harmonic
+from monitor.effects.drivers import EachRun, SettlingDriver
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic
 from monitor.effects.shapes.free import Free
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
@@ -125,11 +125,14 @@ def _below_grid(effect: MachineEffect, pool: Sequence[ChainCandidate]) -> list[C
 
 
 def _same_cycle(rival: ChainCandidate, candidate: ChainCandidate) -> bool:
-    """Whether a rival is the search for the pitch, or has all but the order, that a candidate has."""
+    """Whether a rival is the search for the pitch or holds the load that a candidate has, or has all but its order."""
     effect, other = candidate.effect, rival.effect
     if not isinstance(effect, ChainEffect):
         return False
     if isinstance(other, ChainEffect) and effect.term == other.term:
+        # Another load in every run holds one load in all of them.
+        if isinstance(effect.shape, Compliance) and isinstance(other.driver, EachRun):
+            return True
         orders = [part.shape.order for part in (effect, other) if isinstance(part.shape, Harmonic)]
         if len(orders) == 2 and max(orders) > 3 and abs(orders[0] - orders[1]) < ONE_ORDER:
             return True

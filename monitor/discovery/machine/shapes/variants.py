@@ -44,7 +44,7 @@ WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
 
 # Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
 # some to spare.
-GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.1, 6
+GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.5, 6
 # A wave of fewer periods over the travel, as the positions show it, is a bend.
 FEWEST_PERIODS = 2.0
 
@@ -141,7 +141,9 @@ def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     odds = 1.0
     if isinstance(effect, ChainEffect) and isinstance(effect.shape, Compliance):
         # A drive gives way before a bearing does, and one load is simpler than the weight of every link.
-        simple = isinstance(effect.driver, Load) and effect.term.component == 3 + effect.joint.main
+        # A load that changes with the run is the last thing to think of.
+        one_load = isinstance(effect.driver, Load) and not isinstance(effect.driver, EachRun)
+        simple = one_load and effect.term.component == 3 + effect.joint.main
         odds = 1.0 if simple else ODDS_OF_A_DRIVER
     if isinstance(effect, ChainEffect) and isinstance(effect.shape, Poly) and effect.shape.order > 2:
         odds = ODDS_OF_A_CUBE
