@@ -5,8 +5,8 @@ from __future__ import annotations
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.l_shape_file import read_l_shape
-from monitor.readers.scale_key import read_scale_uncertainty
 from monitor.readers.self_calibration_file import read_self_calibration
+from monitor.readers.setups.scale_key import read_scale_uncertainty
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Ball, Probe, Reflector, ScaleBar
 from monitor.units import MICROMETRE

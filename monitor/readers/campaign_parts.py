@@ -15,7 +15,7 @@ from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import method_rules
-from monitor.readers.setups_file import probe_of, read_setups
+from monitor.readers.setups.file import probe_of, read_setups
 from monitor.readers.sources_file import read_sources
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Campaign, Probe, SourceFile

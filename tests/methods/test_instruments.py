@@ -24,7 +24,7 @@ from monitor.methods.chain.problem import solve_problem
 from monitor.methods.instruments.readings import readings
 from monitor.methods.model import Model
 from monitor.readers import read_campaign, write_campaign
-from monitor.readers.setups_file import FORMATS
+from monitor.readers.setups.file import FORMATS
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.identify.identify import identify

@@ -22,7 +22,7 @@ from monitor.readers.mapping.mapping_file import FILE, Entry, ExportMapping, rea
 from monitor.readers.mapping.pointing import DIRECTION
 from monitor.readers.mapping.rows import TARGET, TIME, Rows, Wanted, joined, rows_of
 from monitor.readers.mapping.understood import UnderstoodFile, columns_of
-from monitor.readers.setups_file import FORMATS
+from monitor.readers.setups.file import FORMATS
 from monitor.readers.toml_table import parse_toml
 from monitor.records import Campaign, Setup, SourceFile
 

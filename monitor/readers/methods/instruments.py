@@ -11,7 +11,7 @@ from monitor.exceptions import Fault
 from monitor.readers.faults import quoted
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.probings_file import SETUP
-from monitor.readers.setups_file import FORMATS, QUATERNION, ReadingFormat
+from monitor.readers.setups.file import FORMATS, QUATERNION, ReadingFormat
 from monitor.records import Array, Setup
 from monitor.units import CONDITION_SUFFIXES
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from monitor.readers.faults import quoted
-from monitor.readers.scale_key import SCALE_UNCERTAINTY
+from monitor.readers.setups.scale_key import SCALE_UNCERTAINTY
 from monitor.readers.toml_table import Table
 from monitor.records import Setup
 

@@ -13,8 +13,8 @@ from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
-from monitor.readers.scale_key import SCALE_UNCERTAINTY, read_scale_uncertainty
-from monitor.readers.setups_agreement import DIRECTION, LENGTH, check_agreement, check_one_statement
+from monitor.readers.setups.agreement import DIRECTION, LENGTH, check_agreement, check_one_statement
+from monitor.readers.setups.scale_key import SCALE_UNCERTAINTY, read_scale_uncertainty
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
 from monitor.units import METRE, MICROMETRE, MICRORADIAN

@@ -1,0 +1,1 @@
+"""The setups of a campaign of instruments: what each states, and that they agree."""
