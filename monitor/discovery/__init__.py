@@ -18,6 +18,7 @@ from monitor.discovery.machine.mistakes.mistakes import (
     is_gross,
 )
 from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
+from monitor.discovery.machine.mistakes.setup_mistakes import find_setup_mistakes
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict
 
@@ -36,6 +37,7 @@ __all__ = [
     "find_other_names",
     "find_reading_mistakes",
     "find_run_mistakes",
+    "find_setup_mistakes",
     "fit",
     "is_far",
     "is_gross",

@@ -224,11 +224,11 @@ def _is_small(effect: MachineEffect, coefficients: Array, covariance: Array) -> 
 
 
 def _likelihood_without(
-    scene: ChainScene, candidates: Sequence[ChainCandidate], removed: int, remaining: int
+    scene: ChainScene, candidates: Sequence[ChainCandidate], without: int, remaining: int
 ) -> float:
     """What the data say of one candidate at its best value without another."""
-    rest = except_for(candidates, removed)
-    index = remaining - (removed < remaining)
+    rest = except_for(candidates, without)
+    index = remaining - (without < remaining)
     best = refine(scene, rest, index).candidate
     return weigh_beside(scene, [best], except_for(rest, index))[0].likelihood
 

@@ -18,6 +18,7 @@ from monitor.discovery import (
     find_other_names,
     find_reading_mistakes,
     find_run_mistakes,
+    find_setup_mistakes,
     is_far,
     is_gross,
     robust_fit,
@@ -72,6 +73,8 @@ def explanation_of(
     mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes:
         mistakes = find_run_mistakes(campaign, maker, first)
+    if not mistakes:
+        mistakes = find_setup_mistakes(campaign, maker, first)
     if not mistakes and is_gross(campaign, first):
         mistakes = find_mistakes(campaign, maker, first)
     elif not mistakes and is_far(first):

@@ -49,7 +49,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
         # Any of the three columns will do: the frame of what is seen turns as it likes.
         yield MIRRORED, _of_channels(_scaled(DIRECTION[1:2], -1.0))
     yield from _exchanged_axes(linear, turning)
-    yield from _turned_axes(linear, turning)
+    yield from turned_axes(linear, turning)
     yield from reading_mistakes(campaign)
     yield from _axes_in_other_units(linear, turning)
     if directed:
@@ -107,7 +107,8 @@ def _exchanged_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[T
             yield f"{columns} were exchanged", _of_readings(_exchanged([(first, second)]))
 
 
-def _turned_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+def turned_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+    """Axes whose sign was the other way round."""
     for axis in turning:
         hint = f" (`sign` of {axis} in campaign.toml)"
         yield f"the sign of {axis} were the other way round{hint}", _of_readings(_scaled((axis,), -1.0))
