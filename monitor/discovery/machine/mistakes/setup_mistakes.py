@@ -28,8 +28,8 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
     fewer than three setups, or where no mistake of the one that contradicts the others brings all to agreement.
     """
     setups = [str(name) for name in np.unique(campaign.probings.target)]
-    known = {setup.id for setup in campaign.artefact.setups}
-    if len(setups) < 3 or not known.issuperset(setups) or _agrees(first):
+    described = {setup.id for setup in campaign.artefact.setups}
+    if len(setups) < 3 or not described.issuperset(setups) or _agrees(first):
         return ()
     cures = [
         cure
@@ -58,18 +58,22 @@ def _agree_without(campaign: Campaign, problem_of: Maker, setup: str) -> bool:
     return fit is not None and _agrees(fit)
 
 
-def _cures(campaign: Campaign, problem_of: Maker, first: Fit, setup: str) -> Iterator[Mistake]:
-    """The mistakes of a setup with which undone everything agrees."""
+def _cures(campaign: Campaign, problem_of: Maker, first: Fit, setup: str) -> list[Mistake]:
+    """The mistakes of a setup with which undone everything agrees; signs of axes where none of its readings is one."""
     mask = campaign.probings.target == setup
     part = replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
-    for what, undo in _trials(part):
-        fit = fitted(_with_rows(campaign, mask, undo(part).probings), problem_of)
-        if fit is not None and _agrees(fit):
-            yield Mistake(f"{what.split(' (`')[0]} in setup {setup}", first.rms, fit.rms)
+    for trials in (reading_mistakes(part), _turned_axes(part)):
+        cures = []
+        for what, undo in trials:
+            fit = fitted(_with_rows(campaign, mask, undo(part).probings), problem_of)
+            if fit is not None and _agrees(fit):
+                cures.append(Mistake(f"{what.split(' (`')[0]} in setup {setup}", first.rms, fit.rms))
+        if cures:
+            return cures
+    return []
 
 
-def _trials(part: Campaign) -> Iterator[Trial]:
-    yield from reading_mistakes(part)
+def _turned_axes(part: Campaign) -> Iterator[Trial]:
     readings = part.probings.readings
     moved = [axis for axis in readings if np.ptp(readings[axis]) > 0]
     linear = [axis for axis in moved if part.machine.is_linear(axis)]
@@ -78,8 +82,8 @@ def _trials(part: Campaign) -> Iterator[Trial]:
 
 def _with_its_columns(probings: Probings) -> Probings:
     """The rows of a setup without the columns that it does not have."""
-    own = {name: values for name, values in probings.channels.items() if np.isfinite(values).any()}
-    return replace(probings, channels=own)
+    recorded = {name: values for name, values in probings.channels.items() if np.isfinite(values).any()}
+    return replace(probings, channels=recorded)
 
 
 def _with_rows(campaign: Campaign, mask: npt.NDArray[np.bool_], undone: Probings) -> Campaign:
