@@ -204,18 +204,21 @@ def test_a_bar_off_the_plane_of_its_swing_has_the_derivatives_of_its_readings(tm
 @pytest.mark.parametrize(
     ("off", "key", "told"),
     [
-        ((0.0, 0.0, 0.01), "", {"EZA:const"}),
-        ((0.0, 0.0, 0.01), KEY, set()),
-        pytest.param((0.0, -0.006, 0.0), "", {"EA0A"}, marks=pytest.mark.slow),
+        ((0.0, 0.0, 0.01), "", ["EZA:const"]),
+        ((0.0, 0.0, 0.01), KEY, []),
+        # The zero of A does the same at these poses: either leads, and the other is its rival.
+        pytest.param((0.0, -0.006, 0.0), "", ["EYA:const"], marks=pytest.mark.slow),
     ],
 )
 def test_what_a_head_carries_elsewhere_than_stated_is_a_constant(
-    tmp_path: Path, off: tuple[float, ...], key: str, told: set[str]
+    tmp_path: Path, off: tuple[float, ...], key: str, told: list[str]
 ) -> None:
     """Was a free shape of the head, "bearing of A is worn": its zero and its spindle's offset were no candidates."""
     campaign = _read(_campaign(tmp_path, 9001, np.array(off), key)[0])
     problem = campaign_method(campaign).problem_of(campaign)
     answer = explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
-    assert {effect.effect for effect in answer.missing} == told
+    assert len(answer.missing) == len(told)
+    for name, effect in zip(told, answer.missing, strict=True):
+        assert name in {effect.effect, *(rival.effect for rival in effect.rivals if rival.coincides)}
     # What free errors take up is no blind spot.
     assert "EZ0A" not in answer.blind

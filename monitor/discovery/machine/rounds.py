@@ -203,7 +203,8 @@ class _Rounds:
             return replace(standing, suspects=more)
         # Suspects that had their turn come again in a circle: what was found under the last ones stands.
         if self._earlier.circle(self.suspects.names, standing, more.names):
-            return standing
+            # The same ones: how far off they are is what they are beside the effects that stand.
+            return replace(standing, suspects=more) if more.same_as(standing.suspects) else standing
         self.suspects = more
         self._noises = Turns()
         return None

@@ -19,8 +19,8 @@ from monitor.units import METRE, MICROMETRE, Unit
 
 @dataclass(frozen=True)
 class PlateExpansion(InstrumentChange):
-    """All points of an artefact go apart from the origin of its coordinates; those that are stated stay as they are, so
-    what they should be grows less."""
+    """All points of an artefact go apart from the middle of those that were read; where it is held elsewhere its zero
+    drifts besides. Those that are stated stay as they are, so what they should be grows less."""
 
     pattern: ClassVar[str] = BEGIN + "expansion"
     word: ClassVar[str] = "expansion"
@@ -37,7 +37,7 @@ class PlateExpansion(InstrumentChange):
         return driver
 
     def _of_rows(self, rows: InstrumentRows, context: Context) -> Array:
-        return -np.asarray(rows.ideal[:, :, None])
+        return -np.asarray(rows.ideal - rows.ideal.mean(axis=0))[:, :, None]
 
     def described(self, driven: str) -> Description:
         return Description(
