@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import find_setup_mistakes, fit
+from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
@@ -53,6 +53,12 @@ def _spoilt(campaign: Campaign, setup: str, change: dict[str, tuple[str, float]]
     [
         ("bar-yz", {"reading_um": ("reading_um", -1.0)}, "the sign of reading_um were the other way round"),
         ("r-test", {"dz_um": ("dz_um", -1.0)}, "the sign of dz_um were the other way round"),
+        (
+            "r-test",
+            {name: (name, -1.0) for name in ("dx_um", "dy_um", "dz_um")},
+            "the signs of dx_um, dy_um, dz_um were the other way round",
+        ),
+        ("bar-zx", {"reading_um": ("reading_um", 1e-3)}, "reading_um was in mm"),
         ("r-test", {"dx_um": ("dy_um", 1.0), "dy_um": ("dx_um", 1.0)}, "the columns dx_um and dy_um were exchanged"),
     ],
 )  # fmt: skip
@@ -64,7 +70,20 @@ def test_what_is_wrong_in_one_setup_is_said_in_its_name(
 
 def test_right_setups_and_errors_of_an_instrument_are_no_mistake(right: Campaign, tmp_path: Path) -> None:
     assert _told(right) == []
-    folder = week(tmp_path / "week", np.random.default_rng(32), shop.TRUTH, "instrument:bar-xy:length", 10.0)
-    campaign = read_campaign(folder)
-    assert isinstance(campaign, Campaign)
-    assert _told(campaign) == []
+    for error, size in (
+        ("bar-xy:length", 10.0),
+        ("bar-xy:length", 37.5),
+        ("laser-Y:dead_path@air_degC", 15.0),
+    ):
+        folder = week(
+            tmp_path / f"{error[:3]}{size}",
+            np.random.default_rng(32),
+            shop.TRUTH,
+            f"instrument:{error}",
+            size,
+        )
+        campaign = read_campaign(folder)
+        assert isinstance(campaign, Campaign)
+        assert _told(campaign) == []
+        # Exchanged for one of another instrument, a column leaves readings that nothing contradicts.
+        assert find_reading_mistakes(campaign, _of_machine, fit(_of_machine(campaign))) == ()

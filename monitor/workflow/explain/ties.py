@@ -69,7 +69,7 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) ->
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
         if kind is TieBreak.PLAN and not is_planned:
-            kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
+            kind, axes = TieBreak.MORE_POSES, _axes(effect.effect, rival)
         actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(
         Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, setup=setup)
@@ -97,14 +97,14 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
         if driver != other or driver == "each_run":
             columns = (_recorded(name) for name in (driver, other) if name not in OF_POSES)
             return TieBreak.DRIVERS, tuple(dict.fromkeys(columns)), ()
-        return TieBreak.INDEXATIONS, (driver,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
+        return TieBreak.INDEXATIONS, (driver,), _axes(effect.effect, rival)
     return (TieBreak.POSES if effect.separation.poses else TieBreak.PLAN), (), ()
 
 
 def _driver(text: str) -> str:
     name = text.rpartition("@")[2] if "@" in text else ""
     # A run that drifts unlike the others (@run_time(3)) does not come again: more runs show whether another does.
-    name = re.sub(r"^run_time\(\d+\)$", "each_run", name)
+    name = re.sub(r"^(run_time\(\d+\)|load_each_run)$", "each_run", name)
     # A time constant that was searched (@warmup45min) is no other driver.
     return re.sub(r"^(warmup|settling|lagged)[\d.]+min", r"\1", name)
 
@@ -114,7 +114,12 @@ def _recorded(driver: str) -> str:
     return driver.removeprefix("lagged_")
 
 
+def _axes(*effects: str) -> tuple[str, ...]:
+    """The axes that effects name, each once."""
+    return tuple(dict.fromkeys(filter(None, map(_axis, effects))))
+
+
 def _axis(text: str) -> str:
-    """The axis that a term names last: C1 of EXC1:const, of a location error C1 of EX0C1."""
+    """The axis that a term names last: C1 of EXC1:const, of a location error C1 of EX0C1; empty where it names none."""
     term = text.partition(":")[0].partition("@")[0]
-    return term[2:].lstrip("0123456789")
+    return term[2:].lstrip("0123456789") if re.match("E[XYZABC]", term) else ""

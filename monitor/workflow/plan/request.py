@@ -57,7 +57,7 @@ class PlanRequest:
 
     def _check_wanted(self) -> None:
         for name, u in self.wanted.items():
-            if 0.0 < u < LEAST_WANTED or u > MOST_WANTED:
+            if not LEAST_WANTED <= u <= MOST_WANTED:
                 raise InputError(
                     f"--wanted {name}: {u:g} is no uncertainty that a plan is made for; write {LEAST_WANTED:g} to "
                     f"{MOST_WANTED:g} in its unit"

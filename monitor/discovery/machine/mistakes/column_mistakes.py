@@ -68,16 +68,25 @@ def measured_columns(campaign: Campaign) -> list[str]:
 def reading_mistakes(campaign: Campaign) -> Iterator[Trial]:
     """Exchanged columns of what was measured, and their signs."""
     measured = measured_columns(campaign)
-    yield from _exchanged_channels(measured)
+    yield from _exchanged_channels(measured, campaign.probings.channels)
     for name in measured:
         yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
 
 
-def unit_mistakes(measured: Sequence[str]) -> Iterator[Trial]:
-    """Deviations in another unit than their columns say."""
+def all_signs(measured: Sequence[str]) -> Iterator[Trial]:
+    """The signs of all columns of what was measured together."""
+    if len(measured) > 1:
+        what = f"the signs of {', '.join(measured)} were the other way round"
+        yield what, _of_channels(_scaled(measured, -1.0))
+
+
+def unit_mistakes(measured: Sequence[str], least: float = 0.0) -> Iterator[Trial]:
+    """Deviations in another unit than their columns say, of more than ``least`` of it."""
     for ending, units in IN_UNITS.items():
         columns = [name for name in measured if name.endswith(ending)]
         for unit, factor in units.items() if columns else ():
+            if factor <= least:
+                continue
             verb = "was" if len(columns) == 1 else "were"
             yield f"{', '.join(columns)} {verb} in {unit}", _of_channels(_scaled(columns, factor))
 
@@ -86,7 +95,7 @@ def direction_mistakes(campaign: Campaign) -> Iterator[Trial]:
     """Mistakes of single columns of directions: tried where nothing of ``column_mistakes`` is enough, since all of them
     mirror the directions, and where their frame may turn one is like the other."""
     directions = [name for name in campaign.probings.channels if name in DIRECTION]
-    yield from _exchanged_channels(directions)
+    yield from _exchanged_channels(directions, campaign.probings.channels)
     for name in directions:
         yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
 
@@ -116,9 +125,14 @@ def turned_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial
         yield f"the sign of {axis} were the other way round", _of_readings(_scaled((axis,), -1.0))
 
 
-def _exchanged_channels(measured: Sequence[str]) -> Iterator[Trial]:
+def _exchanged_channels(measured: Sequence[str], channels: Mapping[str, Array]) -> Iterator[Trial]:
+    """Exchanges of columns that stand in the same rows: another instrument's column would leave a setup no readings."""
     for first, second in combinations(measured, 2):
-        yield f"the columns {first} and {second} were exchanged", _of_channels(_exchanged([(first, second)]))
+        if np.array_equal(np.isfinite(channels[first]), np.isfinite(channels[second])):
+            yield (
+                f"the columns {first} and {second} were exchanged",
+                _of_channels(_exchanged([(first, second)])),
+            )
     if all(name in measured for pair in SPOTS for name in pair):
         yield "u and v of the sensor were exchanged in both pairs of columns", _of_channels(_exchanged(SPOTS))
         yield "the columns of plane and paraboloid were exchanged", _of_channels(_exchanged(ACROSS))

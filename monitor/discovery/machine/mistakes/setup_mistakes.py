@@ -8,15 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.mistakes.column_mistakes import Trial, reading_mistakes, turned_axes
-from monitor.discovery.machine.mistakes.cures import NOISE_TIMES, Maker, Mistake, fitted
+from monitor.discovery.machine.mistakes.column_mistakes import (
+    Trial,
+    all_signs,
+    measured_columns,
+    reading_mistakes,
+    turned_axes,
+    unit_mistakes,
+)
+from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted
 from monitor.records import Array, Campaign, Probings
 
+#: What agrees leaves no more than this, in stated standard uncertainties.
+AGREES = 1.1
 #: A mistake that does the same leaves the same, but for rounding.
 AS_WELL = 1.02
 
@@ -48,7 +58,7 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
 
 def _agrees(fit: Fit) -> bool:
     """Whether what is left is what the stated uncertainties let expect."""
-    return fit.rms <= NOISE_TIMES * fit.sigma
+    return fit.rms <= AGREES * fit.sigma
 
 
 def _agree_without(campaign: Campaign, problem_of: Maker, setup: str) -> bool:
@@ -62,7 +72,10 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, setup: str) -> lis
     """The mistakes of a setup with which undone everything agrees; signs of axes where none of its readings is one."""
     mask = campaign.probings.target == setup
     part = replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
-    for trials in (reading_mistakes(part), _turned_axes(part)):
+    measured = measured_columns(part)
+    # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
+    of_readings = chain(reading_mistakes(part), all_signs(measured), unit_mistakes(measured, 1.0))
+    for trials in (of_readings, _turned_axes(part)):
         cures = []
         for what, undo in trials:
             fit = fitted(_with_rows(campaign, mask, undo(part).probings), problem_of)

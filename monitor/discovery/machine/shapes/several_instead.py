@@ -20,6 +20,9 @@ from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.discovery.search.scene import family_count
 
+#: What is left of readings that are explained, in stated standard uncertainties, beside small effects.
+NEAR_NOISE = 2.0
+
 
 def several_instead(
     plain: ChainScene, with_shapes: tuple[ChainScene, ChainScan], search: Callable[[], ChainScan]
@@ -35,7 +38,22 @@ def several_instead(
     if len(errors) < 2 or len(several.candidates) >= MOST_EFFECTS:
         return with_shapes
     gain = _worth(plain, several) - _worth(scene, result)
-    return (plain, several) if gain > UNDECIDED else with_shapes
+    foretells = _foretells_as_well((plain, several), with_shapes)
+    return (plain, several) if gain > UNDECIDED and foretells else with_shapes
+
+
+def _foretells_as_well(several: tuple[ChainScene, ChainScan], shaped: tuple[ChainScene, ChainScan]) -> bool:
+    """Whether several effects foretell what was left out, runs and poses, no worse than a free shape, and nearly to the
+    noise: where far more is left, likelihoods at the stated noise decide nothing."""
+    most = NEAR_NOISE * several[0].fit.sigma
+    errors = [
+        [held_out(scene.columns(result.candidates)) for held_out in scene.held_out_errors]
+        for scene, result in (several, shaped)
+    ]
+    return all(
+        ours is None or ours <= min(most, np.inf if other is None else other)
+        for ours, other in zip(*errors, strict=True)
+    )
 
 
 def _worth(scene: ChainScene, result: ChainScan) -> float:
