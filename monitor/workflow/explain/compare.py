@@ -12,6 +12,7 @@ from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.method import Instruments, Unable
+from monitor.records import Verdict
 from monitor.store import Database, save_analysis
 from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison
@@ -63,6 +64,9 @@ def _compare_machine(
     apart = disagreement(fit.problem, fit.solution, ability)
     beside = against_others(fit.problem, fit.solution, ability)
     drifting = running_with_time(fit.problem, fit.solution, ability)
+    if beside is not None and comparison.verdict is Verdict.EXPLAINED:
+        # The residual of many rows hides what one setup of few says against all others.
+        comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
     answer = CompareAnswer(
         machine_comparison(comparison, fit.problem), apart, beside, drifting or None, fit.problem.target_word
     )
