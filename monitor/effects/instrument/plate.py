@@ -37,7 +37,7 @@ class PlateExpansion(InstrumentChange):
         return driver
 
     def _of_rows(self, rows: InstrumentRows, context: Context) -> Array:
-        return -np.asarray(rows.ideal - rows.ideal.mean(axis=0))[:, :, None]
+        return -np.asarray(rows.ideal - np.nanmean(rows.ideal, axis=0))[:, :, None]
 
     def described(self, driven: str) -> Description:
         return Description(
