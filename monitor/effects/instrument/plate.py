@@ -37,7 +37,9 @@ class PlateExpansion(InstrumentChange):
         return driver
 
     def _of_rows(self, rows: InstrumentRows, context: Context) -> Array:
-        return -np.asarray(rows.ideal - np.nanmean(rows.ideal, axis=0))[:, :, None]
+        read = np.isfinite(rows.ideal)
+        middle = np.nansum(rows.ideal, axis=0) / np.maximum(read.sum(axis=0), 1)
+        return -np.asarray(rows.ideal - middle)[:, :, None]
 
     def described(self, driven: str) -> Description:
         return Description(
