@@ -13,7 +13,7 @@ from by_path import load, simulator
 from scipy import stats
 
 from monitor.exceptions import CampaignError, EffectError, InputError, NotFoundError
-from monitor.reporting.health.records import State
+from monitor.reporting.health.records import MachineHealth, State
 from monitor.store import Database, import_campaign, load_campaign, machine_runs, verify_audit
 from monitor.store.past.history import latest_tolerances
 from monitor.workflow.fleet.fleet import fleet
@@ -187,15 +187,20 @@ def test_a_limit_of_an_effect_is_read_kept_and_refused_where_there_is_no_such_ef
         assert dict(load_campaign(db, "five-days").machine.tolerances) == limits
 
 
+def _health_of_last_week(worn: Database) -> MachineHealth:
+    """The page of V in the report of the week of its last run."""
+    (name,) = [machine for machine in named_machines(worn) if machine.machine == "V"]
+    last = machine_runs(worn, "V")[-1]
+    past = read_week(worn, name, week_of(last.local_start.date()), ReportOptions())
+    return machine_health(worn, past, computed(past.task))
+
+
 def test_limits_of_a_type_that_hold_for_no_parameter_are_named_by_fleet_and_report(worn: Database) -> None:
     use_model(worn, UseModelRequest("with-backlash", "V", WHY))
     worn.type_tolerances = {"*": {"EB0C9": 5.0}}
     try:
         said = fleet(worn, FleetRequest()).limits_without_parameter
-        (name,) = [machine for machine in named_machines(worn) if machine.machine == "V"]
-        last = machine_runs(worn, "V")[-1]
-        past = read_week(worn, name, week_of(last.local_start.date()), ReportOptions())
-        health = machine_health(worn, past, computed(past.task))
+        health = _health_of_last_week(worn)
     finally:
         worn.type_tolerances = {}
     assert said is not None
@@ -214,10 +219,7 @@ def test_an_effect_beyond_its_limit_alarms_in_trend_fleet_and_report(worn: Datab
     try:
         followed = trend(worn, TrendRequest("V", parameter=BACKLASH))
         rows = {row.parameter: row for row in fleet(worn, FleetRequest(top=0)).table if row.machine == "V"}
-        (name,) = [machine for machine in named_machines(worn) if machine.machine == "V"]
-        last = machine_runs(worn, "V")[-1]
-        past = read_week(worn, name, week_of(last.local_start.date()), ReportOptions())
-        health = machine_health(worn, past, computed(past.task))
+        health = _health_of_last_week(worn)
     finally:
         worn.type_tolerances = {}
     assert followed.parameters[BACKLASH].forecast.limit == LIMIT_UM
