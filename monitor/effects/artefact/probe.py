@@ -45,10 +45,8 @@ class ProbeLobing(BuiltIn):
         normals = normals_of(context, self.text)
         direction = _from_tool(context, normals)
         # The tool points along the Z of its frame at all axes zero, as the chain is described.
-        across, angle = (
-            np.hypot(direction[:, 0], direction[:, 1]),
-            self.lobes * np.arctan2(direction[:, 1], direction[:, 0]),
-        )
+        across = np.hypot(direction[:, 0], direction[:, 1])
+        angle = self.lobes * np.arctan2(direction[:, 1], direction[:, 0])
         lobes = across[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         shifts: Array = normals[:, :, None] * lobes[:, None, :]
         return shifts
