@@ -73,7 +73,8 @@ class Context:
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
-    (n,) numbers what was measured without a break, None where that is the run.
+    (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
+    scale shapes and drivers where these probings are only planned, None where these are it.
     """
 
     chain: Chain
@@ -90,6 +91,7 @@ class Context:
     sight: Array | None = None
     instruments: InstrumentRows | None = None
     stretch: npt.NDArray[np.int64] | None = None
+    measured: Context | None = None
 
     def __len__(self) -> int:
         return len(self.run)
@@ -108,6 +110,11 @@ class Context:
         fit the noise that it is to explain.
         """
         return self.positions if self.expected is None else self.expected
+
+    @property
+    def scaling(self) -> Context:
+        """The probings whose ranges scale shapes and drivers: these, or those measured before these were planned."""
+        return self if self.measured is None else self.measured
 
     def taken(self, rows: npt.NDArray[np.int64]) -> Context:
         """Return the chosen rows (any number of them), in that order, with repetitions."""

@@ -41,8 +41,8 @@ class Channel(DescribedDriver):
                 f"channel '{self.name}' is empty at {int(empty.sum())} of {len(values)} probings; "
                 "an effect needs it at every one"
             )
-        reference = REFERENCE_TEMPERATURE_DEGC if self.is_temperature else float(values.mean())
-        return (values - reference)[:, None]
+        mean = float(context.scaling.columns[self.name].mean())
+        return (values - (REFERENCE_TEMPERATURE_DEGC if self.is_temperature else mean))[:, None]
 
     def unit(self) -> Unit:
         suffix = self.name.rpartition("_")[2]

@@ -66,6 +66,14 @@ class Free(DescribedShape):
 
 def flexible_basis(context: Context, joint: int) -> Array:
     """All parts (n, k) of the flexible basis of an axis."""
+    columns = _unscaled(context, joint)
+    measured = columns if context.measured is None else _unscaled(context.measured, joint)
+    largest = np.abs(measured).max(axis=0)
+    return np.asarray(columns / np.where(largest > 0.0, largest, 1.0))
+
+
+def _unscaled(context: Context, joint: int) -> Array:
+    """The parts (n, k) before they are scaled to 1."""
     position, direction = context.places[:, joint], context.travel[:, joint]
     others = [
         part
@@ -73,7 +81,8 @@ def flexible_basis(context: Context, joint: int) -> Array:
         if index != joint
         for part in _of_other(context, index)
     ]
-    middle, half = (position.max() + position.min()) / 2.0, max(float(np.ptp(position)) / 2.0, 1e-12)
+    visited = context.scaling.places[:, joint]
+    middle, half = (visited.max() + visited.min()) / 2.0, max(float(np.ptp(visited)) / 2.0, 1e-12)
     scaled = (position - middle) / half
     if context.chain.joints[joint].turns:
         parts = [wave(order * position) for order in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
@@ -90,9 +99,7 @@ def flexible_basis(context: Context, joint: int) -> Array:
         parts += _steps(scaled)
     parts += [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
     parts.append((direction == 0.0).astype(np.float64))
-    columns = np.column_stack(parts)
-    largest = np.abs(columns).max(axis=0)
-    return np.asarray(columns / np.where(largest > 0.0, largest, 1.0))
+    return np.column_stack(parts)
 
 
 def _steps(scaled: Array) -> list[Array]:
@@ -107,13 +114,13 @@ def _steps(scaled: Array) -> list[Array]:
 
 def _of_other(context: Context, joint: int) -> list[Array]:
     """What a product takes of another axis; nothing of one that stands still."""
-    position = context.places[:, joint]
-    spread = float(np.ptp(position))
+    position, visited = context.places[:, joint], context.scaling.places[:, joint]
+    spread = float(np.ptp(visited))
     if spread == 0.0:
         return []
     if context.chain.joints[joint].turns:
         return [np.cos(position), np.sin(position), position / np.pi]
-    return [(position - position.mean()) / spread]
+    return [(position - visited.mean()) / spread]
 
 
 def way_since_reversal(context: Context, joint: int) -> Array:

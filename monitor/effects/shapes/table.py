@@ -38,8 +38,8 @@ class Table(DescribedShape):
     def columns(self, context: Context, joint: int) -> Array:
         if self.nodes < 2:
             raise EffectError(f"table{self.nodes} has too few nodes; write table or table2 and above")
-        q = context.places[:, joint]
-        grid = np.linspace(q.min(), q.max(), self.nodes)
+        q, visited = context.places[:, joint], context.scaling.places[:, joint]
+        grid = np.linspace(visited.min(), visited.max(), self.nodes)
         step = grid[1] - grid[0]
         if step == 0:
             return np.column_stack([np.ones(len(q)), np.zeros((len(q), self.nodes - 1))])

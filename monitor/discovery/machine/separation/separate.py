@@ -108,6 +108,7 @@ class _Touches:
             target=self.target,
             nominal=self.nominal,
             columns=columns,
+            measured=present,
         )
 
 
