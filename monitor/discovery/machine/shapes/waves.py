@@ -19,6 +19,8 @@ from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import HARMONICS, Free
 from monitor.records import Array
 
+#: A shape that takes more names than these has none: a wave that does not repeat each turn is three and a remainder.
+MOST_NAMES = 2
 #: The free shape with some parts, from 0, beside others; and the score of effects at their price beside others.
 OfParts = Callable[[Sequence[int]], ChainCandidate]
 Score = Callable[[Sequence[ChainCandidate]], float]
@@ -37,8 +39,8 @@ def waves_instead(
     instead = [[wave] for wave in waves.values()]
     parts = effect.shape.parts
     orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
-    if orders and set(orders) <= set(waves):
-        rest = [part - 1 for part in parts if part > 2 * HARMONICS]
+    rest = [part - 1 for part in parts if part > 2 * HARMONICS]
+    if orders and set(orders) <= set(waves) and len(orders) + bool(rest) <= MOST_NAMES:
         instead.append([*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])])
     best = max(instead, key=score, default=[])
     return best if best and score(best) >= score([free]) else []
