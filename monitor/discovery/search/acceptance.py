@@ -38,6 +38,15 @@ class Acceptance(Generic[CandidateT]):
         """Whether a candidate that stands out is believed beside others."""
         return True
 
+    def error_of(self, candidate: CandidateT) -> str:
+        """What a candidate is a shape of."""
+        return candidate.family
+
+    def is_credible(self, others: Sequence[CandidateT], candidate: CandidateT) -> bool:
+        """Whether a candidate would be believed beside others if the error on what was left out did not say no: other
+        effects that are still to be found may be what raises that."""
+        return self.accepts(others, candidate)
+
     def stands_among(
         self, pool: Pool[CandidateT], others: Sequence[CandidateT], evidence: Evidence[CandidateT]
     ) -> bool:

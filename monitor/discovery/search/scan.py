@@ -129,6 +129,15 @@ class _Steps(Generic[CandidateT]):
     def best(self, selected: Sequence[CandidateT], fallen: Collection[str]) -> CandidateT | None:
         """The most convincing candidate that stands the control and is accepted beside the selected ones; families that
         have ``fallen`` are not selected again."""
+        return self._best(selected, fallen, self.rules.accepts)
+
+    def _best(
+        self,
+        selected: Sequence[CandidateT],
+        fallen: Collection[str],
+        believed: Callable[[Sequence[CandidateT], CandidateT], bool],
+    ) -> CandidateT | None:
+        """The most convincing candidate that stands the control and is ``believed`` beside the selected ones."""
         families = {candidate.family for candidate in selected}.union(fallen)
         weighed = best_of_families(self.weighed(selected))
         p_values = [evidence.p_value for evidence in weighed]
@@ -138,7 +147,7 @@ class _Steps(Generic[CandidateT]):
             standing = q_value <= self.rate and candidate.family not in families
             if (
                 standing
-                and self.rules.accepts(selected, candidate)
+                and believed(selected, candidate)
                 and self.rules.stands_among(self.pool, selected, evidence)
             ):
                 return candidate
@@ -151,6 +160,24 @@ class _Steps(Generic[CandidateT]):
         self.pool = self.pool.with_more([other for other in self.rules.alternatives(best) if other.visible])
         self._weighed = Memory()
         return self.merged(self.exchanged(selected))
+
+    def ahead(
+        self, selected: Sequence[CandidateT], fallen: Collection[str], most: int
+    ) -> list[CandidateT] | None:
+        """The selected candidates with several more that stand beside each other; None where there are no such.
+
+        Of three effects of like size each alone may foretell poses that were left out worse than none, by what the two
+        others do there. Two shapes of one error among them are a shape that nobody knows, which is asked for later.
+        """
+        together = list(selected)
+        for _ in range(most):
+            best = self._best(together, fallen, self.rules.is_credible) if len(together) < most else None
+            if best is None:
+                break
+            together = self.admitted(together, best)
+        standing = self.standing(together)
+        errors = {self.rules.error_of(candidate) for candidate in standing}
+        return standing if len(selected) + 1 < len(standing) == len(errors) else None
 
     def standing(self, selected: Sequence[CandidateT]) -> list[CandidateT]:
         """The selected candidates without those that do not stand beside the others, the most doubtful first."""

@@ -21,6 +21,12 @@ class Steps(Protocol[CandidateT]):
     def standing(self, selected: Sequence[CandidateT]) -> list[CandidateT]:
         """The selected candidates that stand beside the others."""
 
+    def ahead(
+        self, selected: Sequence[CandidateT], fallen: Collection[str], most: int
+    ) -> list[CandidateT] | None:
+        """The selected candidates with several more, up to ``most``, that stand beside each other although none of them
+        stands beside the selected ones alone; None where there are no such."""
+
 
 def step_by_step(
     steps: Steps[CandidateT], begin: Sequence[CandidateT], *, most: int, most_steps: int
@@ -35,8 +41,14 @@ def step_by_step(
             continue
         # What an exchange, a merger or a later effect has made doubtful is no finding; others have their turn.
         standing = steps.standing(selected)
-        if len(standing) == len(selected):
+        if len(standing) < len(selected):
+            fallen |= {candidate.family for candidate in selected} - {
+                candidate.family for candidate in standing
+            }
+            selected = standing
+            continue
+        together = steps.ahead(selected, fallen, most)
+        if together is None:
             break
-        fallen |= {candidate.family for candidate in selected} - {candidate.family for candidate in standing}
-        selected = standing
+        selected = together
     return steps.standing(selected)

@@ -97,6 +97,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._doubt = NoiseDoubt(scene) if few else None
         self._weighed: Memory[float] = Memory()
         self._accepted: Memory[bool] = Memory()
+        self._credible: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
         self._pool: Pool[ChainCandidate] | None = None
         self._flipped: Memory[float | None] = Memory()
@@ -105,9 +106,21 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
         run, is of a plausible size, and lowers the error on runs left out (blocks of poses where there is one run; true
         where it has few) and that at poses left out of every run."""
-        return self._accepted.answer(others, candidate, lambda: self._is_accepted(others, candidate))
+        return self._accepted.answer(
+            others,
+            candidate,
+            lambda: self.is_credible(others, candidate) and self.predicts(others, candidate),
+        )
 
-    def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+    def error_of(self, candidate: ChainCandidate) -> str:
+        """The error of which a candidate is a shape."""
+        return error_of(candidate)
+
+    def is_credible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """The rules of ``accepts`` but for the errors on what was left out."""
+        return self._credible.answer(others, candidate, lambda: self._is_credible(others, candidate))
+
+    def _is_credible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         limit = self.rate
         named = [
             *self._larger_errors(others, candidate),
@@ -130,7 +143,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
             tries = candidate.variant.tries * candidate.variant.odds * self._families
             if self._doubt.p_value(others, candidate) * tries > limit:
                 return False
-        return self.predicts(others, candidate)
+        return True
 
     def predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect lowers the errors on what was left out; true where what was stated beforehand (the length

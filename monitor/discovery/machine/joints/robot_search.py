@@ -82,6 +82,9 @@ class _StepsBesideCurves:
         """All of them: they were asked when the last one was admitted."""
         return list(selected)
 
+    def ahead(self, selected: Sequence[ChainCandidate], fallen: Collection[str], most: int) -> None:
+        """None: with thousands of poses each effect foretells what was left out by itself."""
+
     def _beside(self, selected: Sequence[ChainCandidate]) -> Pursuit:
         fit = self.scene.fit
         return Pursuit(fit, side_by_side(fit.solution.last.residual.size, selected), poses_of(fit))
