@@ -33,6 +33,12 @@ GROWN = {
     "EXX:poly1@settling45min": lambda count: -np.expm1(-np.arange(count) / 45.0),
     "EXX:poly2@each_run": lambda count: np.ones(count),
 }
+#: The same, and what the run of the fit alone shows.
+SHOWN = {
+    **GROWN,
+    "EXX:poly1@run_time(1)": lambda count: np.linspace(0.0, 1.0, count),
+    "nothing": lambda count: np.zeros(count),
+}
 
 
 def _measured(folder: Path, name: str, effect: str, ways: int, started: str, seed: int) -> Path:
@@ -41,7 +47,7 @@ def _measured(folder: Path, name: str, effect: str, ways: int, started: str, see
     stops = np.linspace(0.0, 500.0, 11)
     x = np.concatenate([stops[:: (-1) ** way] for way in range(ways)])
     shape = x**2 / 500.0 if "poly2" in effect else x
-    off = GROWTH * GROWN[effect](len(x)) * shape + np.random.default_rng(seed).normal(0.0, NOISE, len(x))
+    off = GROWTH * SHOWN[effect](len(x)) * shape + np.random.default_rng(seed).normal(0.0, NOISE, len(x))
     rows = [
         {"setup": "laser", "X": float(at), "reading_um": 1e3 * float(at + by)}
         for at, by in zip(x, off, strict=True)
@@ -52,11 +58,13 @@ def _measured(folder: Path, name: str, effect: str, ways: int, started: str, see
     return written
 
 
-def _predicted(tmp_path: Path, effect: str, ways: int, started: str, seed: int = 1) -> PredictAnswer:
-    """What a model with the effect, fitted to four ways, says of another campaign."""
+def _predicted(
+    tmp_path: Path, effect: str, ways: int, started: str, seed: int = 1, shown: str | None = None
+) -> PredictAnswer:
+    """What a model with the effect, fitted to four ways, says of another campaign, which has it or ``shown``."""
     folders = [
         _measured(tmp_path, "fitted", effect, 4, "2026-03-02T08:00:00+00:00", 1),
-        _measured(tmp_path, "other", effect, ways, started, seed),
+        _measured(tmp_path, "other", shown or effect, ways, started, seed),
     ]
     with Database(tmp_path / "one.duckdb") as db:
         import_folders(db, ImportRequest(folders))
@@ -85,3 +93,11 @@ def test_what_no_row_says_of_another_run_is_named(tmp_path: Path, effect: str) -
     of_each_run = effect.endswith("@each_run")
     assert answer.taken_over == ((effect,) if of_each_run else ())
     assert answer.from_own_start == (() if of_each_run else (effect,))
+
+
+def test_a_drift_of_the_fitted_run_alone_is_none_of_the_other_one(tmp_path: Path) -> None:
+    effect = "EXX:poly1@run_time(1)"
+    answer = _predicted(tmp_path, effect, 4, "2026-05-09T06:00:00+00:00", seed=2, shown="nothing")
+    assert answer.fitted_rms_um == pytest.approx(0.3, rel=0.3)
+    assert answer.rms_um == pytest.approx(0.3, rel=0.4)
+    assert answer.from_own_start == ()

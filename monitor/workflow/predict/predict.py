@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.evidence.held_out import poses_of
+from monitor.effects import ArtefactEffect, ChainEffect, Context, Effect, InstrumentEffect, TurnEffect
 from monitor.effects.drivers import EachRun, RunTime, Sequence, SettlingDriver
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
@@ -111,14 +112,36 @@ def _of_one_set_up(problem: ChainProblem) -> ChainProblem:
     """The problem of two runs as one of a single run, with one frame and one place of every target; times and
     conditions stay those of each, and nothing goes on from the one to the other."""
     context = problem.context
-    apart = replace(problem, context=replace(context, stretch=context.run))
+    added = tuple(_of_its_stretch(effect) for effect in problem.added)
+    apart = replace(problem, added=added, context=replace(context, stretch=context.run))
     return apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0]))
 
 
+@dataclass(frozen=True)
+class _DriftOfStretch(RunTime):
+    """A drift in one run alone, where the runs are one set-up and only their stretches say which is which."""
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        return np.asarray((context.run_time * (context.stretch == self.run))[:, None])
+
+
+def _of_its_stretch(effect: Effect) -> Effect:
+    """The effect; that of one run alone is none of the other one."""
+    if not isinstance(effect, ChainEffect | ArtefactEffect | TurnEffect | InstrumentEffect):
+        return effect
+    driver = effect.driver
+    if not isinstance(driver, RunTime) or driver.run is None:
+        return effect
+    return replace(effect, driver=_DriftOfStretch(driver.run))
+
+
 def _driven_by(problem: ChainProblem, drivers: tuple[type, ...]) -> tuple[str, ...]:
-    """The added effects that follow one of the drivers."""
+    """The added effects that follow one of the drivers; a drift of one run alone follows none in another run."""
     return tuple(
-        effect.text for effect in problem.added if isinstance(getattr(effect, "driver", None), drivers)
+        effect.text
+        for effect in problem.added
+        if isinstance(driver := getattr(effect, "driver", None), drivers)
+        and not isinstance(driver, _DriftOfStretch)
     )
 
 
