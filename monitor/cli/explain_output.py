@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from monitor.cli import output, residual_output
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
@@ -110,8 +112,19 @@ def _next_step(explanation: MachineExplanation | CurveExplanation, campaign: str
     if explanation.missing:
         first, model = explanation.missing[0].effect, explanation.comparison.model
         together = explanation.added_together if isinstance(explanation, MachineExplanation) else (first,)
-        effects, it = " ".join(f'"{effect}"' for effect in together), "it" if len(together) == 1 else "them"
-        output.say(f"to add {it}: monitor model add {effects} --to {model} --as NAME{campaign}")
+        every = [effect.effect for effect in explanation.missing]
+        what = "it" if len(together) == 1 else "them"
+        if len(every) > len(together):
+            what = "the first" if len(together) == 1 else "these powers together"
+        _add(what, together, f"{model} --as NAME{campaign}")
+        if len(every) > len(together):
+            _add(f"all {len(every)}", every, f"{model} --as NAME{campaign}")
+
+
+def _add(what: str, effects: Sequence[str], to: str) -> None:
+    """How to add some effects."""
+    names = " ".join(f'"{effect}"' for effect in effects)
+    output.say(f"to add {what}: monitor model add {names} --to {to}")
 
 
 def _bad_probing(reading: BadProbing, target_word: str) -> None:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from monitor.reporting.messages import joined_by_and
 from monitor.units import MICROMETRE
 
 
@@ -212,6 +213,8 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         sentences.append(f"These data cannot tell it apart from {', '.join(first.others)}.")
     if finding.unseen:
         sentences.append(UNSEEN)
+    if further := [missing.effect for missing in finding.missing[1:]]:
+        sentences.append(f"It also lacks {joined_by_and(further)}.")
     return sentences
 
 

@@ -284,7 +284,12 @@ def _missing(
     rivals: list[tuple[ChainCandidate, bool]] = []
     if not is_curve(candidate):
         search = RivalSearch(scene, selection.candidates, surroundings.drivers)
-        rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
+        # What was searched under another name may come to the same.
+        rivals = [
+            pair
+            for pair in search.rivals(index, least_likelihood(finding.evidence), coefficients)
+            if _name(pair[0]) != _name(candidate)
+        ]
     return ChainMissing(
         rank=index + 1,
         effect=_name(candidate),
