@@ -20,7 +20,8 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting import calibration_messages
 from monitor.sources import CommonQuantity
-from monitor.statistics import Change, trend as statistics_trend
+from monitor.statistics import Change
+from monitor.statistics.trend import trend as statistics_trend
 from monitor.store import Database, import_campaign, load_identification, machine_history
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.changes import ChangeSearch
