@@ -30,7 +30,7 @@ IN_UNIT = frozenset(
         *("mean", "u_all", "u_pooled", "u_by_day", "mean_by_day", "sd", "sd_all", "sd_pooled", "centre"),
         *("between", "between_interval", "within", "within_interval", "u_run_on_a_day_of_its_own"),
         *("within_run", "between_runs", "u_day", "u_day_interval", "spread", "between_days", "within_days"),
-        *("latest", "latest_u", "slope_per_year", "u_slope", "slope_interval"),
+        *("latest", "latest_u", "u_line", "u_slope_per_year", "slope_per_year", "u_slope", "slope_interval"),
         *("robust_slope_per_year", "robust_interval", "bias", "lower", "upper", "stable_within"),
         *("stepwise", "u_stepwise", "at_once", "u_at_once", "difference_by_method", "u_difference_by_noise"),
         *("earlier", "later", "parts", "known_beforehand", "expected_of_drift", "drift_in_30_days"),

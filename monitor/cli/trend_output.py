@@ -8,7 +8,7 @@ from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
 from monitor.cli.forecast_output import forecast_start
-from monitor.cli.rests_on_output import levels
+from monitor.cli.rests_on_output import levels, steps_at_once
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -59,6 +59,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
         yield from (_change(name, change) for change in parameter.changes)
         yield from _settled(name, parameter)
         yield from (_event_step(name, step) for step in parameter.event_steps)
+    yield from steps_at_once(answer)
     few = [
         change.days for _, parameter in parameters for change in parameter.changes if change.days < FEW_DAYS
     ]
@@ -202,10 +203,11 @@ def _p_value(change: DatedChange) -> str:
 
 def _change(name: str, change: DatedChange) -> str:
     others = change.between_instruments
+    # Of several steps at once one sentence says it.
+    words = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, {_p_value(change)})"
-        f"{'' if others is None else f'; {others.in_words(change.unit)}'}"
+        f"({_interval(change.interval)}, {_p_value(change)}){words}"
     )
 
 

@@ -415,14 +415,6 @@ def change_in_words(kind: str, season_not_told: bool) -> str:
     return as_trend_computes(f"{what}; {DRIFT_OR_SEASON}" if season_not_told else what)
 
 
-def step_between_instruments(before: str, after: str, stated: str | None, may_be_all: bool) -> str:
-    """Return what is said of a step between instruments; ``stated`` is u of their difference, None without any."""
-    measured = f"measured by {before} before and by {after} after it"
-    if stated is None:
-        return f"{measured}: it may be theirs, nothing is known here of their calibrations"
-    return f"{measured}: their calibrations (u = {stated}) {'can be' if may_be_all else 'are not'} all of it"
-
-
 def as_trend_computes(what: str) -> str:
     """Return what a row of a table says, and where that was computed."""
     return f"{what}; computed from the runs, as `monitor trend` does"

@@ -154,17 +154,20 @@ def slope_beside(
     )
 
 
-def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = None) -> CellDrift:
+def drift_in_blocks(
+    drift: CellDrift, blocks: Blocks, *, cycle: float | None = None, u_common: Array | None = None
+) -> CellDrift:
     """The drift of every cell with the resemblance of its groups allowed for, as ``trend`` does.
 
     The slope is that of all groups, or, where a ``cycle`` is fitted beside it, that of the blocks; its uncertainty is
-    that of the blocks, and that of the season where it may be a part of the slope (``beside_season``). NaN where they
-    are too few.
+    that of the blocks, that of the season where it may be a part of the slope (``beside_season``), and ``u_common``
+    (c,) of the slope by what groups have in common. NaN where they are too few.
     """
     lines = block_lines(blocks, cycle=cycle)
     slope = np.where(lines.cyclic, lines.slope, np.where(np.isfinite(lines.slope), drift.slope, np.nan))
     # Days that differ by rounding alone have no slope.
     slope = np.where((lines.slope == 0.0) & (lines.u_slope == 0.0), 0.0, slope)
-    u, p_value, season_p = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal)
-    steepness = np.abs(_quotient(slope, lines.u_slope))
+    u_slope = lines.u_slope if u_common is None else np.hypot(lines.u_slope, u_common)
+    u, p_value, season_p = beside_season(slope, u_slope, lines.dof, lines.seasonal)
+    steepness = np.abs(_quotient(slope, u_slope))
     return CellDrift(slope, u, p_value, lines.widening, season_p, steepness, lines)

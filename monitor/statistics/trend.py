@@ -7,7 +7,7 @@ or a step (``changes``) first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -66,6 +66,8 @@ class Trend:
     whether a season alone moves them; None where none is asked of the line, else ``u_slope`` holds what a season may be
     of it (``beside_season``), which is no part of the ``covariance``: ``season_ahead`` adds it to what is foretold.
     ``beside`` are the coefficients of the columns beside the line, which is that of their means over the runs.
+    ``common`` (q, 2) is what level and slope are off by for one standard uncertainty of each of q quantities that runs
+    have in common: no part of the ``covariance``, which is of what scatters, but of ``u_slope`` and its interval.
     """
 
     at: float
@@ -89,6 +91,13 @@ class Trend:
     season_p: float | None = None
     season_ahead: SeasonAhead | None = None
     beside: tuple[float, ...] = ()
+    common: Array = field(default_factory=lambda: np.empty((0, 2)))
+
+    def u_common(self, times: npt.ArrayLike) -> Array:
+        """Return the standard uncertainty (m,) of the line at ``times`` (m,) by what runs have in common."""
+        away = np.asarray(times, dtype=np.float64) - self.at
+        off_by = self.common[:, 0] + self.common[:, 1] * away[..., np.newaxis]
+        return np.sqrt(np.asarray((off_by**2).sum(axis=-1), dtype=np.float64))
 
 
 @dataclass(frozen=True)
@@ -156,14 +165,34 @@ def _ranked(
     return slope, interval if enough else None, monotone
 
 
+def _in_common(fit: MixedFit, design: Array, common: Array) -> Array:
+    """What level and slope (q, 2) are off by for each column of ``common`` (d, q): the fit of the day means on
+    ``design`` (d, k) is linear in the values, so that it is the fit of the columns with the weights of the days."""
+    if not common.shape[1]:
+        return np.empty((0, 2))
+    root = np.sqrt(fit.weight / fit.weight.max())[:, np.newaxis]
+    scale = np.abs(design).max(axis=0)
+    solution = np.linalg.lstsq(root * (design / scale), root * common, rcond=None)[0] / scale[:, np.newaxis]
+    return np.asarray(solution[[0, -1]].T)
+
+
 def _result(
-    fit: MixedFit, lines: BlockLines, at: float, y: Array, u: Array | None, columns: Array, p: float
+    fit: MixedFit,
+    lines: BlockLines,
+    at: float,
+    y: Array,
+    u: Array | None,
+    columns: Array,
+    common: Array,
+    p: float,
 ) -> Trend:
-    """The line without what rests on ranks; ``columns`` (n, e) are what is fitted beside it."""
+    """The line without what rests on ranks; ``columns`` (n, e) are what is fitted beside it, ``common`` (q, 2) what
+    level and slope are off by."""
     # Days that differ by rounding alone have no slope.
     is_constant = lines.slope[0] == 0.0 and lines.u_slope[0] == 0.0
     slope, dof = 0.0 if is_constant else float(fit.coefficients[-1]), float(lines.dof[0])
-    seasonal = beside_season(np.array([slope]), lines.u_slope, lines.dof, lines.seasonal)
+    u_of_slope = np.hypot(lines.u_slope, np.linalg.norm(common[:, 1]))
+    seasonal = beside_season(np.array([slope]), u_of_slope, lines.dof, lines.seasonal)
     u_slope, season_p = float(seasonal.u[0]), float(seasonal.season_p[0])
     # From the mean time of the blocks to that of the runs.
     shift = np.array([[1.0, at - float(lines.at[0])], [0.0, 1.0]])
@@ -197,6 +226,7 @@ def _result(
         ),
         season_p=None if np.isnan(season_p) else season_p,
         beside=tuple(fit.coefficients[1 + 2 * int(lines.cyclic[0]) : -1].tolist()),
+        common=common,
     )  # fmt: skip
 
 
@@ -210,7 +240,8 @@ def _with_season(line: Trend, alone: BlockLines, t: Array, cycle: float | None) 
     """The line with what a season may be of it ahead of its runs at ``t``; ``alone`` is it without one."""
     if line.season_p is None or cycle is None:
         return line
-    u = float(np.sqrt(max(line.u_slope**2 - float(alone.u_slope[0]) ** 2, 0.0)))
+    without = float(alone.u_slope[0]) ** 2 + float((line.common[:, 1] ** 2).sum())
+    u = float(np.sqrt(max(line.u_slope**2 - without, 0.0)))
     return replace(
         line,
         season_ahead=SeasonAhead(u, float(t.min()), float(t.max()), cycle, float(alone.seasonal.bend[0])),
@@ -225,15 +256,19 @@ def trend(
     days: npt.ArrayLike | None = None,
     cycle: float | None = None,
     beside: npt.ArrayLike | None = None,
+    common: npt.ArrayLike | None = None,
     level: float = 0.95,
     robust: bool = True,
     independent: bool = False,
 ) -> Trend:
     """Drift of ``values`` (n,), any unit, over ``times`` (n,), any unit.
 
-    ``u`` (n,) standard uncertainties in the unit of the values (what is common to all runs, such as the
-    scale bar, moves no slope and is better left out); their common scale is estimated. ``days`` (n,) labels
-    whose runs share a day component, and which count at the mean time of the day; None: every run is its own day.
+    ``u`` (n,) standard uncertainties in the unit of the values, without what runs have in common; their common scale is
+    estimated. ``common`` (n, q) is what the values are off by for one standard uncertainty of each of q quantities that
+    outlast a run (the scale of a laser): the variance of level and slope by each is (sum of weights times column)²
+    (JCGM 100:2008, 5.2.2), and Student's distribution of the scatter is kept for the sum, which is a little wide.
+    ``days`` (n,) labels whose runs share a day component, and which count at the mean time of the day; None: every run
+    is its own day.
     ``cycle`` is the period of a wave that is fitted beside the line where the history covers most of one (the year);
     a shorter history without columns beside the line is judged beside a wave of any size (``beside_season``);
     ``beside`` (n, e) are columns, such as the temperature, that are fitted beside it by their means of each day.
@@ -278,9 +313,14 @@ def trend(
     beside_line = _side_by_side(means, count)[index]
     design = np.column_stack([np.ones_like(t), beside_line, on_day - at])
     fit = fit_with_days(y, design, run_u, index)
+    shared = np.empty((len(y), 0)) if common is None else as_matrix(common, "common")
+    if len(shared) != len(y):
+        raise DataError(f"common has {len(shared)} rows; {len(y)} are needed, one for each run.")
+    of_days = _side_by_side([by_day(column) for column in shared.T], count)
+    in_common = _in_common(fit, design[np.unique(index, return_index=True)[1]], of_days)
     judged = _Days(fit.weight, time, plain.value, plain.beside)
     lines = _independent(fit, at) if independent else _judged_line(judged, cycle, is_cyclic=wave.size > 0)
-    result = _with_season(_result(fit, lines, at, y, run_u, beside_line, level), lines, t, cycle)
+    result = _with_season(_result(fit, lines, at, y, run_u, beside_line, in_common, level), lines, t, cycle)
     if not robust:
         return result
     slope, interval, monotone = _ranked(*day_averages(y, t, run_u, index), level)

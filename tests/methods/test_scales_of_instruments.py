@@ -148,6 +148,9 @@ CONTRADICTIONS = (
     (LASER, (KEY + 'known = ["scale"]\n',) * 3, KEY.split(" ")[0], "take 'scale' out of known, so that"),
     (LASER, ('known = ["direction"]\n', "", ""),
      "direction_standard_uncertainty_urad", "or leave this key out where the direction holds exactly"),
+    (LASER, (f'{KEY}certificate = "C-7"\n', f'{KEY}certificate = "C-8"\n', KEY), "certificate",
+     "is calibrated by certificate 'C-8' here and by certificate 'C-7' in setup 'laser-X'; one instrument has one"),
+    (BAR, ('certificate = "B-1"\n', "", ""), "certificate", "without one here and by certificate 'B-1' in setup"),
     (BAR, ('known = ["length"]\n',) * 3, LENGTH.split(" ")[0], "the length is stated with an uncertainty and as known"),
 )  # fmt: skip
 

@@ -53,9 +53,9 @@ def test_what_all_runs_are_off_by_is_in_the_crossing_date(with_common):
     hits, trials, common = 0, 150, 6.0
     for _ in range(trials):
         y, t, day = history(rng)
-        line = trend(y + rng.normal(0.0, common), t, days=day, robust=False)
-        known = common if with_common else 0.0
-        low, high = forecast(line, (-60.0, 10.0), 84.0, [], common=known).crossing.interval
+        known = np.full((len(y), 1), common) if with_common else None
+        line = trend(y + rng.normal(0.0, common), t, days=day, common=known, robust=False)
+        low, high = forecast(line, (-60.0, 10.0), 84.0, []).crossing.interval
         hits += low <= 200.0 <= high
     assert hits / trials > 0.93 if with_common else hits / trials < 0.86, hits
 

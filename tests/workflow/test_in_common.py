@@ -7,23 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.rests_on_output import levels
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.reporting import calibration_messages
 from monitor.sources import CommonQuantity
 from monitor.statistics import Change
+from monitor.statistics.trend import trend as statistics_trend
 from monitor.store import Database, import_campaign, load_identification, machine_history
 from monitor.workflow.history.agreement import AgreementPair
-from monitor.workflow.history.in_common import RestsOn, calibrated_alike
-from monitor.workflow.history.other_instruments import other_instruments
-from monitor.workflow.history.past import machine_past
+from monitor.workflow.history.changes import ChangeSearch
+from monitor.workflow.history.in_common import RestsOn, calibrated_alike, calibrated_to, stated_differently
+from monitor.workflow.history.other_instruments import between_instruments
+from monitor.workflow.history.past import ParameterPast, machine_past
 from monitor.workflow.history.series import Series, parameter_series
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
@@ -35,6 +39,7 @@ from tests.simulator import four_instruments as shop
 
 #: The scale, um/m, and what the gain of X grew by from January to June.
 U, GROWN = 1.0, 1.2
+CERTIFICATES = {"january": "C-7", "june": "C-7", "july": "C-8"}
 LASER, GAINS = "laser interferometer", ("EXX", "EYY", "EZZ")
 
 
@@ -114,40 +119,107 @@ def test_another_calibration_is_another_scale(answer: TrendAnswer) -> None:
     assert gain.expanded == pytest.approx(2.0 * np.hypot(gain.u_first, gain.u_second), rel=1e-12)
 
 
-def test_levels_hold_what_all_runs_rest_on_and_weights_do_not(db: Database) -> None:
+def test_jcgm100_5_2_2_a_mean_has_of_each_calibration_the_share_of_its_runs(db: Database) -> None:
+    """Two runs of three rest on C-7: 2/3 of u by it, 1/3 by the other one, and the weights have none of it."""
     history = machine_history(db, "CENTRE-9")
-    january = history.part(history.campaign != "july")
-    series, _ = parameter_series(january)["EXX"]
-    np.testing.assert_allclose(series.u_common, U, rtol=0.02)
+    series, _ = parameter_series(history)["EXX"]
+    assert [quantity.certificate for quantity in series.common_parts] == ["C-7", "C-8"]
+    np.testing.assert_allclose(np.abs(series.common_of_mean), [2.0 * U / 3.0, U / 3.0], rtol=0.02)
     weights = series.weights()
     assert weights is not None
-    np.testing.assert_allclose(np.hypot(weights, series.u_common), series.u, rtol=1e-9)
-    # With July by another calibration nothing is in all runs.
-    assert np.all(parameter_series(history)["EXX"][0].u_common == 0.0)
+    np.testing.assert_allclose(np.hypot(weights, np.linalg.norm(series.common, axis=1)), series.u, rtol=1e-9)
+    january, _ = parameter_series(history.part(history.campaign != "july"))["EXX"]
+    np.testing.assert_allclose(np.abs(january.common_of_mean), U, rtol=0.02)
+
+
+def test_a_line_over_two_calibrations_has_their_shares() -> None:
+    """Five days by one, five by the other: the level has u / sqrt(2), the slope what both are apart; by hand."""
+    t, u = np.arange(10.0), 2.0
+    parts = np.column_stack([np.where(t < 5, u, 0.0), np.where(t < 5, 0.0, u)])
+    y = np.random.default_rng(3).normal(size=10)
+    line = statistics_trend(y, t, common=parts, robust=False)
+    alone = statistics_trend(y, t, robust=False)
+    weights = (t - t.mean()) / np.sum((t - t.mean()) ** 2)
+    of_slope = np.hypot(*(weights @ parts))
+    np.testing.assert_allclose(
+        line.common, np.column_stack([parts.mean(axis=0), weights @ parts]), atol=1e-12
+    )
+    assert line.u_slope == pytest.approx(np.hypot(alone.u_slope, of_slope), rel=1e-9)
+    assert line.u_common(t.mean()) == pytest.approx(u / np.sqrt(2.0), rel=1e-9)
+    assert line.u_common(t)[-1] == pytest.approx(
+        np.linalg.norm(parts.mean(axis=0) + (t[-1] - t.mean()) * (weights @ parts)), rel=1e-9
+    )
+    # One calibration moves no slope.
+    assert statistics_trend(y, t, common=np.full((10, 1), u), robust=False).u_slope == pytest.approx(
+        alone.u_slope
+    )
+
+
+def _stepped(past: dict[str, ParameterPast], sizes: dict[str, float], at: int) -> dict[str, ParameterPast]:
+    """The past with steps of ``sizes`` between the run ``at`` and the next one."""
+    times = past["EXX"].series.t[at : at + 2]
+    return {
+        name: replace(
+            parameter,
+            search=ChangeSearch(
+                (Change(name, "step", at + 1, times[1], (times[0], times[1]), sizes[name], 0.1, 1e-4),)
+                if name in sizes
+                else ()
+            ),
+        )
+        for name, parameter in past.items()
+    }
 
 
 def test_a_step_between_instruments_has_what_their_calibrations_leave_open(db: Database) -> None:
     """June and July are by two calibrations of 1 um/m each; January and June by one, and June by an R-test besides."""
     history = machine_history(db, "CENTRE-9")
-    past = machine_past(history, ())["EXX"]
-    january, june, july = past.series.t
-    between = [
-        other_instruments(
-            history,
-            past,
-            Change("EXX", "step", 1, at=last, interval=(first, last), size=size, u=0.1, p_value=1e-4),
-        )
-        for first, last, size in ((june, july, 2.5), (june, july, 4.0), (january, june, 1.2))
-    ]
-    assert all(each is not None for each in between)
-    assert [each.may_be_all for each in between if each] == [True, False, False]
-    assert [each.u for each in between if each] == pytest.approx([np.sqrt(2.0) * U] * 2 + [0.0], abs=0.03)
-    assert between[0] is not None
-    assert (
-        between[0].in_words("µm/m").endswith("after it: their calibrations (u = 1.4 µm/m) can be all of it")
-    )
-    slope = Change("EXX", "slope", 1, at=july, interval=(june, july), size=2.5, u=0.1, p_value=1e-4)
-    assert other_instruments(history, past, slope) is None
+    past = machine_past(history, ())
+    judged = []
+    for at, size in ((1, 2.5), (1, 4.0), (0, 1.2)):
+        (between,) = between_instruments(history, _stepped(past, {"EXX": size}, at)).values()
+        judged.append(between)
+    assert [each.may_be_all for each in judged] == [True, False, False]
+    assert [each.u for each in judged] == pytest.approx([np.sqrt(2.0) * U] * 2 + [0.0], abs=0.03)
+    assert judged[0].e_n == pytest.approx(2.5 / (2.0 * np.hypot(0.1, np.sqrt(2.0) * U)), rel=0.03)
+    assert judged[0].in_words("µm/m").endswith("after it: their calibrations (u = 1.4 µm/m) can be all of it")
+    slope = _stepped(past, {"EXX": 2.5}, 1)
+    (change,) = slope["EXX"].search.changes
+    slope["EXX"] = replace(slope["EXX"], search=ChangeSearch((replace(change, kind="slope"),)))
+    assert not between_instruments(history, slope)
+
+
+def test_a_laser_calibrated_anew_under_its_old_name_is_named_at_the_step(db: Database) -> None:
+    """The same instruments before and after, and another certificate: no event need be recorded."""
+    history = machine_history(db, "CENTRE-9")
+    history = replace(history, measured_by=np.full(3, "instruments (laser interferometer)"))
+    past = machine_past(history, ())
+    (between,) = between_instruments(history, _stepped(past, {"EXX": 2.5}, 1)).values()
+    assert (between.before, between.after) == (f"{LASER} (C-7)", f"{LASER} (C-8)")
+    assert between.may_be_all
+    # January and June are by one certificate.
+    assert not between_instruments(history, _stepped(past, {"EXX": 2.5}, 0))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "may_be_all"),
+    [((2.0, 2.1, 1.9), True), ((2.0, -2.0, 1.9), False), ((6.0, 6.1, 5.9), False)],
+)
+def test_steps_of_three_gains_by_one_laser_are_judged_at_once(
+    db: Database, sizes: tuple[float, ...], may_be_all: bool
+) -> None:
+    """Each of 2 um/m may be the scales (u = 1.4); two ways at once none can be. By the covariance written out."""
+    history = machine_history(db, "CENTRE-9")
+    past = _stepped(machine_past(history, ()), dict(zip(GAINS, sizes, strict=True)), 1)
+    judged = between_instruments(history, past)
+    assert {each.may_be_all for each in judged.values()} == {may_be_all}
+    assert {each.together for each in judged.values()} == {GAINS}
+    covariance = 0.1**2 * np.eye(3) + 2.0 * U**2
+    expected = chi2.sf(sizes @ np.linalg.solve(covariance, sizes), 3)
+    assert [each.p_value for each in judged.values()] == pytest.approx([expected] * 3, rel=0.2, abs=1e-12)
+    words = {each.in_words("µm/m").rpartition(": ")[2] for each in judged.values()}
+    can = "can be" if may_be_all else "are not"
+    assert all(f"{can} all of the steps of EXX, EYY, EZZ at once" in said for said in words)
 
 
 def test_the_page_says_what_all_runs_rest_on(db: Database) -> None:
@@ -157,7 +229,7 @@ def test_the_page_says_what_all_runs_rest_on(db: Database) -> None:
     assert stated.u == pytest.approx(U, rel=0.02)
     (sentence,) = levels(answer)
     assert sentence.startswith(
-        "all runs rest on the scale of laser interferometer (C-7): u of levels and of what is "
+        "all runs since the last change rest on the scale of laser interferometer (C-7): u of levels and of what is "
     )
     assert all(each.rests_on is None for name, each in answer.parameters.items() if name not in GAINS)
 
@@ -188,3 +260,66 @@ def test_of_two_statements_of_one_calibration_the_surer_is_in_common() -> None:
     alike = calibrated_alike(parts)
     assert list(alike) == [sure, other]
     np.testing.assert_array_equal(alike[sure], [[1.0], [1.0]])
+
+
+def test_runs_of_two_calibrations_say_how_many_rest_on_each(answer: TrendAnswer) -> None:
+    stated = {each.certificate: each for each in answer.parameters["EXX"].rests_on or ()}
+    assert {name: (each.runs, each.of_runs) for name, each in stated.items()} == {
+        "C-7": (2, 3),
+        "C-8": (1, 3),
+    }
+    # The last day is by C-8 alone.
+    assert [each.u for each in stated.values()] == pytest.approx([0.0, U], abs=0.02)
+    first, second = levels(answer)
+    assert first.startswith(
+        "the scale of laser interferometer (C-7) is in u of means and lines with the share"
+    )
+    assert "EXX, 2 of 3 runs: latest 0;" in first
+    assert "EXX, 1 of 3 runs: latest 1.0 µm/m;" in second
+
+
+def test_an_older_identification_says_so_and_counts_all_of_its_u(db: Database) -> None:
+    history = machine_history(db, "CENTRE-9")
+    older = {
+        quantity: np.where(history.campaign[:, None] == "january", 0.0, part)
+        for quantity, part in history.common_parts.items()
+    }
+    history = replace(
+        history,
+        common_parts=older,
+        calibrations=replace(history.calibrations, unstored={"january": ((LASER, "C-7"),)}),
+    )
+    series, _ = parameter_series(history)["EXX"]
+    scale = next(quantity for quantity in series.common_parts if quantity.certificate == "C-7")
+    part = np.abs(series.common_parts[scale])
+    np.testing.assert_allclose(part, [series.u[0], U, 0.0], rtol=0.02)
+    weights = series.weights()
+    assert weights is not None
+    assert weights[0] == series.u[0]
+
+
+def test_identifications_of_before_the_parts_are_known_by_their_time(db: Database) -> None:
+    assert not machine_history(db, "CENTRE-9").calibrations.unstored
+    db.execute("UPDATE schema_migration SET applied_at = now()::TIMESTAMP + INTERVAL 1 DAY WHERE number = 17")
+    try:
+        again = machine_history(db, "CENTRE-9", parameter=None, since=datetime(2026, 1, 1, tzinfo=UTC))
+        assert again.calibrations.unstored == {name: ((LASER, c),) for name, c in CERTIFICATES.items()}
+        answer = trend(db, TrendRequest("CENTRE-9", since=datetime(2026, 1, 1, tzinfo=UTC)))
+        (note,) = (note for note in answer.notes if "older version identified" in note)
+        assert "type `monitor identify` for each" in note
+    finally:
+        db.execute(
+            "UPDATE schema_migration SET applied_at = now()::TIMESTAMP - INTERVAL 1 DAY WHERE number = 17"
+        )
+
+
+def test_one_calibration_stated_with_two_uncertainties_is_said() -> None:
+    parts = {CommonQuantity(LASER, "C-7", "scale", u): np.ones((1, 1)) for u in (2e-6, 0.5e-6)}
+    parts[CommonQuantity("bar", "", "length of 100 mm", 3e-4)] = np.ones((1, 1))
+    ((surest, other),) = stated_differently(parts)
+    assert [calibrated_to(each) for each in (surest, other)] == ["0.5 µm/m", "2 µm/m"]
+    words = calibration_messages.stated_differently(LASER, "C-7", "scale", "0.5 µm/m", "2 µm/m")
+    assert words.startswith(
+        "campaigns state the scale of laser interferometer (C-7) with u = 0.5 µm/m and with 2 µm/m"
+    )
+    assert calibrated_to(CommonQuantity("bar", "", "length of 100 mm", 3e-4)) == "0.3 µm"

@@ -273,6 +273,16 @@ def test_choices_and_their_refusals(made: Database) -> None:
         trends(made, "N")
 
 
+def test_a_parameter_asked_for_alone_changed_with_the_same_probability(made: Database) -> None:
+    """The p-value of a change and the threshold it passes pay for all parameters of the machine, whoever asks."""
+    every = trends(made, "M")["parameters"]
+    assert any(parameter["changes"] for parameter in every.values())
+    for name, parameter in every.items():
+        alone = trends(made, "M", parameter=name)["parameters"][name]
+        assert alone["changes"] == parameter["changes"]
+        assert alone["event_steps"] == parameter["event_steps"]
+
+
 def test_figures_are_drawn(made: Database, tmp_path: Path) -> None:
     files = trends(made, "M", parameter="EX0C", figures=tmp_path / "figures")["figures"]
     assert [Path(file).name for file in files] == ["trend-EX0C.svg", "trend-EX0C.png"]

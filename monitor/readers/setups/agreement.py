@@ -56,6 +56,22 @@ def check_agreement(setups: Sequence[tuple[Table, Setup]], takes_scale: Sequence
                     f"{own_words} here and {other_words} in setup {quoted(other.data['id'])}; write "
                     "the same in each, or name another instrument where it is another one",
                 )
+            elif stated.key in table.data and table.data.get("certificate") != other.data.get("certificate"):
+                _fault_of_certificate(table, other, setup, stated)
+
+
+def _fault_of_certificate(table: Table, other: Table, setup: Setup, stated: Stated) -> None:
+    """Note that two setups state one calibrated quantity by different certificates: two calibrations are two values."""
+    here, there = (
+        f"by certificate {quoted(each.data['certificate'])}" if "certificate" in each.data else "without one"
+        for each in (table, other)
+    )
+    table.fault(
+        "certificate",
+        f"the {stated.name} of {quoted(setup.instrument)} is calibrated {here} here and {there} in setup "
+        f"{quoted(other.data['id'])}; one instrument has one calibration in a campaign: write the one that held "
+        "in each, or name the instrument otherwise where it was calibrated anew between them or is another one",
+    )
 
 
 def _of_instrument(setup: Setup, takes_scale: Sequence[str]) -> Iterator[tuple[Stated, float | None]]:

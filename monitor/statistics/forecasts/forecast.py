@@ -56,23 +56,21 @@ class Forecast:
     method: str
 
 
-def predict(line: Trend, times: npt.ArrayLike, common: float = 0.0) -> tuple[Array, Array, Array]:
+def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
     """Line (m,), standard uncertainty of the line (m,), and of one run on a day of its own (m,).
 
-    What a season may be of the slope counts from the last run on: up to there it was seen. ``common`` is the standard
-    uncertainty of what all runs are off together, which no scatter about the line shows.
+    What a season may be of the slope counts from the last run on: up to there it was seen. What runs have in common,
+    which no scatter about the line shows, is a part of both.
     """
     t = np.asarray(times, dtype=np.float64) - line.at
     c = line.covariance
     of_season = 0.0 if line.season_ahead is None else line.season_ahead.at(times)
-    of_level = np.maximum(c[0, 0] + 2.0 * t * c[0, 1] + t * t * c[1, 1], 0.0) + common**2
+    of_level = np.maximum(c[0, 0] + 2.0 * t * c[0, 1] + t * t * c[1, 1], 0.0) + line.u_common(times) ** 2
     of_line = np.hypot(np.sqrt(of_level), of_season)
     return line.level_at + line.slope * t, of_line, np.hypot(of_line, line.run_sd)
 
 
-def _crossing(
-    line: Trend, common: float, limit: float, side: float, origin: float, horizon: float
-) -> Crossing:
+def _crossing(line: Trend, limit: float, side: float, origin: float, horizon: float) -> Crossing:
     """Return the first time from ``origin`` on at which the line, and each side of its band, reaches the limit.
 
     ``side`` is 1.0 for an upper and -1.0 for a lower limit: a line that lies beyond it has reached it, at
@@ -83,7 +81,7 @@ def _crossing(
 
     def first(multiple: float) -> float:
         def gap(t: npt.ArrayLike) -> Array:
-            value, u, _ = predict(line, t, common)
+            value, u, _ = predict(line, t)
             return np.asarray(side * (limit - value) - multiple * factor * u)
 
         beyond = np.flatnonzero(gap(grid) <= 0.0)
@@ -100,8 +98,8 @@ def _crossing(
     return Crossing(limit, None if np.isinf(at) else at, (first(1.0), first(-1.0)))
 
 
-def _probability(line: Trend, common: float, times: npt.ArrayLike, lower: float, upper: float) -> Array:
-    value, _, u = predict(line, times, common)
+def _probability(line: Trend, times: npt.ArrayLike, lower: float, upper: float) -> Array:
+    value, _, u = predict(line, times)
     scale = np.maximum(u, 1e-300)
     below = scipy.special.stdtr(line.dof, (upper - value) / scale)
     return np.asarray(below - scipy.special.stdtr(line.dof, (lower - value) / scale))
@@ -115,15 +113,14 @@ def forecast(
     *,
     reliability: float = 0.95,
     horizon: float | None = None,
-    common: float = 0.0,
 ) -> Forecast:
     """Forecast a drift ``line`` against ``limits`` (lower, upper) in the unit of its values.
 
     ``origin`` (now), ``checks`` (c,) and ``horizon`` in the unit of its times; without a horizon ten times the span of
-    the history (from its mean time to now, doubled). An open side is an infinite limit. ``common`` is the standard
-    uncertainty of what all runs are off together (the scale of the laser that measured them): with it the forecast is
-    of the quantity, without it of what the same instrument will read. It counts as what few degrees of freedom leave of
-    the line does, which is wider than it need be. Raises ``DataError`` for limits that do not rise, a check before now.
+    the history (from its mean time to now, doubled). An open side is an infinite limit. With what runs have
+    in ``common`` in the line (the scale of the laser that measured them) the forecast is of the quantity, without it of
+    what the same instrument will read. It counts as what few degrees of freedom leave of the line does, which is wider
+    than it need be. Raises ``DataError`` for limits that do not rise, a check before now.
     Neglected: changes yet to come; see ``backtest``.
     """
     lower, upper = (float(x) for x in limits)
@@ -139,20 +136,20 @@ def forecast(
     if not end > origin:
         raise DataError(f"horizon is {end}; it must lie after now, {origin}.")
     sides = [
-        _crossing(line, common, limit, side, origin, end)
+        _crossing(line, limit, side, origin, end)
         for limit, side in ((lower, -1.0), (upper, 1.0))
         if np.isfinite(limit)
     ]
     sides.sort(key=lambda c: (np.inf if c.at is None else c.at, c.interval[0]))
     grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 2000)]) * (end - origin)
-    out = np.flatnonzero(_probability(line, common, grid, lower, upper) < reliability)
+    out = np.flatnonzero(_probability(line, grid, lower, upper) < reliability)
     value = predict(line, at)[0]
     return Forecast(
         origin=origin,
         crossing=sides[0] if sides else Crossing(np.inf, None, (np.inf, np.inf)),
         checks=at,
         predicted=value,
-        probability=_probability(line, common, at, lower, upper),
+        probability=_probability(line, at, lower, upper),
         recommended_interval=np.inf if not out.size else float(grid[max(int(out[0]) - 1, 0)] - origin),
         reliability=reliability,
         horizon=end,

@@ -35,8 +35,8 @@ NODES = 48
 class JointLines:
     """The ``lines`` of p parameters, and the ``correlation`` (p, p) of lines and scatter.
 
-    The lines are in the unit of their values over days or any unit of time. ``common`` (q, p) are their changes for one
-    standard uncertainty of each of q quantities by which all runs are off together; None without any.
+    The lines are in the unit of their values over days or any unit of time. ``common`` (q, p, 2) is what their levels
+    and slopes are off by for one standard uncertainty of each of q quantities that runs have in common; None without.
     """
 
     lines: Sequence[Trend]
@@ -180,9 +180,12 @@ def draw_lines(joint: JointLines, rng: np.random.Generator, count: int) -> Futur
     level = z[0] * roots[:, 0, 0]
     slope = z[0] * roots[:, 1, 0] + z[1] * roots[:, 1, 1]
     level *= heavy
+    slope *= heavy
     if joint.common is not None and joint.common.size:
-        level += rng.standard_normal((count, len(joint.common))) @ joint.common
-    return Futures(joint, level, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy)
+        off_together = np.tensordot(rng.standard_normal((count, len(joint.common))), joint.common, axes=1)
+        level += off_together[:, :, 0]
+        slope += off_together[:, :, 1]
+    return Futures(joint, level, slope, z[2] * np.array([line.run_sd for line in lines]) * heavy)
 
 
 def _first_crossing(times: Array, lengths: Array, limit: float) -> Array:

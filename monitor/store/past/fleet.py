@@ -67,6 +67,19 @@ class FleetBlocks:
 
 
 @dataclass(frozen=True)
+class CommonSums:
+    """What the groups of cells have of calibrated quantities that outlast a campaign, a row each cell, quantity and
+    block that has any, all (m,): the numbers of ``cell``, ``quantity`` and ``block``, the sums ``p`` of what values are
+    off by for one standard uncertainty, and ``tp`` of its products with t as in ``FleetSums``."""
+
+    cell: npt.NDArray[np.intp]
+    quantity: npt.NDArray[np.intp]
+    block: npt.NDArray[np.intp]
+    p: Array
+    tp: Array
+
+
+@dataclass(frozen=True)
 class TemperatureSums:
     """Sums over those groups of c cells whose runs all have a temperature, in °C less 20, all (c,).
 
@@ -107,7 +120,6 @@ class FleetSums(GroupSums):
     are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
     without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
     it). ``last_value`` and ``last_u`` are of the last run of the machine (NaN where the parameter was refused there),
-    ``last_common`` is what that u holds of calibrated quantities that outlast a campaign,
     ``check_d`` is when it is measured next, as far after its last run as its campaigns lie apart (days since 1970).
     """
 
@@ -132,11 +144,11 @@ class FleetSums(GroupSums):
     beyond_d: Array
     last_value: Array
     last_u: Array
-    last_common: Array
     check_d: Array
     repeated_sums: RepeatedSums
     temperatures: TemperatureSums
     blocks: FleetBlocks
+    common: CommonSums
     same_hours: tuple[GroupHours, ...]
 
 
@@ -160,8 +172,10 @@ def fleet_sums(
     NotFoundError where nothing was identified.
     """
     with db.reading():
-        epoch_d, columns, of_blocks, same_hours = _summed(db, (model, version), cut, limits, apart_d)
-    return _sums(columns, _blocks(of_blocks, columns), epoch_d, same_hours)
+        epoch_d, columns, of_blocks, of_common, same_hours = _summed(
+            db, (model, version), cut, limits, apart_d
+        )
+    return _sums(columns, _blocks(of_blocks, columns), _common(of_common, columns), epoch_d, same_hours)
 
 
 def _summed(
@@ -170,8 +184,9 @@ def _summed(
     cut: BlockCut,
     limits: Mapping[tuple[str, str], float],
     apart_d: float,
-) -> tuple[float, dict[str, Any], dict[str, Any], tuple[GroupHours, ...]]:
-    """Return first day, columns of all cells and of their blocks, and the groups of machines of which some overlap.
+) -> tuple[float, dict[str, Any], dict[str, Any], dict[str, Any], tuple[GroupHours, ...]]:
+    """Return first day, columns of all cells, of their blocks and of what these have in common, and the groups of
+    machines of which some overlap.
 
     The tables on the way live as long as the connection.
 
@@ -206,14 +221,14 @@ def _summed(
     db.set_variables({"whole": cut.whole, "each": cut.each, "most": cut.most, "epoch_d": epoch_d})
     db.execute(queries.BLOCKS)
     db.execute(queries.PARTS)
-    columns, of_blocks = (
+    columns, of_blocks, of_common = (
         {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
-        for query in (queries.TOGETHER, queries.OF_BLOCKS)
+        for query in (queries.TOGETHER, queries.OF_BLOCKS, queries.OF_COMMON)
     )
     same_hours = tuple(GroupHours(*row) for row in db.rows(queries.SAME_HOURS))
     for name in queries.TABLES:
         db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
-    return epoch_d, columns, of_blocks, same_hours
+    return epoch_d, columns, of_blocks, of_common, same_hours
 
 
 def _blocks(
@@ -230,9 +245,23 @@ def _blocks(
     return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis], degrees)
 
 
+def _common(
+    columns: Mapping[str, npt.NDArray[np.generic]], cells: Mapping[str, npt.NDArray[np.generic]]
+) -> CommonSums:
+    """What blocks have of calibrated quantities, in display units, by the places of their cells among ``cells``."""
+    order = np.argsort(cells["cell"])
+    known = np.isin(columns["cell"], cells["cell"])
+    rows = order[np.searchsorted(cells["cell"], columns["cell"][known], sorter=order)]
+    factor = np.asarray(cells["factor"], dtype=np.float64)[rows]
+    p, tp = (np.asarray(columns[name], dtype=np.float64)[known] / factor for name in ("p", "tp"))
+    quantity, block = (columns[name][known].astype(np.intp) for name in ("quantity_no", "block"))
+    return CommonSums(rows, quantity, block, p, tp)
+
+
 def _sums(
     columns: Mapping[str, npt.NDArray[np.generic]],
     blocks: FleetBlocks,
+    common: CommonSums,
     epoch_d: float,
     same_hours: tuple[GroupHours, ...],
 ) -> FleetSums:
@@ -275,7 +304,6 @@ def _sums(
         beyond_d=number["beyond_d"],
         last_value=number["last_value"] / f,
         last_u=number["last_u"] / f,
-        last_common=number["last_common"] / f,
         check_d=number["check_d"],
         repeated_sums=RepeatedSums(
             runs=number["runs_rep"],
@@ -299,5 +327,6 @@ def _sums(
             sum_gm=number["gm"] / f,
         ),
         blocks=blocks,
+        common=common,
         same_hours=same_hours,
     )  # fmt: skip

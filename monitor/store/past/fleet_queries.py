@@ -190,23 +190,14 @@ WITH last AS (
     FROM fleet_chosen GROUP BY machine_no
 ), ends AS (
     SELECT campaign_id, arg_max(run, started_at) AS run FROM run SEMI JOIN last USING (campaign_id) GROUP BY campaign_id
-), parts AS (
-    SELECT identification_id, unnest(part) AS part, generate_subscripts(part, 1) AS number
-    FROM common_part JOIN last USING (identification_id) JOIN ends USING (campaign_id, run)
-), common AS (
-    SELECT identification_id, list(u ORDER BY number) AS us
-    FROM (SELECT identification_id, number, sqrt(sum(part * part)) AS u FROM parts GROUP BY ALL)
-    GROUP BY identification_id
 )
-SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, x AS last_value, u AS last_u, coalesce(of_all, 0.0) AS last_common
+SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, x AS last_value, u AS last_u
 FROM (
     SELECT machine_no, unnest(h.numbers) AS k, unnest(list_transform(v.value, lambda xs: xs[place])) AS x,
-           unnest(list_transform(v.u, lambda us: us[place])) AS u,
-           unnest(coalesce(v.us, list_transform(v.u, lambda us: 0.0))) AS of_all
+           unnest(list_transform(v.u, lambda us: us[place])) AS u
     FROM (
-        SELECT last.*, list_position(v.runs, run) AS place, v.value, v.u, common.us
+        SELECT last.*, list_position(v.runs, run) AS place, v.value, v.u
         FROM last JOIN ends USING (campaign_id) JOIN identified_values AS v USING (identification_id)
-        LEFT JOIN common USING (identification_id)
     ) AS v JOIN fleet_heading AS h USING (heading)
 )
 """
@@ -332,7 +323,7 @@ SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        coalesce(l.latest_mm, 0.0) AS latest_mm, coalesce(e.since_d, 'nan') AS since_d,
        coalesce(b.beyond_d, 'nan') AS beyond_d,
        coalesce(r.last_value, 'nan') AS last_value, coalesce(r.last_u, 'nan') AS last_u,
-       coalesce(r.last_common, 0.0) AS last_common, c.check_d,
+       c.check_d,
        coalesce(h.channel, '') AS thermometer
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}
@@ -353,6 +344,28 @@ SELECT cb >> {BLOCK_BITS} AS cell, cb & ((1 << {BLOCK_BITS}) - 1) AS block, CAST
 sum(k) AS t, sum(m) / sum(k) AS m,
        coalesce(sum(g), 0.0) / sum(k) AS g
 FROM fleet_part WHERE n > 0 GROUP BY cb
+"""
+
+# What the groups of every cell have of each calibrated quantity that outlasts a campaign, by blocks: of a campaign that
+# of its first run, which is as good as that of any. Of two statements of one calibration the surer is in common.
+OF_COMMON = f"""
+WITH alike AS (
+    SELECT identification_id, arg_min(part, run) AS part, arg_min(p.u, run) AS u, machine_no, calibrated, certificate,
+           quantity
+    FROM common_part AS p JOIN fleet_chosen USING (identification_id)
+    GROUP BY identification_id, machine_no, calibrated, certificate, quantity
+), surest AS (
+    SELECT *, min(u) OVER (PARTITION BY machine_no, calibrated, certificate, quantity) / u AS share,
+           dense_rank() OVER (ORDER BY calibrated, certificate, quantity) AS quantity_no
+    FROM alike
+)
+SELECT cell, quantity_no, block, sum(part) AS p, sum(part * t) AS tp
+FROM (
+    SELECT (g.machine_no << {PARAMETER_BITS}) | unnest(h.numbers) AS cell, quantity_no, block,
+           unnest(s.part) * share AS part, began_d - getvariable('epoch_d') AS t
+    FROM fleet_blocked AS g JOIN surest AS s USING (identification_id) JOIN fleet_heading AS h USING (heading)
+)
+WHERE part <> 0.0 GROUP BY ALL ORDER BY ALL
 """
 
 TABLES = (

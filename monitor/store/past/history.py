@@ -22,6 +22,7 @@ from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
 from monitor.store.past.common_parts import parts_of
 from monitor.store.past.identified_values import IdentifiedValues, values_of
+from monitor.store.past.instruments import Calibrations, measured_by
 from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
 from monitor.store.type_tolerances import types_in_use
 from monitor.units import CONDITION_SUFFIXES
@@ -67,17 +68,6 @@ GROUP BY ALL ORDER BY ALL
 """
 
 
-_INSTRUMENTS = """
-SELECT DISTINCT campaign_id, setup ->> 'instrument' AS instrument
-FROM (
-    SELECT campaign_id, unnest(CAST(artefact -> 'setups' AS JSON[])) AS setup
-    FROM campaign WHERE campaign_id IN ({marks})
-)
-WHERE setup ->> 'instrument' IS NOT NULL
-ORDER BY ALL
-"""
-
-
 @dataclass(frozen=True)
 class CampaignFit:
     """How the readings of a campaign judge the ``model`` (a version of it) that its values come from.
@@ -116,7 +106,7 @@ class MachineHistory:
     of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
     in the same order. ``common_parts`` are what values (n, p) have of each calibrated quantity that outlasts a
     campaign, 0 for runs that do not rest on it. ``fits`` by campaign say whether its readings refute the model, where
-    that was looked for: none for identifications of older versions.
+    that was looked for: none for identifications of older versions. ``calibrations`` are those of the instruments.
     """
 
     machine: str
@@ -138,6 +128,7 @@ class MachineHistory:
     channels: frozenset[str] = frozenset()
     fits: Mapping[str, CampaignFit] = field(default_factory=dict)
     common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
+    calibrations: Calibrations = field(default_factory=Calibrations)
 
     @cached_property
     def seconds(self) -> Array:
@@ -234,13 +225,14 @@ def _read(
     rows = {(identified[run.campaign_id].number, run.run): row for row, run in enumerate(runs)}
     names, units, values, u = _values(db, identified.values(), rows, parameter)
     conditions, channels = _conditions(db, runs)
+    methods, calibrations = measured_by(db, runs, [head.number for head in identified.values()])
     latest = max(recorded, key=lambda run: (run.started_at, run.campaign_id), default=None)
     return MachineHistory(
         machine=machine,
         campaigns={number: name for number, (name, _) in campaigns.items()},
         campaign=np.array([run.campaign for run in runs], dtype=np.str_),
         method=np.array([run.method for run in runs], dtype=np.str_),
-        measured_by=_measured_by(db, runs),
+        measured_by=methods,
         run=np.array([run.run for run in runs], dtype=np.int64),
         started_at=tuple(run.started_at for run in runs),
         day=np.array([run.day for run in runs], dtype=np.int64),
@@ -255,6 +247,7 @@ def _read(
         channels=channels,
         fits=_fits(db, campaigns, identified),
         common_parts=_common_parts(db, identified.values(), rows, names) if has_parts else {},
+        calibrations=calibrations,
     )
 
 
@@ -390,15 +383,6 @@ def _values(
         values[target] = block.values[recorded]
         uncertainties[target] = np.where(np.isnan(block.values[recorded]), np.nan, block.u[recorded])
     return names, tuple(unit_of[name] for name in names), values, uncertainties
-
-
-def _measured_by(db: Database, runs: list[RecordedRun]) -> npt.NDArray[np.str_]:
-    """The method of every run (n,), and in brackets the instruments that its campaign names: ``(ball bar)``."""
-    named: dict[int, list[str]] = {}
-    for number, instrument in _with_marks(db, _INSTRUMENTS, sorted({run.campaign_id for run in runs})):
-        named.setdefault(int(number), []).append(str(instrument))
-    brackets = {number: f" ({', '.join(instruments)})" for number, instruments in named.items()}
-    return np.array([run.method + brackets.get(run.campaign_id, "") for run in runs], dtype=np.str_)
 
 
 def _conditions(db: Database, runs: list[RecordedRun]) -> tuple[dict[str, Array], frozenset[str]]:

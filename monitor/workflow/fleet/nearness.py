@@ -19,6 +19,7 @@ from monitor.statistics.days.seasonal_slopes import SeasonAhead, beside_season
 from monitor.statistics.sufficient import CellDrift, CellTests
 from monitor.store import FleetSums
 from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.fleet.in_common import CommonOfLines, common_of_lines
 from monitor.workflow.fleet.steps import split_times
 from monitor.workflow.history.beyond_limit import RISK
 from monitor.workflow.history.drift import SHORTEST_DAYS
@@ -88,7 +89,8 @@ def _inside(sums: FleetSums, cells: CellTests, drift: CellDrift, level: Array, l
     at = sums.check_d - sums.epoch_d
     value = level + drift.slope * (sums.check_d - sums.last_d)
     ends = sums.last_d - sums.epoch_d
-    line = _LineAhead(drift.lines, value, about, drift.u, sums.first_d - sums.epoch_d, ends, sums.last_common)
+    common = common_of_lines(sums, sums.blocks.groups)
+    line = _LineAhead(drift.lines, value, about, drift.u, sums.first_d - sums.epoch_d, ends, common)
     inside = line.inside(at, of_run, limit)
     doubted = np.flatnonzero(inside < RELIABILITY)
     if doubted.size:
@@ -104,8 +106,8 @@ def _inside(sums: FleetSums, cells: CellTests, drift: CellDrift, level: Array, l
 @dataclass(frozen=True, eq=False)
 class _LineAhead:
     """Lines of c cells: their ``value`` at the next check, the variance of a day ``about`` them, ``u`` of the slope
-    with its season, and when the days they go through begin and end, in days as those of the lines; all runs are off
-    together by the standard uncertainty ``common``."""
+    with its season, and when the days they go through begin and end, in days as those of the lines; what their days
+    have in ``common``."""
 
     lines: BlockLines
     value: Array
@@ -113,7 +115,7 @@ class _LineAhead:
     u: Array
     begins: Array
     ends: Array
-    common: Array
+    common: CommonOfLines
 
     def inside(self, at: Array, of_run: Array, limit: Array) -> Array:
         """Return the probability (c,) that a run, of variance ``of_run`` about its day, lies within ± ``limit``.
@@ -125,13 +127,13 @@ class _LineAhead:
         with np.errstate(divide="ignore", invalid="ignore"):
             t = at - self.lines.at
             of_line = c[:, 0, 0] + 2.0 * t * c[:, 0, 1] + t**2 * c[:, 1, 1]
-            of_slope = np.sqrt(np.maximum(self.u**2 - c[:, 1, 1], 0.0))
+            of_slope = np.sqrt(np.maximum(self.u**2 - c[:, 1, 1] - self.common.u_slope**2, 0.0))
             bend = np.nan_to_num(self.lines.seasonal.bend)
             of_season = np.nan_to_num(
                 SeasonAhead(of_slope, self.begins, self.ends, DAYS_PER_YEAR, bend).at(at)
             )
             spread = np.maximum(of_line, 0.0) + of_season**2 + self.about * self.lines.scatter + of_run
-            spread += self.common**2
+            spread += self.common.u_at(at) ** 2
             u = np.maximum(np.sqrt(spread), 1e-300)
             dof = np.where(self.lines.dof > 0.0, self.lines.dof, np.nan)
             above, below = (limit - self.value) / u, (-limit - self.value) / u
@@ -179,6 +181,7 @@ def _line_since(sums: FleetSums, rows: npt.NDArray[np.intp], groups: Array, at: 
         slope = np.where(last - first >= SHORTEST_DAYS, lines.slope, np.nan)
         deviation = m - mean[:, np.newaxis] - slope[:, np.newaxis] * (t - mean_t[:, np.newaxis])
         about = (groups * deviation**2).sum(axis=1) / (used.sum(axis=1) - 2.0)
-    u = beside_season(slope, lines.u_slope, lines.dof, lines.seasonal).u
+    common = common_of_lines(sums, groups, rows)
+    u = beside_season(slope, np.hypot(lines.u_slope, common.u_slope), lines.dof, lines.seasonal).u
     value = sums.origin[rows] + mean + slope * (at - mean_t)
-    return _LineAhead(lines, value, about, u, first, last, sums.last_common[rows])
+    return _LineAhead(lines, value, about, u, first, last, common)

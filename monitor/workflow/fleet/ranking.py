@@ -23,6 +23,7 @@ from monitor.statistics.sufficient import (
 from monitor.store import BlockCut, FleetSums
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.attention import ATTENTION, Attention
+from monitor.workflow.fleet.in_common import common_of_lines
 from monitor.workflow.fleet.nearness import Nearness, nearness
 from monitor.workflow.history.drift import DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE, SHORTEST_DAYS
 
@@ -59,7 +60,9 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
         (sums.sum_t, warmth.sum_g, sums.sum_m),
     )
     drift = replace(drift, slope=np.where(beside, slopes, drift.slope))
-    return cells, _without_short_histories(sums, drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR))
+    u_common = common_of_lines(sums, sums.blocks.groups).u_slope
+    in_blocks = drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR, u_common=u_common)
+    return cells, _without_short_histories(sums, in_blocks)
 
 
 def warmth_beside(sums: FleetSums) -> npt.NDArray[np.bool_]:

@@ -33,7 +33,7 @@ from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
-from monitor.workflow.history.other_instruments import other_instruments
+from monitor.workflow.history.other_instruments import between_instruments
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -113,12 +113,12 @@ def changes_noted(
     week: Week,
 ) -> list[Change]:
     """Everything that changed, the latest first; ``runs`` are those of the campaign that was explained."""
-    noted = []
+    noted, between = [], between_instruments(history, past)
     for parameter in past.values():
         for change in parameter.search.changes:
             at = moment_of(change.at, parameter.series)
             after = moment_of(change.interval[0], parameter.series)
-            others, unit = other_instruments(history, parameter, change), parameter.series.unit
+            others, unit = between.get(change), parameter.series.unit
             besides = "" if others is None else others.in_words(unit)
             what = ParameterChanged(change.parameter, change.kind, change.size, change.u, unit, besides)
             noted.append(Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at)))

@@ -59,6 +59,7 @@ class PieceDrift:
                 days=piece.days,
                 cycle=DAYS_PER_YEAR,
                 beside=self._beside,
+                common=piece.common if piece.common_parts else None,
             )
         except DataError as error:
             return refused(Part.DRIFT, error)

@@ -85,7 +85,6 @@ def drift_forecast(
             checks,
             reliability=reliability,
             horizon=horizon_of(origin),
-            common=float(drift.piece.u_common[-1]),
         )
     except DataError:
         return None

@@ -15,7 +15,7 @@ from monitor.sources import CommonQuantity
 from monitor.store import FEWEST_STEADY, MachineHistory
 from monitor.units import DEGREE_CELSIUS, column_unit
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
-from monitor.workflow.history.in_common import calibrated_alike
+from monitor.workflow.history.in_common import with_unstored
 
 #: A run differs from others by this part of its u at least; less is rounding of what it has in common with them.
 LEAST_OF_RUN = 1e-3
@@ -30,7 +30,7 @@ class Series:
     shop's clock from UTC, that of the machine's last run. ``temperature`` (n,) is that of the machine or its shop in °C
     as far as recorded (NaN: not), under the name ``thermometer``. ``campaign`` (n,) numbers the campaigns of the runs;
     None where nobody says them. ``common_parts`` (n,) are what values change by for one standard uncertainty of each
-    calibrated quantity that outlasts a campaign.
+    calibrated quantity that outlasts a campaign; of the runs of the mask ``bounded`` (n,) only at most (None: none).
     """
 
     name: str
@@ -46,6 +46,7 @@ class Series:
     thermometer: str | None = None
     campaign: npt.NDArray[np.intp] | None = None
     common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
+    bounded: npt.NDArray[np.bool_] | None = None
 
     def part(self, mask: npt.NDArray[np.bool_]) -> Series:
         """The runs of a mask (n,)."""
@@ -56,6 +57,7 @@ class Series:
             self.warm_up[mask], self.offset, None if self.temperature is None else self.temperature[mask],
             self.thermometer, None if self.campaign is None else self.campaign[mask],
             {quantity: part[mask] for quantity, part in self.common_parts.items()},
+            None if self.bounded is None else self.bounded[mask],
         )  # fmt: skip
 
     @cached_property
@@ -86,22 +88,25 @@ class Series:
         return mask
 
     @property
-    def in_all_runs(self) -> dict[CommonQuantity, Array]:
-        """The parts (n,) of the quantities that every run rests on: by these all runs are off together."""
-        return {quantity: part for quantity, part in self.common_parts.items() if len(part) and part.all()}
+    def common(self) -> Array:
+        """What values change by for one standard uncertainty of each quantity (n, q), in the order of
+        ``common_parts``."""
+        parts = list(self.common_parts.values())
+        return np.column_stack(parts) if parts else np.empty((len(self.values), 0))
 
     @property
-    def u_common(self) -> Array:
-        """The standard uncertainty (n,) of what all runs are off together: no number of runs makes it smaller, and no
-        difference of two runs has it."""
-        parts = [part**2 for part in self.in_all_runs.values()]
-        return np.sqrt(np.sum(parts, axis=0)) if parts else np.zeros(len(self.u))
+    def common_of_mean(self) -> Array:
+        """What the mean of all runs is off by for one standard uncertainty of each quantity (q,): no number of runs of
+        one calibration makes it smaller, and runs of another one have no part in it (JCGM 100:2008, 5.2.2)."""
+        return np.asarray(self.common.mean(axis=0))
 
     def weights(self) -> Array | None:
-        """The uncertainties of the runs by which they differ, None where a run has none (then all count alike)."""
+        """The uncertainties of the runs without what they have of calibrated quantities, which scatter no run; None
+        where a run has none (then all count alike)."""
         if not bool(np.isfinite(self.u).all() and (self.u > 0.0).all()):
             return None
-        of_run = self.u**2 - self.u_common**2
+        calibrated = (self.common**2).sum(axis=1)
+        of_run = self.u**2 - (calibrated if self.bounded is None else np.where(self.bounded, 0.0, calibrated))
         return np.sqrt(np.maximum(of_run, (LEAST_OF_RUN * self.u) ** 2))
 
 
@@ -147,13 +152,15 @@ def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDA
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
     thermometer, temperature = _temperature(history)
     campaign = np.unique(history.campaign, return_inverse=True)[1].ravel()
-    common = calibrated_alike(history.common_parts)
+    common, bounded = with_unstored(history)
     series = {}
     for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         mask = np.isfinite(history.values[:, j])
         whole = Series(
             name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset,
-            temperature, thermometer, campaign, {quantity: part[:, j] for quantity, part in common.items()},
+            temperature, thermometer, campaign,
+            {quantity: part[:, j] for quantity, part in common.items() if part[:, j].any()},
+            bounded if bounded.any() else None,
         )  # fmt: skip
         if mask.any():
             series[name] = (whole.part(mask), mask)

@@ -84,8 +84,8 @@ class DriftStatement:
 
 @dataclass(frozen=True)
 class LatestMean:
-    """The mean of the last day's runs; its uncertainty by their scatter and what all runs rest on, of a single run as
-    stated."""
+    """The mean of the last day's runs; its uncertainty by their scatter and the calibrations that they rest on, of a
+    single run as stated."""
 
     latest: float
     latest_u: float | None
@@ -99,8 +99,9 @@ class DatedChange:
 
     ``days`` is the number of days that were searched. ``kind`` is ``step`` or ``slope``; of drifts ``trend``, or
     ``transient``: off by ``size`` at the first run, it settles with ``time_constant_days``.
-    ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say;
-    they are fewer where one parameter is asked for. ``between_instruments``: other instruments measure from a step on.
+    ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say.
+    It is of one parameter, and stated where it is below the share of ``false_alarm`` that each of the machine's
+    parameters has, whether one is asked for or all. ``between_instruments``: other instruments measure from a step on.
     """
 
     at: str | None
@@ -344,8 +345,8 @@ class ControlCharts:
 
 @dataclass(frozen=True)
 class ParameterTrend:
-    """The long view of one parameter. All runs since its last change are off together by what it ``rests_on``: levels
-    and forecasts hold that, slopes and steps do not."""
+    """The long view of one parameter. Runs since its last change are off together by what they ``rests_on``: levels,
+    forecasts and slopes have the share of these runs, which of a slope is none where all rest on one calibration."""
 
     unit: str
     drift: DriftStatement = field(metadata=INLINED)

@@ -38,7 +38,7 @@ from monitor.workflow.trend.answer import (
 DAY_COVERAGE_H, YEAR_COVERAGE_D = 12.0, 300.0
 #: A dependence needs so many runs with the condition; a cycle so many, by its name.
 FEWEST_RUNS, FEWEST_OF_CYCLE = 6, {"day": 8, "year": 12}
-#: What all runs rest on is named from this part of u on.
+#: What runs rest on is named from this part of the u of a run on.
 COUNTS = 0.1
 #: Channels that go together more closely than this cannot be told apart (their variances inflate tenfold).
 COLLINEAR = 0.95
@@ -87,14 +87,14 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
 
 def latest_mean(steady: Series) -> LatestMean:
     """The mean of the last day's steady runs, with its standard uncertainty (None where not stated): the scatter of the
-    runs by their number, and what they are off together.
+    runs by their number, and what it has of the calibrations that they rest on.
 
     A day of another campaign that overlaps it is part of it, as in the table of all machines.
     """
     last = steady.of_last_day
     count = int(last.sum())
     if count > 1:
-        common = float(steady.part(last).u_common[-1])
+        common = float(np.linalg.norm(steady.part(last).common_of_mean))
         u = float(np.hypot(steady.values[last].std(ddof=1) / np.sqrt(count), common))
     else:
         u = float(steady.u[last][0])
@@ -103,10 +103,30 @@ def latest_mean(steady: Series) -> LatestMean:
     )
 
 
-def all_rest_on(piece: Series) -> tuple[RestsOn, ...]:
-    """What all runs of a piece of history are off together by, as far as it counts in the uncertainty of its last."""
-    u_of = {quantity: float(abs(part[-1])) for quantity, part in piece.in_all_runs.items()}
-    return tuple(rests_on(quantity, u) for quantity, u in u_of.items() if u > COUNTS * piece.u[-1])
+def calibrations(drift: PieceDrift) -> tuple[RestsOn, ...]:
+    """What the runs of the present piece have of calibrated quantities, as far as it counts in the u of a run; of each
+    what the latest mean, the line at the last run and the slope are off by for one standard uncertainty."""
+    piece, latest = drift.piece, drift.whole.part(drift.whole.of_last_day)
+    of_mean = dict(zip(latest.common_parts, np.abs(latest.common_of_mean), strict=True))
+    line, year = drift.line, DAYS_PER_YEAR
+    stated = []
+    for row, (quantity, part) in enumerate(piece.common_parts.items()):
+        rests = part != 0.0
+        if not (np.abs(part) > COUNTS * piece.u).any():
+            continue
+        of_line = of_slope = None
+        if line is not None:
+            level, slope = line.common[row]
+            of_line = float(abs(level + slope * (piece.t[-1] - line.at)))
+            of_slope = float(abs(slope) * year) if drift.stated is not None else None
+        bounded = piece.bounded is not None and bool(piece.bounded[rests].any())
+        stated.append(
+            replace(
+                rests_on(quantity), u=float(of_mean[quantity]), runs=int(rests.sum()), of_runs=len(rests),
+                u_line=of_line, u_slope_per_year=of_slope, at_most=bounded or None,
+            )
+        )  # fmt: skip
+    return tuple(stated)
 
 
 def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedChange:

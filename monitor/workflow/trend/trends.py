@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -11,7 +11,8 @@ import numpy as np
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.records import VOLUMETRIC, Array
-from monitor.reporting import messages
+from monitor.reporting import calibration_messages, messages
+from monitor.statistics import Change
 from monitor.store import (
     NOTE,
     Database,
@@ -33,8 +34,9 @@ from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.forecast import NEXT_CHECK_D
+from monitor.workflow.history.in_common import calibrated_to, stated_differently
 from monitor.workflow.history.limits_of_type import limits_without_parameter
-from monitor.workflow.history.other_instruments import other_instruments
+from monitor.workflow.history.other_instruments import OtherInstruments, between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
@@ -49,7 +51,7 @@ from monitor.workflow.trend.control import Charts
 from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast
 from monitor.workflow.trend.parameter import (
-    all_rest_on,
+    calibrations,
     conditions,
     cycles,
     dated_change,
@@ -98,7 +100,9 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
 
 
 def _history(db: Database, request: TrendRequest) -> MachineHistory:
-    """The history of a machine; campaigns not yet identified are identified first where the database may be written.
+    """The history of a machine, of all parameters: what one of them changed by is told with what all of them show, and
+    with the same probability, whoever asks for it alone. Campaigns not yet identified are identified first where the
+    database may be written.
 
     While none is identified by the newest version of a method's own model, that of the newest which one is.
     """
@@ -112,7 +116,7 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
 
     def read(by: Mapping[str, tuple[str, int]]) -> MachineHistory:
         return machine_history(
-            db, machine, model=model, version=version, parameter=request.parameter, since=request.since, followed_by=by,
+            db, machine, model=model, version=version, since=request.since, followed_by=by,
         )  # fmt: skip
 
     by = followed_by(db, machine)
@@ -134,7 +138,7 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
         history = read(numbered)
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
-        every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters
+        every = history.parameters
         hint = did_you_mean(request.parameter, every)
         raise NotFoundError(
             f"machine {machine} has no parameter {request.parameter!r}; {hint}it has {', '.join(every) or 'none yet'}"
@@ -145,11 +149,15 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
 def _answer(
     db: Database,
     request: TrendRequest,
-    history: MachineHistory,
+    whole: MachineHistory,
     events: list[MachineEvent],
-    past: Mapping[str, ParameterPast],
+    every: Mapping[str, ParameterPast],
     refers_to: Mapping[str, str],
 ) -> TrendAnswer:
+    """The answer from the history and the past of all parameters, about those that were asked for."""
+    asked = request.parameter
+    history = whole if asked is None else whole.own_copy(asked)
+    past = {name: parameter for name, parameter in every.items() if asked in (None, name)}
     refuted = model_refuted(history)
     head = TrendAnswer(
         machine=request.machine,
@@ -169,6 +177,7 @@ def _answer(
             *_of_older_version(db, request),
             *_limits_of_type(db, history, past if request.parameter is None else None),
             *_refuted(refuted),
+            *_calibrations(history),
         ),
         false_alarm=FALSE_ALARM,
         seed=SEED,
@@ -188,9 +197,9 @@ def _answer(
         None if reference is None else (days_since_1970(reference[0]), days_since_1970(reference[1])),
     )
     check = _next_check(history, request)
-    page = _Page(request, history, charts, check)
+    page = _Page(request, history, charts, check, between_instruments(whole, every))
     parameters = with_discovery_rates({name: page.parameter(parameter) for name, parameter in past.items()})
-    parameters = _with_event_steps(parameters, event_steps(past, events))
+    parameters = _with_event_steps(parameters, event_steps(every, events))
     control = ControlCharts(
         charts.period(), charts.of_vector(history.parameters, np.random.default_rng(SEED))
     )
@@ -236,6 +245,18 @@ def _refuted(refuted: ModelRefuted | None) -> tuple[str, ...]:
     latest = refuted.campaigns[-1]
     names = tuple(campaign.campaign for campaign in refuted.campaigns)
     return (messages.model_refuted(names, refuted.judged, latest.model, latest.p_value),)
+
+
+def _calibrations(history: MachineHistory) -> Iterator[str]:
+    """Which identifications do not say what their runs have of calibrations, and which calibrations are stated
+    differently."""
+    unstored = tuple(name for name in history.calibrations.unstored if (history.campaign == name).any())
+    if unstored:
+        yield calibration_messages.calibrations_not_stored(unstored)
+    for first, second in stated_differently(history.common_parts):
+        yield calibration_messages.stated_differently(
+            first.of, first.certificate, first.quantity, calibrated_to(first), calibrated_to(second)
+        )
 
 
 def _not_followed(history: MachineHistory) -> list[str]:
@@ -285,6 +306,7 @@ class _Page:
     history: MachineHistory
     charts: Charts
     check: float
+    between: Mapping[Change, OtherInstruments]
 
     def parameter(self, past: ParameterPast) -> ParameterTrend:
         """The long view of one parameter."""
@@ -302,7 +324,7 @@ class _Page:
             changes=tuple(
                 replace(
                     dated_change(change, series, search.least_p),
-                    between_instruments=other_instruments(self.history, past, change),
+                    between_instruments=self.between.get(change),
                 )
                 for change in search.changes
             ),
@@ -319,7 +341,7 @@ class _Page:
             why_no_backtest=why_no_test,
             control=self.charts.of(self.history.parameters.index(series.name)),
             q_value=None,
-            rests_on=all_rest_on(drift.piece) or None,
+            rests_on=calibrations(drift) or None,
         )
 
     def _channels(self, past: ParameterPast) -> dict[str, Array]:

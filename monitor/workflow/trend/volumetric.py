@@ -94,7 +94,7 @@ def _held(piece: Series) -> Trend:
         at=at, level_at=float(piece.values.mean()), slope=0.0, u_slope=0.0, slope_interval=(0.0, 0.0),
         dof=float(max(count - 1, 1)), p_value=1.0, covariance=np.array([[level * level, 0.0], [0.0, 0.0]]), within=sd,
         between=0.0, run_sd=sd, n=n, days=count, confidence=0.95, robust_slope=0.0, robust_interval=None,
-        monotone=None,
+        monotone=None, common=np.column_stack([piece.common_of_mean, np.zeros(len(piece.common_parts))]),
     )  # fmt: skip
 
 
@@ -171,15 +171,15 @@ def _residuals(parameters: _Extrapolated) -> Array:
 
 
 def _in_common(parameters: _Extrapolated) -> Array:
-    """What the p parameters are off together (q, p), for one standard uncertainty of each of q quantities."""
-    of_each = [parameters.drifts[name].piece.in_all_runs for name in parameters.lines]
+    """What levels and slopes of the p parameters are off together by (q, p, 2), for one standard uncertainty of each of
+    q quantities."""
+    of_each = [
+        dict(zip(parameters.drifts[name].piece.common_parts, line.common, strict=True))
+        for name, line in parameters.lines.items()
+    ]
     quantities = dict.fromkeys(quantity for parts in of_each for quantity in parts)
-    return np.array(
-        [
-            [float(parts[quantity][-1]) if quantity in parts else 0.0 for parts in of_each]
-            for quantity in quantities
-        ]
-    )
+    none = np.zeros(2)
+    return np.array([[parts.get(quantity, none) for parts in of_each] for quantity in quantities])
 
 
 def _backtest(

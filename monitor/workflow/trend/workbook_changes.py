@@ -5,11 +5,12 @@ Changes and drifts of the search, and the steps at recorded events, at which the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 
 from monitor import progress
 from monitor.reporting import messages
+from monitor.statistics import Change
 from monitor.store import (
     ComputedChange,
     Database,
@@ -20,7 +21,7 @@ from monitor.store import (
     numbered_by,
 )
 from monitor.workflow.history.event_steps import EventStep, event_steps
-from monitor.workflow.history.other_instruments import other_instruments
+from monitor.workflow.history.other_instruments import OtherInstruments, between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.trend.parameter import dated_change
 
@@ -36,7 +37,8 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         history = machine_history(db, name, followed_by=numbered_by(db, name))
         events = machine_events(db, name)
         past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-        changes = [row for parameter in past.values() for row in _changes(name, history, parameter)]
+        others = between_instruments(history, past)
+        changes = [row for parameter in past.values() for row in _changes(name, others, parameter)]
         changes += [_at_event(name, step) for step in event_steps(past, events)]
         rows += changes
         if not changes and (past or not history.unidentified):
@@ -47,10 +49,12 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
     return tuple(rows)
 
 
-def _changes(machine: str, history: MachineHistory, past: ParameterPast) -> Iterator[ComputedChange]:
+def _changes(
+    machine: str, between: Mapping[Change, OtherInstruments], past: ParameterPast
+) -> Iterator[ComputedChange]:
     search = past.search
     for change in (*search.changes, *search.drifts):
-        dated, others = dated_change(change, past.series), other_instruments(history, past, change)
+        dated, others = dated_change(change, past.series), between.get(change)
         at = (
             None
             if dated.at is None
