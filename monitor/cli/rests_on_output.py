@@ -61,12 +61,12 @@ def _shares(name: str, unit: str, each: RestsOn) -> str:
         "line": (each.u_line, unit),
         "slope": (each.u_slope_per_year, f"{unit} a year"),
     }
-    words = ", ".join(
+    listed = ", ".join(
         f"{what} {output.two_digits(u)} {of}" if u else f"{what} 0"
         for what, (u, of) in shares.items()
         if u is not None
     )
-    return f"{name}, {each.runs} of {each.of_runs} runs: {words}"
+    return f"{name}, {each.runs} of {each.of_runs} runs: {listed}"
 
 
 def steps_at_once(answer: TrendAnswer) -> Iterator[str]:

@@ -204,10 +204,10 @@ def _p_value(change: DatedChange) -> str:
 def _change(name: str, change: DatedChange) -> str:
     others = change.between_instruments
     # Of several steps at once one sentence says it.
-    words = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
+    exchanged = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, {_p_value(change)}){words}"
+        f"({_interval(change.interval)}, {_p_value(change)}){exchanged}"
     )
 
 

@@ -248,6 +248,14 @@ def _with_season(line: Trend, alone: BlockLines, t: Array, cycle: float | None) 
     )
 
 
+def _columns(values: npt.ArrayLike | None, name: str, runs: int) -> Array:
+    """Columns (n, e) of so many runs, none where nothing is given. Raises ``DataError`` for another number of rows."""
+    columns = np.empty((runs, 0)) if values is None else as_matrix(values, name)
+    if len(columns) != runs:
+        raise DataError(f"{name} has {len(columns)} rows; {runs} are needed, one for each run.")
+    return columns
+
+
 def trend(
     values: npt.ArrayLike,
     times: npt.ArrayLike,
@@ -282,9 +290,7 @@ def trend(
     y = as_vector(values, "values", least=3)
     t = as_vector(times, "times", length=len(y))
     run_u = None if u is None else as_positive(u, "u", length=len(y))
-    columns = np.empty((len(y), 0)) if beside is None else as_matrix(beside, "beside")
-    if len(columns) != len(y):
-        raise DataError(f"beside has {len(columns)} rows; {len(y)} are needed, one for each run.")
+    columns, shared = _columns(beside, "beside", len(y)), _columns(common, "common", len(y))
     as_probability(level, "level")
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     count = int(index.max()) + 1
@@ -313,9 +319,6 @@ def trend(
     beside_line = _side_by_side(means, count)[index]
     design = np.column_stack([np.ones_like(t), beside_line, on_day - at])
     fit = fit_with_days(y, design, run_u, index)
-    shared = np.empty((len(y), 0)) if common is None else as_matrix(common, "common")
-    if len(shared) != len(y):
-        raise DataError(f"common has {len(shared)} rows; {len(y)} are needed, one for each run.")
     of_days = _side_by_side([by_day(column) for column in shared.T], count)
     in_common = _in_common(fit, design[np.unique(index, return_index=True)[1]], of_days)
     judged = _Days(fit.weight, time, plain.value, plain.beside)

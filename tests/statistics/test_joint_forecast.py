@@ -55,7 +55,7 @@ def test_what_all_runs_are_off_by_together_is_drawn_once_for_all_parameters():
     rng = np.random.default_rng(3)
     values = 5.0 + 0.5 * rng.normal(size=(30, 2))
     lines, now = lines_of(values), float(WEEKS[-1])
-    common, question = np.array([[2.0, 2.0]]), LengthQuestion(8.0, now, [now], now + 1.0)
+    common, question = np.array([[[2.0, 0.0], [2.0, 0.0]]]), LengthQuestion(8.0, now, [now], now + 1.0)
     for signs, both in ((1.0, 4.0), (-1.0, 0.0)):
         vectors = ErrorVectors(np.array([[[1.0, signs], [0.0, 0.0], [0.0, 0.0]]]), np.zeros((1, 3)))
         found = forecast_longest(

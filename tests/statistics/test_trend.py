@@ -171,7 +171,7 @@ def test_without_ranks_the_line_is_the_same():
     whole, line = (trend(y, t, u=u, days=day, robust=robust) for robust in (True, False))
     assert np.isnan(line.robust_slope)
     assert (line.robust_interval, line.monotone) == (None, None)
-    ranked = {"robust_slope", "robust_interval", "monotone", "covariance"}
+    ranked = {"robust_slope", "robust_interval", "monotone", "covariance", "common"}
     for field in {field.name for field in fields(whole)} - ranked:
         assert getattr(whole, field) == getattr(line, field), field
     assert np.array_equal(whole.covariance, line.covariance)

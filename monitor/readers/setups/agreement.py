@@ -62,13 +62,13 @@ def check_agreement(setups: Sequence[tuple[Table, Setup]], takes_scale: Sequence
 
 def _fault_of_certificate(table: Table, other: Table, setup: Setup, stated: Stated) -> None:
     """Note that two setups state one calibrated quantity by different certificates: two calibrations are two values."""
-    here, there = (
+    own_words, other_words = (
         f"by certificate {quoted(each.data['certificate'])}" if "certificate" in each.data else "without one"
         for each in (table, other)
     )
     table.fault(
         "certificate",
-        f"the {stated.name} of {quoted(setup.instrument)} is calibrated {here} here and {there} in setup "
+        f"the {stated.name} of {quoted(setup.instrument)} is calibrated {own_words} here and {other_words} in setup "
         f"{quoted(other.data['id'])}; one instrument has one calibration in a campaign: write the one that held "
         "in each, or name the instrument otherwise where it was calibrated anew between them or is another one",
     )

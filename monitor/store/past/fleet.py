@@ -250,11 +250,11 @@ def _common(
 ) -> CommonSums:
     """What blocks have of calibrated quantities, in display units, by the places of their cells among ``cells``."""
     order = np.argsort(cells["cell"])
-    known = np.isin(columns["cell"], cells["cell"])
-    rows = order[np.searchsorted(cells["cell"], columns["cell"][known], sorter=order)]
+    in_cells = np.isin(columns["cell"], cells["cell"])
+    rows = order[np.searchsorted(cells["cell"], columns["cell"][in_cells], sorter=order)]
     factor = np.asarray(cells["factor"], dtype=np.float64)[rows]
-    p, tp = (np.asarray(columns[name], dtype=np.float64)[known] / factor for name in ("p", "tp"))
-    quantity, block = (columns[name][known].astype(np.intp) for name in ("quantity_no", "block"))
+    p, tp = (np.asarray(columns[name], dtype=np.float64)[in_cells] / factor for name in ("p", "tp"))
+    quantity, block = (columns[name][in_cells].astype(np.intp) for name in ("quantity_no", "block"))
     return CommonSums(rows, quantity, block, p, tp)
 
 

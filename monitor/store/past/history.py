@@ -246,7 +246,7 @@ def _read(
         unidentified=_unidentified(campaigns, recorded, identified),
         channels=channels,
         fits=_fits(db, campaigns, identified),
-        common_parts=_common_parts(db, identified.values(), rows, names) if has_parts else {},
+        common_parts=_common_parts(db, identified.values(), rows, names, has_parts=has_parts),
         calibrations=calibrations,
     )
 
@@ -256,10 +256,12 @@ def _common_parts(
     identified: Iterable[_Identified],
     rows: Mapping[tuple[int, int], int],
     names: tuple[str, ...],
+    *,
+    has_parts: bool,
 ) -> dict[CommonQuantity, Array]:
-    """What the values (n, p) of the history have of each calibrated quantity, in display units."""
+    """What the values (n, p) of the history have of each calibrated quantity, in display units, where asked for."""
     at = {name: column for column, name in enumerate(names)}
-    heads = {head.number: head for head in identified}
+    heads = {head.number: head for head in identified if has_parts}
     places: dict[int, tuple[list[int], list[int], Array]] = {}
     for number, head in heads.items():
         read = [index for index, name in enumerate(head.parameters) if name in at]

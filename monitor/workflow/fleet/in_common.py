@@ -51,8 +51,10 @@ def common_of_lines(
     line = line_of[common.cell]
     used = line >= 0
     used[used] = groups[line[used], common.block[used]] > 0.0
-    key, place = np.unique(np.column_stack([line[used], common.quantity[used]]), axis=0, return_inverse=True)
-    p, tp = (np.bincount(place.ravel(), column[used], len(key)) for column in (common.p, common.tp))
+    key, pair_of_row = np.unique(
+        np.column_stack([line[used], common.quantity[used]]), axis=0, return_inverse=True
+    )
+    p, tp = (np.bincount(pair_of_row.ravel(), column[used], len(key)) for column in (common.p, common.tp))
     t = blocks.t[selected]
     number = np.maximum(groups.sum(axis=1), 1.0)
     at = (groups * t).sum(axis=1) / number

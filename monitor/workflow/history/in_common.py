@@ -94,8 +94,8 @@ def with_unstored(history: MachineHistory) -> tuple[dict[CommonQuantity, Array],
         runs = history.campaign == campaign
         if not runs.any():
             continue
-        known = [quantity for quantity in parts if (quantity.of, quantity.certificate) in stated]
-        quantity = known[0] if known else CommonQuantity(*stated[0], CALIBRATION, np.inf)
+        of_others = [quantity for quantity in parts if (quantity.of, quantity.certificate) in stated]
+        quantity = of_others[0] if of_others else CommonQuantity(*stated[0], CALIBRATION, np.inf)
         part = parts.setdefault(quantity, np.zeros(history.u.shape))
         sign = np.where(part.sum(axis=0) < 0.0, -1.0, 1.0)
         parts[quantity] = np.where(runs[:, np.newaxis], sign * np.nan_to_num(history.u), part)

@@ -173,13 +173,13 @@ def _jointly(
 ) -> _Jointly | None:
     """The steps of one exchange at once; None where nothing is known of the calibrations."""
     last, first = min(step.last for step in steps), max(step.first for step in steps)
-    found = {step.past.series.name: (step.change.size, step.change.u) for step in steps}
+    stepped = {step.past.series.name: (step.change.size, step.change.u) for step in steps}
     differences: dict[str, tuple[float, float]] = {}
     for name, parameter in past.items():
-        difference = found.get(name) or _difference(parameter.series.steady, measuring.history, last, first)
+        difference = stepped.get(name) or _difference(parameter.series.steady, measuring.history, last, first)
         if difference is not None and measuring.apart(name, last, first).any():
             differences[name] = difference
-    if len(differences.keys() & found.keys()) < 2:
+    if len(differences.keys() & stepped.keys()) < 2:
         return None
     sizes, u = np.array(list(differences.values())).T
     apart = np.array([measuring.apart(name, last, first) for name in differences])
