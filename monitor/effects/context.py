@@ -73,7 +73,8 @@ class Context:
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
-    (n,) numbers what was measured without a break, None where that is the run.
+    (n,) numbers what was measured without a break, None where that is the run; ``resting`` names the targets beside
+    the machine.
     """
 
     chain: Chain
@@ -90,6 +91,7 @@ class Context:
     sight: Array | None = None
     instruments: InstrumentRows | None = None
     stretch: npt.NDArray[np.int64] | None = None
+    resting: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.run)
