@@ -74,7 +74,8 @@ class Context:
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
     (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
-    scale shapes and drivers where these probings are only planned, None where these are it.
+    scale shapes and drivers where these probings are only planned, None where these are it; ``resting`` names the
+    targets beside the machine.
     """
 
     chain: Chain
@@ -92,6 +93,7 @@ class Context:
     instruments: InstrumentRows | None = None
     stretch: npt.NDArray[np.int64] | None = None
     measured: Context | None = None
+    resting: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.run)

@@ -16,16 +16,17 @@ from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.several_instead import several_instead
 from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
+from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
 from monitor.discovery.machine.suspects.wander import with_base_instead
 from monitor.discovery.search.scan import by_error_taken_away, scan
 
-# More orders of gears, and drifts, than these are noise that none explains.
-MOST_GEARS, MOST_DRIFTS = 12, 60
+# More orders of gears, drifts, and moves of a station than these are noise that none explains.
+MOST_GEARS, MOST_DRIFTS, MOST_MOVES = 12, 60, 4
 
 
 def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
-    """Scan a scene; where gears or drifts of one run stand out of what it leaves, once more with them; at last with
-    tables instead of several shapes. Return the scene with the candidates that were added."""
+    """Scan a scene; where gears, drifts of one run or moves of the station stand out of what it leaves, once more with
+    them; at last with tables instead of several shapes. Return the scene with the candidates that were added."""
 
     def scanned(
         scene: ChainScene, begin: Sequence[ChainCandidate], shared: Sequence[ChainCandidate] = ()
@@ -34,12 +35,18 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
 
     gears: set[str] = set()
     drifts: set[str] = set()
+    moves: set[str] = set()
     selected: Sequence[ChainCandidate] = ()
     while True:
         result = standing_out(scene, scanned(scene, selected))
         selected = result.candidates
         new = _not_yet(gear_variants(scene, selected, rate), gears, MOST_GEARS)
         new += _not_yet(drifts_of_runs(scene, selected, rate), drifts, MOST_DRIFTS)
+        moved = _not_yet(station_moves(scene, selected, rate), moves, MOST_MOVES)
+        if moved:
+            # Several drifts together are what comes nearest to one move: each has to stand beside it.
+            selected = [candidate for candidate in selected if not may_be_a_move(candidate)]
+        new += moved
         if not new:
             if not all_curves_were_searched(scene.fit):
                 scene, result = with_tables(scene, result, scanned)

@@ -12,7 +12,7 @@ __all__ = ["HEADS", "PROBE_HEAD", "ArtefactChange", "normals_of", "parse_artefac
 
 #: What the texts of these changes begin with, before a colon; no term of a chain is called so.
 PROBE_HEAD = "probe"
-HEADS = ("ball", "artefact", "stem", "shape", "tracker", PROBE_HEAD)
+HEADS = ("ball", "artefact", "stem", "shape", "tracker", "base", PROBE_HEAD)
 
 
 def parse_artefact(body: str) -> ArtefactChange:
@@ -22,6 +22,7 @@ def parse_artefact(body: str) -> ArtefactChange:
         raise EffectError(
             f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
             "artefact:expansion@ambient_degC, stem:gravity, shape, probe:lobing2, probe:lobing3, "
-            "tracker:shift@run_time and tracker:turn@run_time"
+            "tracker:shift@run_time, tracker:turn@run_time, tracker:moved(run 7, sequence 23) and "
+            "base:moved(run 7, sequence 23)"
         )
     return change

@@ -47,7 +47,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
     u = campaign.probe.scale_uncertainty
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     return TrackingProblem(
-        context=replace(context, nominal=carried),
+        context=replace(context, nominal=carried, resting=frozenset(fixed)),
         base=model.base_of(chain, outside=True),
         added=model.added_to(chain, outside=True),
         sigma=np.full((len(context), 3), campaign.probe.standard_uncertainty),

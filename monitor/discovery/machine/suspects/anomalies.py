@@ -259,7 +259,7 @@ def _ball_move(
     moved[touches[first[best] :]] += np.eye(3)
     vectors = deviations.vectors[rows] / np.sqrt(deviations.inflation[rows])[:, None]
     judged = ~fit.left_out[rows]
-    likelihood = tails.shift(vectors[judged], moved[judged], shifts[best])
+    likelihood = tails.shift(vectors[judged], basis[judged], moved[judged], shifts[best])
     chi_square[best] = min(float(chi_square[best]), max(likelihood, 0.0))
     row = int(rows[touches[first[best]]])
     # The tip followed the ball, so the vector from where the ball was to the tip is its shift.

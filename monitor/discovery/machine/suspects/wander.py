@@ -21,6 +21,7 @@ from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
 from monitor.effects import ArtefactEffect, ChainEffect, Context
+from monitor.effects.artefact.station import BaseMoved
 from monitor.effects.description import Description
 from monitor.effects.driver import HeatDriver
 from monitor.effects.drivers import Always
@@ -58,9 +59,11 @@ class TrackerWander:
 
 
 def is_drift_of_machine(candidate: ChainCandidate) -> bool:
-    """Whether an effect is a drift with time or heat of anything but the tracker."""
+    """Whether an effect is a drift with time or heat, or a move, of anything but the tracker."""
     effect = candidate.effect
-    return not isinstance(effect, ArtefactEffect) and isinstance(effect.driver, HeatDriver)
+    if isinstance(effect, ArtefactEffect):
+        return isinstance(effect.change, BaseMoved)
+    return isinstance(effect.driver, HeatDriver)
 
 
 def tracker_wander(scene: ChainScene) -> tuple[ChainCandidate, ...]:
@@ -71,9 +74,13 @@ def tracker_wander(scene: ChainScene) -> tuple[ChainCandidate, ...]:
         return ()
     runs = len(problem.runs)
     visits = int(resting.sum()) // (len(problem.resting) * runs)
-    nodes = int(np.clip(visits // VISITS_A_NODE, FEWEST_NODES, MOST_NODES))
-    wander = ArtefactEffect(TrackerWander(nodes), Always(), "")
-    return scene_of(scene.fit, [Variant(wander.text, wander)]).candidates
+    return wander(scene, int(np.clip(visits // VISITS_A_NODE, FEWEST_NODES, MOST_NODES)))
+
+
+def wander(scene: ChainScene, nodes: int) -> tuple[ChainCandidate, ...]:
+    """What a tracker that walks along a curve of so many nodes could do."""
+    curve = ArtefactEffect(TrackerWander(nodes), Always(), "")
+    return scene_of(scene.fit, [Variant(curve.text, curve)]).candidates
 
 
 def with_base_instead(scene: ChainScene, result: ChainScan, rate: float) -> ChainScan:

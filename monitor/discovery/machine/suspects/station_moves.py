@@ -1,0 +1,114 @@
+"""A station that moved once within a run: from a reading on, all that a tracker sees stands elsewhere, or all that the
+machine carries.
+
+Every moment is tried, with a shift and a turn. A move has to say more at its price, all moments paid for, than the same
+motion by and by through that run, evenly or settling, and than a tracker that walks along a curve of some nodes; drifts
+of the catalogue compete with it in the scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.suspects.wander import MOST_NODES, wander
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.evidence import Evidence, weigh_beside
+from monitor.effects import ArtefactEffect
+from monitor.effects.artefact.station import BaseMoved, Moved, TrackerMoved
+from monitor.effects.artefact.tracker import TRACKER_COLUMNS
+from monitor.effects.drivers import Always, RunTime
+from monitor.effects.drivers.settling import Settling
+
+# Readings before and after: six coefficients follow fewer.
+READINGS_EACH_SIDE = 8
+# So many moments of a run are tried, then those between the best one and its neighbours.
+MOMENTS = 40
+# A tripod is knocked more easily than a machine; resting targets outweigh that at once.
+ODDS_OF_BASE = 3.0
+# Time constants of what settles in a run, in parts of it.
+SETTLING = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)
+
+
+def station_moves(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> list[ChainVariant]:
+    """The move of the tracker and that of the machine that explain most beside selected effects; none where none stands
+    out at a ``rate``."""
+    context = scene.fit.problem.context
+    if any(name not in context.columns for name in TRACKER_COLUMNS):
+        return []
+    steady = [candidate for candidate in selected if not may_be_a_move(candidate)]
+    found = [
+        best for kind in (TrackerMoved, BaseMoved) if (best := _likeliest(scene, steady, kind)) is not None
+    ]
+    walks = weigh_beside(scene, wander(scene, MOST_NODES), steady)
+    return [
+        each.candidate.variant
+        for each in found
+        if each.p_value <= rate
+        and each.score
+        > max((other.score for other in (*walks, *_by_and_by(scene, steady, each))), default=0.0)
+    ]
+
+
+def _by_and_by(
+    scene: ChainScene, steady: Sequence[ChainCandidate], move: Evidence[ChainCandidate]
+) -> list[Evidence[ChainCandidate]]:
+    """The motion of a move through all of its run, evenly or settling, most likely first."""
+    variant, context = move.candidate.variant, scene.fit.problem.context
+    assert isinstance(variant.effect, ArtefactEffect)
+    change = variant.effect.change
+    assert isinstance(change, Moved)
+    of_run = context.run == change.run
+    lasted = float(np.ptp(context.time[of_run]))
+    drivers = [RunTime(), *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0)]
+    whole = replace(change, sequence=int(context.sequence[of_run].min()))
+    drifts = [ArtefactEffect(whole, driver, f"drift {number}") for number, driver in enumerate(drivers)]
+    variants = [Variant(drift.text, drift, len(drivers), variant.odds) for drift in drifts]
+    return weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
+
+
+def may_be_a_move(candidate: ChainCandidate) -> bool:
+    """Whether an effect is one of the frame of the tracker or of the machine's base that follows a driver: what a
+    single move is taken for."""
+    head, _, driver = candidate.family.partition("@")
+    first = candidate.fit.problem.context.chain.joints[0].name
+    return bool(driver) and (head.startswith("tracker:") or head.endswith(f"0{first}"))
+
+
+def _sequence_of(candidate: ChainCandidate) -> int:
+    """The reading from which on a move is there."""
+    effect = candidate.effect
+    assert isinstance(effect, ArtefactEffect) and isinstance(effect.change, Moved)
+    return effect.change.sequence
+
+
+def _likeliest(
+    scene: ChainScene, steady: Sequence[ChainCandidate], kind: type[Moved]
+) -> Evidence[ChainCandidate] | None:
+    """The likeliest move of a kind of all runs."""
+    context = scene.fit.problem.context
+    moments = {
+        int(run): np.unique(context.sequence[context.run == run])[READINGS_EACH_SIDE:-READINGS_EACH_SIDE]
+        for run in scene.fit.problem.runs
+    }
+    tries = sum(map(len, moments.values()))
+
+    def best_of(run: int, sequences: Iterable[int]) -> Evidence[ChainCandidate] | None:
+        moves = (ArtefactEffect(kind(run, int(sequence)), Always(), "") for sequence in sequences)
+        odds = ODDS_OF_BASE if kind is BaseMoved else 1.0
+        variants = [Variant(move.text, move, tries, odds) for move in moves]
+        weighed = weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
+        return weighed[0] if weighed else None
+
+    found = []
+    for run, sequences in moments.items():
+        step = max(len(sequences) // MOMENTS, 1)
+        coarse = best_of(run, sequences[::step])
+        if coarse is not None:
+            at = int(np.searchsorted(sequences, _sequence_of(coarse.candidate)))
+            fine = best_of(run, sequences[max(at - step, 0) : at + step + 1])
+            found.append(fine or coarse)
+    return max(found, key=lambda each: each.score, default=None)
