@@ -68,6 +68,8 @@ def parts_of(value: object) -> Iterator[bytes]:
         yield str(len(value)).encode()
         for inner in value:
             yield from parts_of(inner)
+    elif isinstance(value, frozenset):
+        yield from parts_of(sorted(value))
     elif isinstance(value, (bytes, str, int, float, type(None), date, tzinfo)):
         yield repr(value).encode()
     else:
