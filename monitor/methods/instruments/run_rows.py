@@ -99,12 +99,19 @@ class RunRows:
         return projector * scale[None, :] / scale[:, None], determined, rank
 
 
-def run_rows(problem: ChainProblem, solution: Solution, run: int) -> RunRows:
-    """The rows of a run of a joint fit; by itself a run has its covariance in that fit once it knows what the others
-    say of what they share."""
+def run_rows(
+    problem: ChainProblem, solution: Solution, run: int, *, knows_others: bool = False
+) -> RunRows:
+    """The rows of a run at the point of a joint fit, by itself: with what is stated of its bars and scales.
+
+    A run that ``knows_others`` has its covariance in the joint fit: it knows what the other runs say of what they
+    share. Whether instruments agree is asked without that: each run would vouch for the same wrong bar in the others.
+    """
     assert isinstance(problem, InstrumentProblem)
     index = int(np.searchsorted(problem.runs, run))
-    at = problem.beside_others(solution, run).linearise(solution.local, solution.common)
+    alone = replace(problem, shares_bars=False, from_others=None)
+    by_itself = problem.beside_others(solution, run) if knows_others else alone
+    at = by_itself.linearise(solution.local, solution.common)
     whole = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
     return RunRows(
         problem,

@@ -4,7 +4,8 @@ The joint estimate is C J' r, linear in the whitened readings r, each of varianc
 the sum of the squares of its row of C J', and the readings of one instrument have their part of that sum (GUM, 5.1.3).
 What an instrument says alone is one Gauss-Newton step from the joint point on its own rows: where instruments disagree
 by five times U, a tenth of u beside the fit of its own campaign. What its rows do not separate on the nominal machine
-is left out of that step, as in ``InstrumentProblem.linearise``. Where its readings, after that step, scatter more than
+is left out of that step, as in ``InstrumentProblem.linearise``. Of bars and scales it knows what is stated, not what
+the instruments of other runs made of them. Where its readings, after that step, scatter more than
 it states, their own scatter counts, with its degrees of freedom (JCGM 100:2008, 4.2 and G.4.1); less never makes it
 surer. Setups whose ``instrument`` is written the same are one instrument.
 """
@@ -25,7 +26,7 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
     at = run_rows(problem, solution, run)
     jacobian, residual, index = at.jacobian, at.residual, int(np.searchsorted(problem.runs, run))
     count = len(problem.base_names)
-    inverse = inverse_of(jacobian, RANK_TOLERANCE)
+    inverse = inverse_of(run_rows(problem, solution, run, knows_others=True).jacobian, RANK_TOLERANCE)
     joint = solution.local[index, :count]
     free = solution.local_free[index, :count]
     squares = np.where(free[:, None], inverse[:count] ** 2, np.nan)
