@@ -68,6 +68,29 @@ def test_a_bar_read_with_the_other_sign_is_refused_beside_a_laser(tmp_path: Path
     assert "widersprechen sich in" in ground_sentence(ground, texts_of("de"))
 
 
+def runs_with_a_bar(folder: Path, off: float, runs: int) -> Campaign:
+    """A laser and a ball bar, ``off`` its stated length by so much, once in each of so many runs."""
+    chain, rows, text = shop.machine(0.0), [], ""
+    for run in range(1, runs + 1):
+        rng = np.random.default_rng(run)
+        instruments = (shop.laser(chain, rng, 1), shop.ball_bar(chain, rng, 10.0, off))
+        text = "".join(setups for setups, _ in instruments)
+        rows += [{**row, "run": run} for _, of in instruments for row in of]
+    started = [f"2026-03-{run:02d}T20:00:00+00:00" for run in range(2, runs + 2)]
+    campaign = read_campaign(chain.write(folder / f"runs-{runs}", text, rows, started=started))
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+def test_runs_do_not_vouch_for_the_same_wrong_bar_in_each_other(tmp_path: Path) -> None:
+    """The laser of one run calibrates the bar of another, and would make it right by what it is wrong."""
+    off = 15.0 * shop.BAR_U
+    for runs in (1, 2):
+        ground = grounds(runs_with_a_bar(tmp_path / "wrong", off, runs))[GroundKind.INSTRUMENTS]
+        assert ground.size > 2.0 > ground.limit
+    assert GroundKind.INSTRUMENTS not in grounds(runs_with_a_bar(tmp_path / "right", shop.BAR_U, 2))
+
+
 def test_instruments_that_agree_are_no_ground(tmp_path: Path) -> None:
     for seed in range(31, 36):
         assert grounds(week(tmp_path / str(seed), seed)) == {}

@@ -99,9 +99,7 @@ class RunRows:
         return projector * scale[None, :] / scale[:, None], determined, rank
 
 
-def run_rows(
-    problem: ChainProblem, solution: Solution, run: int, *, knows_others: bool = False
-) -> RunRows:
+def run_rows(problem: ChainProblem, solution: Solution, run: int, *, knows_others: bool = False) -> RunRows:
     """The rows of a run at the point of a joint fit, by itself: with what is stated of its bars and scales.
 
     A run that ``knows_others`` has its covariance in the joint fit: it knows what the other runs say of what they
