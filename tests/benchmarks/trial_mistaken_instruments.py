@@ -81,11 +81,11 @@ FAULTS: dict[str, tuple[Fault, str]] = {
     "level in mrad": (readings("level", 1e-3, ("reading_urad",)), "reading_urad was in mrad in setup level"),
     "dial, other sign": (readings("square", -1.0), "other way round in setup square"),
     "dial in mm": (readings("square", 1e-3), "reading_um was in mm in setup square"),
-    "bar-xy, X and Y": (axes("bar-xy", "X", "Y"), "x_mm and y_mm were exchanged in setup bar-xy"),
-    "bar-yz, Y and Z": (axes("bar-yz", "Y", "Z"), "y_mm and z_mm were exchanged in setup bar-yz"),
-    "R-test, X and Y": (axes("r-test", "X", "Y"), "x_mm and y_mm were exchanged in setup r-test"),
-    "laser-Y, Y and Z": (axes("laser-Y", "Y", "Z"), "y_mm and z_mm were exchanged in setup laser-Y"),
-    "laser-X, X and Y": (axes("laser-X", "X", "Y"), "x_mm and y_mm were exchanged in setup laser-X"),
+    "bar-xy, X and Y": (axes("bar-xy", "X", "Y"), "were exchanged in setup bar-xy"),
+    "bar-yz, Y and Z": (axes("bar-yz", "Y", "Z"), "were exchanged in setup bar-yz"),
+    "R-test, X and Y": (axes("r-test", "X", "Y"), "were exchanged in setup r-test"),
+    "laser-Y, Y and Z": (axes("laser-Y", "Y", "Z"), "were exchanged in setup laser-Y"),
+    "laser-X, X and Y": (axes("laser-X", "X", "Y"), "were exchanged in setup laser-X"),
 }  # fmt: skip
 
 #: Errors that are real, with their sizes: of the machine by what it does to its errors, of instruments by their names.

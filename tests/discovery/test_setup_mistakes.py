@@ -116,4 +116,4 @@ def test_exchanged_axes_of_a_setup_are_said_where_the_fit_settles(right: Campaig
     readings = {name: np.array(values) for name, values in probings.readings.items()}
     readings["X"][rows], readings["Y"][rows] = probings.readings["Y"][rows], probings.readings["X"][rows]
     told = _told(replace(right, probings=replace(probings, readings=readings)))
-    assert told == ["the columns x_mm and y_mm were exchanged in setup bar-xy"]
+    assert told == ["the columns y_mm and x_mm were exchanged in setup bar-xy"]

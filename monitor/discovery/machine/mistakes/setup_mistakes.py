@@ -118,7 +118,7 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
     one."""
-    mask = np.isin(campaign.probings.target, doubted.setups)
+    mask = np.isin(_setup_of_rows(campaign), doubted.setups)
     part = replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
@@ -170,6 +170,12 @@ def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
         turned_axes([axis for axis in linear if axis in moved], turning),
         exchanged_axes(linear, turning, moved),
     )
+
+
+def _setup_of_rows(campaign: Campaign) -> npt.NDArray[np.str_]:
+    """The setup (n,) of every row."""
+    number = campaign.probings.channels["setup"].astype(np.int64) - 1
+    return np.array([setup.id for setup in campaign.artefact.setups])[number]
 
 
 def _with_its_columns(probings: Probings) -> Probings:
