@@ -126,7 +126,8 @@ class Machine:
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe; ``standard_uncertainty`` of a coordinate and ``tip`` (spindle frame) in mm, of a scale in mm/mm."""
+    """A probe; ``standard_uncertainty`` of a coordinate and ``tip`` (spindle frame) in mm, of a scale in mm/mm;
+    ``known`` names what holds without an uncertainty: the scale of a tracker."""
 
     id: str
     model: str
@@ -134,6 +135,7 @@ class Probe:
     tip: tuple[float, float, float] | None = None
     certificate: str | None = None
     scale_uncertainty: float | None = None
+    known: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ from monitor.workflow.explain.explain_answer import CurveExplanation
 from monitor.workflow.explain.explain_answer import CurveMissing
 from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.explain_answer import InstrumentAlias
-from monitor.workflow.explain.explain_answer import LikelyMistake
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.explain_answer import MachineMissing
 from monitor.workflow.explain.explain_answer import MovedTarget
@@ -57,6 +56,7 @@ from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.refuted import RefutedCampaign
 from monitor.workflow.identify.answer import CurveNoise
+from monitor.workflow.identify.answer import LikelyMistake
 from monitor.workflow.instruments.answer import AgainstOthers
 from monitor.workflow.instruments.answer import Disagreement
 from monitor.workflow.instruments.answer import RunsWithTime
@@ -161,6 +161,8 @@ class TypedCompareAnswer(Answer[CompareAnswer]):
     def instruments_disagree(self) -> Disagreement | None: ...
     @property
     def against_others(self) -> AgainstOthers | None: ...
+    @property
+    def likely_mistakes(self) -> tuple[LikelyMistake, ...] | None: ...
     @property
     def run_with_time(self) -> tuple[RunsWithTime, ...] | None: ...
     @property
@@ -267,6 +269,8 @@ class TypedExplainAnswer(Answer[ExplainAnswer]):
     def unlike_runs(self) -> tuple[UnlikeRun, ...]: ...
     @property
     def added_together(self) -> tuple[str, ...]: ...
+    @property
+    def against_others(self) -> AgainstOthers | None: ...
     @property
     def unit(self) -> str: ...
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from monitor.cli import output, residual_output
+from monitor.cli.contradiction_output import against_others
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.cli.verbs.plan_instruments import where
@@ -44,6 +45,8 @@ def _machine(explanation: MachineExplanation) -> None:
         return
     residual_output.summary(explanation.comparison)
     output.say()
+    if explanation.against_others is not None:
+        against_others(explanation.against_others)
     for effect in explanation.missing:
         _machine_effect(effect, explanation)
         _advice(effect, "data", explanation.comparison.campaign)

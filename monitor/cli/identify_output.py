@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from monitor.cli import output
+from monitor.cli.contradiction_output import likely_mistakes
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.records import FrameOfReference
 from monitor.reporting import messages
@@ -39,6 +40,8 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     )
     for note in (run.note for run in runs if run.note):
         output.say(note)
+    if answer.likely_mistakes:
+        likely_mistakes(answer.likely_mistakes)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     _taken_up(answer)

@@ -6,6 +6,8 @@ from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.l_shape_file import read_l_shape
 from monitor.readers.self_calibration_file import read_self_calibration
+from monitor.readers.setups.agreement import SCALE, check_one_statement
+from monitor.readers.setups.known_key import read_known
 from monitor.readers.setups.scale_key import read_scale_uncertainty
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Ball, Probe, Reflector, ScaleBar
@@ -36,11 +38,13 @@ def read_probe(top: Table, *, required: bool = True, has_scale: bool = False) ->
     tip = table.numbers("tip_mm", 3, largest=FARTHEST_MM, unit="mm", example="[0.0, 0.0, -150.0]")
     certificate = table.text("certificate")
     scale = read_scale_uncertainty(table) if has_scale else None
+    known = read_known(table, (SCALE.name,)) if has_scale else ()
+    check_one_statement(table, known)
     table.finish()
     if identity is None or model is None or uncertainty is None:
         return None
     point = None if tip is None else (tip[0], tip[1], tip[2])
-    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate, scale)
+    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate, scale, known)
 
 
 def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:

@@ -89,6 +89,8 @@ def _probe(probe: Probe) -> Iterator[str]:
         yield f"certificate = {_text(probe.certificate)}"
     if probe.scale_uncertainty is not None:
         yield f"scale_standard_uncertainty_um_per_m = {decimal_in(MICROMETRE.per(METRE))(probe.scale_uncertainty)}"
+    if probe.known:
+        yield f"known = [{', '.join(map(_text, probe.known))}]"
 
 
 def _artefact(artefact: Artefact) -> Iterator[str]:

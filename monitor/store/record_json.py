@@ -86,17 +86,19 @@ def machine_record(text: str) -> Machine:
 
 
 def probe_json(probe: Probe) -> str:
-    """A probe as text; lengths in mm. A scale that is not stated is left out: texts and hashes stay what they were."""
+    """A probe as text; lengths in mm. What nobody states of a scale is left out: texts and hashes stay as they were."""
     document = asdict(probe)
     if probe.scale_uncertainty is None:
         del document["scale_uncertainty"]
+    if not probe.known:
+        del document["known"]
     return _text(document)
 
 
 def probe_record(text: str) -> Probe:
     """The probe of ``probe_json``."""
     document = json.loads(text)
-    return Probe(**{**document, "tip": _tuple(document["tip"])})
+    return Probe(**{**document, "tip": _tuple(document["tip"]), "known": tuple(document.get("known", ()))})
 
 
 def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:

@@ -1,4 +1,4 @@
-"""The readings of one setup are wrong: another sign or exchanged columns are said in its name, and no effect.
+"""The readings of one setup or instrument are wrong: a unit, a sign or exchanged columns are said in its name.
 
 Six instruments of one machine, simulated without a line of the package.
 """
@@ -87,3 +87,33 @@ def test_right_setups_and_errors_of_an_instrument_are_no_mistake(right: Campaign
         assert _told(campaign) == []
         # Exchanged for one of another instrument, a column leaves readings that nothing contradicts.
         assert find_reading_mistakes(campaign, _of_machine, fit(_of_machine(campaign))) == ()
+
+
+@pytest.mark.parametrize(
+    ("word", "columns", "factor", "what"),
+    [
+        ("bar", ("reading_um",), 1e-3, "reading_um was in mm in all setups of ball bar"),
+        ("bar", ("reading_um",), -1.0, "the sign of reading_um were the other way round in all setups of ball bar"),
+        ("r-test", ("dx_um", "dy_um", "dz_um"), 1.0 / 25400.0, "dx_um, dy_um, dz_um were in inches in setup r-test"),
+        ("level", ("reading_urad",), 1e-3, "reading_urad was in mrad in setup level"),
+    ],
+)  # fmt: skip
+@pytest.mark.slow
+def test_all_setups_of_an_instrument_in_another_unit_or_sign_are_said_in_its_name(
+    right: Campaign, word: str, columns: tuple[str, ...], factor: float, what: str
+) -> None:
+    spoilt = right
+    for setup in right.artefact.setups:
+        if setup.id.startswith(word):
+            spoilt = _spoilt(spoilt, setup.id, {name: (name, factor) for name in columns})
+    assert _told(spoilt) == [what]
+
+
+@pytest.mark.slow
+def test_exchanged_axes_of_a_setup_are_said_where_the_fit_settles(right: Campaign) -> None:
+    probings = right.probings
+    rows = probings.target == "bar-xy"
+    readings = {name: np.array(values) for name, values in probings.readings.items()}
+    readings["X"][rows], readings["Y"][rows] = probings.readings["Y"][rows], probings.readings["X"][rows]
+    told = _told(replace(right, probings=replace(probings, readings=readings)))
+    assert told == ["the columns y_mm and x_mm were exchanged in setup bar-xy"]

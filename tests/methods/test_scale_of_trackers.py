@@ -7,6 +7,8 @@ reads all lengths too long by its scale.
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,13 +20,16 @@ from monitor.discovery import robust_fit
 from monitor.exceptions import CampaignError
 from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification
+from monitor.methods.tracker.problem import TrackingProblem
 from monitor.readers import read_campaign
 from monitor.readers.writer import write_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import GroundKind
+from monitor.reporting.texts import texts_of
 from monitor.sources import CommonQuantity
-from monitor.store.record_json import probe_json
+from monitor.store.record_json import probe_json, probe_record
 from monitor.uncertainty import measured_run
+from monitor.workflow.certificate.taken_as_stated import known_scale_sentence
 from monitor.workflow.uncertainty.grounds import grounds_of
 from tests.simulator import tracked_machine as shop
 
@@ -164,3 +169,45 @@ def test_the_scale_is_read_and_written_again_and_is_no_key_of_a_touching_probe(t
         (folder / file.name).write_bytes(text)
     with pytest.raises(CampaignError, match="scale_standard_uncertainty_um_per_m"):
         read_campaign(folder)
+
+
+def _stating(folder: Path, *keys: str) -> Path:
+    """The example whose ``[probe]`` has some keys besides."""
+    shutil.copytree(EXAMPLES / "tracked-robot", folder)
+    path = folder / "campaign.toml"
+    text = re.sub(r"\nscale_standard_uncertainty.*", "", path.read_text(encoding="utf-8"))
+    stated = "".join(f"{key}\n" for key in keys)
+    path.write_text(text.replace("[probe]\n", f"[probe]\n{stated}"), encoding="utf-8")
+    return folder
+
+
+def test_a_scale_that_is_stated_as_known_is_no_ground_and_stands_in_the_certificate(tmp_path: Path) -> None:
+    campaign = read_campaign(_stating(tmp_path / "known", 'known = ["scale"]'))
+    assert isinstance(campaign, Campaign)
+    assert campaign.probe.known == ("scale",)
+    assert probe_record(probe_json(campaign.probe)) == campaign.probe
+    assert "known" not in json.loads(probe_json(replace(campaign.probe, known=())))
+    write_campaign(campaign, tmp_path / "again")
+    assert read_campaign(tmp_path / "again").probe == campaign.probe
+    problem = campaign_method(campaign).problem_of(campaign)
+    assert isinstance(problem, TrackingProblem)
+    assert problem.exact_scales() == ()
+    assert replace(problem, is_scale_known=False).exact_scales() != ()
+    sentence = known_scale_sentence(campaign, texts_of("en"))
+    assert sentence is not None
+    assert campaign.probe.id in sentence
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (("scale_standard_uncertainty_um_per_m = 1.0", 'known = ["scale"]'), "take 'scale' out of known"),
+        (('known = ["frame"]',), "'frame' is no unknown of this reading; what may be known is scale"),
+        (("known = true",), r'is no list of names; write for example known = \["scale"\]'),
+    ],
+)
+def test_what_a_tracker_may_know_is_its_scale_alone(
+    tmp_path: Path, keys: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(CampaignError, match=message):
+        read_campaign(_stating(tmp_path / "wrong", *keys))

@@ -135,10 +135,11 @@ def week(
     *,
     cycles: int = 2,
     beside: Mapping[str, float] | None = None,
+    pitch: float = 0.0,
 ) -> Path:
     """Write a campaign of six instruments; ``error`` of ``ERRORS`` has ``size`` µm, µrad or µm/m, and those ``beside``
-    it theirs."""
-    chain = shop.machine(0.0, truth)
+    it theirs; X pitches by ``pitch`` rad/mm."""
+    chain = shop.machine(pitch, truth)
     parts = [
         shop.laser(chain, rng, cycles),
         shop.ball_bar(chain, rng, 10.0),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.cli.verbs.compare_ import _against_others
+from monitor.cli.contradiction_output import against_others
 from monitor.methods.method import ContrastKind
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.grounds import IN_U, Ground, GroundKind, ground_sentence
@@ -34,7 +34,7 @@ def _answer(*names: str, comparisons: int = 3) -> AgainstOthers:
 
 
 def _said(answer: AgainstOthers, capsys: pytest.CaptureFixture[str]) -> str:
-    _against_others(answer)
+    against_others(answer)
     return " ".join(capsys.readouterr().out.split())
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from monitor.cli import output, residual_output
+from monitor.cli.contradiction_output import against_others, chance, likely_mistakes
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.records import Verdict
@@ -19,14 +20,12 @@ from monitor.workflow.explain.compare_answer import (
     MachinePart,
 )
 from monitor.workflow.explain.request import CompareRequest
-from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime, Suspect
+from monitor.workflow.instruments.answer import Disagreement, RunsWithTime
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
 # A robot has a thousand indexations; more than these are no table to read.
 MOST_PARTS = 20
-#: Of disagreements that chance makes more rarely no digits are shown: normal tails are not known so far out.
-LEAST_PERCENT = 0.001
 #: The breakdowns of a machine that are shown, and those that are cut to the worst parts.
 SHOWN, CUT = ("axis", "target", "indexation", "run"), ("target", "indexation")
 EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
@@ -55,7 +54,9 @@ def run(options: Namespace) -> int:
     if answer.instruments_disagree is not None:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
     if answer.against_others is not None:
-        _against_others(answer.against_others)
+        against_others(answer.against_others)
+    if answer.likely_mistakes:
+        likely_mistakes(answer.likely_mistakes)
     for drift in answer.run_with_time or ():
         _drift(answer.comparison.campaign, drift)
     _breakdown(answer)
@@ -63,71 +64,24 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _chance(by_chance: float) -> str:
-    """How often chance does such a thing, in words."""
-    percent = 100.0 * by_chance
-    return f"at most {percent:.1g} %" if percent >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
-
-
 def _drift(campaign: str, drift: RunsWithTime) -> None:
     number = f" ({drift.number})" if drift.number != "reading" else ""
     output.say(
         f"setup {drift.setup}{number} in run {drift.run} runs with the time: {drift.size:+.3g} {drift.unit} from its "
         f"first row to its last, u = {drift.u:.2g} {drift.unit}, one of {drift.comparisons} looked at; chance alone "
-        f"makes one as large in {_chance(drift.by_chance)} of campaigns. It drifts, or the model lacks what the plan "
+        f"makes one as large in {chance(drift.by_chance)} of campaigns. It drifts, or the model lacks what the plan "
         f"went through in order: `monitor explain {campaign}` weighs both; a drift belongs into u, as "
         "drift_standard_uncertainty_um or _urad of the setup"
     )
 
 
 def _disagreement(campaign: str, apart: Disagreement) -> None:
-    chance = _chance(apart.by_chance)
     output.say(
         f"{apart.parameter} in run {apart.run}: {apart.first} and {apart.second} disagree, E_n = {apart.e_n:.2f}, the "
-        f"least likely of {apart.comparisons}; chance alone makes one as large in {chance} of campaigns. "
-        f"`monitor contributions {campaign} --run {apart.run}` says what "
-        f"each says alone, `monitor explain {campaign}` what may be missing"
+        f"least likely of {apart.comparisons}; chance alone makes one as large in {chance(apart.by_chance)} of "
+        f"campaigns. `monitor contributions {campaign} --run {apart.run}` says what each says alone, "
+        f"`monitor explain {campaign}` what may be missing"
     )
-
-
-def _against_others(beside: AgainstOthers) -> None:
-    names, suspects = " or ".join(suspect.name for suspect in beside.suspects), beside.suspects
-    agree = all(suspect.others_agree for suspect in suspects)
-    said = f"setups in run {beside.run} contradict each other"
-    if not suspects:
-        who = (
-            "No single setup or instrument explains it: more than one is wrong, or the model lacks something"
-        )
-    elif len(suspects) == 1:
-        said = f"{names} in run {beside.run} contradicts all others together"
-        rest = "the others agree" if agree else "nothing is left that could contradict"
-        who = (
-            f"Without {names} {rest}: look first at {_where(suspects)}; where they are right, the model lacks what the "
-            "others do not meet"
-        )
-    else:
-        if beside.is_of_two:
-            said = f"{suspects[0].name} and {suspects[1].name} in run {beside.run} contradict each other"
-        rest = "the others agree" if agree else "nothing contradicts"
-        who = f"Without {names} {rest}, so that any of these may be the wrong one: look at {_where(suspects)}"
-    output.say(
-        f"{said} by {beside.size:.1f} u in "
-        f"{beside.directions} {'direction' if beside.directions == 1 else 'directions'}; chance alone makes as much in "
-        f"{_chance(beside.by_chance)} of campaigns. {who}"
-    )
-
-
-def _where(suspects: Sequence[Suspect]) -> str:
-    """What to look at: of a number that is stated nothing was read."""
-    read = [suspect.name for suspect in suspects if not suspect.is_stated]
-    parts = [f"signs, unit, points and rows of {' and '.join(read)}"] if read else []
-    parts += [
-        f"{suspect.name}, one number for {', '.join(suspect.setups)} (its certificate, the digits and the unit in the "
-        "file, the temperature)"
-        for suspect in suspects
-        if suspect.is_stated
-    ]
-    return " and at ".join(parts)
 
 
 def _breakdown(answer: CompareAnswer) -> None:

@@ -58,6 +58,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
         scale=None
         if u is None
         else CommonQuantity(campaign.probe.id, campaign.probe.certificate or "", SCALE, u),
+        is_scale_known=SCALE in campaign.probe.known,
     )
 
 

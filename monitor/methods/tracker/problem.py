@@ -48,13 +48,14 @@ class TrackingProblem(ChainProblem):
     """Points of reflectors (n rows); ``context.nominal`` (n, 3) holds them in the machine's frame by the first guess,
     ``reflectors`` (T, 3) their places by it in the order of ``targets``, ``fixed`` names those beside the machine,
     ``gear_ratios`` are those that the machine file gives. ``observer`` is the tracker's name, ``scale`` that of its
-    lengths where it states how well it knows it: an unknown of every run then."""
+    lengths where it states how well it knows it: an unknown of every run then; ``is_scale_known``: exact as stated."""
 
     reflectors: tuple[tuple[float, float, float], ...] = ()
     fixed: tuple[str, ...] = ()
     gear_ratios: tuple[tuple[str, float], ...] = ()
     observer: str = ""
     scale: CommonQuantity | None = None
+    is_scale_known: bool = False
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -184,8 +185,8 @@ class TrackingProblem(ChainProblem):
         return nuisance[:, -1:] / self.scale.u, by_own
 
     def exact_scales(self) -> tuple[AsStated, ...]:
-        """The tracker, where it does not say how well it knows its scale, with what that moves."""
-        if self.scale is not None:
+        """The tracker, where it does not say how well it knows its scale, nor that it does, with what that moves."""
+        if self.scale is not None or self.is_scale_known:
             return ()
         turn, _, _ = self._turned(self.own_start)
         return tuple(exact_scales(self, {self.observer: (self.targets, self._arms(turn))}))

@@ -4,6 +4,9 @@ Values are coded (``K0001/2 10,023``) or stand in lines that 0x0F separates into
 attribute, date, event and more (K0001, K0002, K0004, ...). Where all characteristics are coordinates (``P1.X``,
 ``P1_Y``, ``P1 Z``) the rows are points with ``target``, ``x``, ``y``, ``z`` and nominal values (K2101); else each
 characteristic is a column by its name (K2002). Attributes of 255 and above mark a value that does not count.
+
+Each value of a coordinate is a record: a part, or the same one clamped again. The format does not say which, and two
+clampings have no common frame: ``record`` says which record is read, or that all stood in one clamping.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from monitor.readers.export import Export, ExportFile, ExportFormat
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.toml_table import Table
 
 _FIELD = re.compile(r"K([0-9]{4})(?:/([0-9]{1,6}))?(?:\s+(.*?))?\s*")
 _COORDINATE = re.compile(r"(.+?)[ ._-]?([XYZ])", re.IGNORECASE)
@@ -23,6 +27,8 @@ _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?(?:[eE][+-]?[0-9]+)?")
 _INVALID = 255
 #: More characteristics than any part has.
 _MOST = 100_000
+#: What ``record`` says where all records are of one clamping.
+ONE_CLAMPING = "one clamping"
 _NAME, _NOMINAL, _UNIT, _VALUE, _ATTRIBUTE, _DATE = "2002", "2101", "2142", "0001", "0002", "0004"
 
 
@@ -33,7 +39,7 @@ class _Part:
     fields: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
     values: dict[int, list[tuple[str, int]]] = field(default_factory=dict)
     facts: list[tuple[str, str]] = field(default_factory=list)
-    started: str | None = None
+    started: dict[int, str] = field(default_factory=dict)
 
     def text(self, key: str, number: int) -> str | None:
         """Return a field of a characteristic, or that of all of them."""
@@ -48,13 +54,24 @@ class _Part:
             value = ""
         elif not _NUMBER.fullmatch(value):
             return f"{quoted(value)} is not a value; attributive characteristics have none"
-        if len(cells) > 2 and cells[2].strip() and self.started is None:
-            self.started = cells[2].strip().replace("/", " ")
-        self.values.setdefault(number, []).append((value.replace(",", "."), line))
+        of_number = self.values.setdefault(number, [])
+        if len(cells) > 2 and cells[2].strip():
+            self.started.setdefault(len(of_number), cells[2].strip().replace("/", " "))
+        of_number.append((value.replace(",", "."), line))
         return None
 
 
-def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
+def settings(table: Table) -> int | str | None:
+    """Read the key of a file of points with several records: ``record = 2``, or ``record = "one clamping"``."""
+    value = table.raw("record", required=False, example="1")
+    is_number = isinstance(value, int) and not isinstance(value, bool) and value >= 1
+    if value is None or value == ONE_CLAMPING or is_number:
+        return value
+    table.fault("record", f'{quoted(value)} is no record; write its number from 1 on, or "{ONE_CLAMPING}"')
+    return None
+
+
+def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export | None:
     """Read the values of all characteristics; None with the faults noted."""
     decoded = decode_foreign(file.name, file.content, faults)
     if decoded is None:
@@ -72,7 +89,7 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
         _complete(part, file.name, faults)
     if len(faults) > before:
         return None
-    points = _points(part, file.name, decoded[1], faults)
+    points = _points(part, file.name, decoded[1], record, faults)
     return None if len(faults) > before else points or _table(part, decoded[1])
 
 
@@ -90,8 +107,8 @@ def _line(part: _Part, line: str, number: int) -> str | None:
         if value.isdigit() and int(value) >= _INVALID:
             part.values[which][-1] = ("", part.values[which][-1][1])
         return None
-    if key == _DATE and part.started is None:
-        part.started = value.replace("/", " ")
+    if key == _DATE:
+        part.started.setdefault(max(len(part.values.get(which, ())) - 1, 0), value.replace("/", " "))
     elif key.startswith("1") and value:
         part.facts.append((f"K{key}", value))
     part.fields[key, which] = (value, number)
@@ -153,10 +170,33 @@ def _coordinates(part: _Part) -> dict[str, dict[str, int]] | None:
     return points if all(set(numbers) == letters for numbers in points.values()) else None
 
 
-def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | None:
+def _records(part: _Part, name: str, record: int | str | None, faults: Faults) -> range:
+    """Return the records that are read; empty with the fault noted where that is not said."""
+    values = next(iter(part.values.values()))
+    if record == ONE_CLAMPING or (len(values) == 1 and record in (None, 1)):
+        return range(len(values))
+    if isinstance(record, int) and record <= len(values):
+        return range(record - 1, record)
+    if isinstance(record, int):
+        faults.add(name, None, "record", f"there is no record {record}; the file has {len(values)}")
+    else:
+        faults.add(
+            name, values[1][1], None,
+            f"every coordinate has {len(values)} records (parts, or clampings of one), which would share one frame; "
+            "write one [[exports]] a record, each with its own run and record = 1, record = 2, ..., or "
+            f'record = "{ONE_CLAMPING}" where the part was not moved in between',
+        )  # fmt: skip
+    return range(0)
+
+
+def _points(part: _Part, name: str, layout: str, record: int | str | None, faults: Faults) -> Export | None:
     """Return the rows of points where every characteristic with values is a coordinate of one; None otherwise."""
     points = _coordinates(part)
     if points is None:
+        if record is not None:
+            faults.add(
+                name, None, "record", "the characteristics are no coordinates of points; leave record out"
+            )
         return None
     units = {part.text(_UNIT, number) for number in part.values}
     if len(units) > 1:
@@ -167,7 +207,10 @@ def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | Non
         return None
     columns: dict[str, list[str]] = {}
     lines: list[int] = []
-    for visit in range(len(next(iter(part.values.values())))):
+    records = _records(part, name, record, faults)
+    if not records:
+        return None
+    for visit in records:
         for target, numbers in points.items():
             columns.setdefault("target", []).append(target)
             for letter, number in sorted(numbers.items()):
@@ -178,7 +221,8 @@ def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | Non
     columns = {key: cells for key, cells in columns.items() if any(cells)}
     unit = next(iter(units)) or ""
     stated = dict.fromkeys(columns.keys() - {"target"}, unit) if foreign_unit(unit) else {}
-    return Export(columns, stated, lines, layout, tuple(part.facts), part.started)
+    started = next((part.started[visit] for visit in records if visit in part.started), None)
+    return Export(columns, stated, lines, layout, tuple(part.facts), started)
 
 
 def _table(part: _Part, layout: str) -> Export:
@@ -192,12 +236,14 @@ def _table(part: _Part, layout: str) -> Export:
         if unit is not None and foreign_unit(unit) is not None:
             units[label] = unit
     lines = [line for _, line in part.values[min(part.values)]]
-    return Export(columns, units, lines, layout, tuple(part.facts), part.started)
+    started = part.started[min(part.started)] if part.started else None
+    return Export(columns, units, lines, layout, tuple(part.facts), started)
 
 
 EXPORT = ExportFormat(
     "q-das",
     "Q-DAS ASCII transfer format: points (target, x, y, z) or a column a characteristic",
     read,
+    settings,
     suffixes=(".dfq",),
 )

@@ -14,6 +14,7 @@ from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.setups.agreement import DIRECTION, LENGTH, check_agreement, check_one_statement
+from monitor.readers.setups.known_key import read_known
 from monitor.readers.setups.scale_key import SCALE_UNCERTAINTY, read_scale_uncertainty
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
@@ -132,7 +133,7 @@ def _setup(table: Table) -> Setup | None:
         along=table.text("along", required=True, example='"X"') if "along" in form.needs else None,
         side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
-        known=_known(table, form),
+        known=read_known(table, form.holdable),
         turn_uncertainty=_stated(table, "urad") if form.turns else None,
         certificate=table.text("certificate"),
         drift_uncertainty=_drift(table, form),
@@ -244,24 +245,6 @@ def _branch(table: Table, key: str, default: Branch) -> Branch:
     if value is not None:
         table.fault(key, f'{quoted(value)} is no side of the machine; write "tool" or "work"')
     return default
-
-
-def _known(table: Table, form: ReadingFormat) -> tuple[str, ...]:
-    value = table.raw("known", required=False, example='["zero"]')
-    if value is None:
-        return ()
-    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        table.fault(
-            "known", f'{quoted(value)} is no list of names; write for example known = ["{form.holdable[0]}"]'
-        )
-        return ()
-    for name in value:
-        if name not in form.holdable:
-            table.fault(
-                "known",
-                f"{quoted(name)} is no unknown of this reading; what may be known is {one_of(form.holdable)}",
-            )
-    return tuple(value)
 
 
 def probe_of(setups: tuple[Setup, ...], probings: Probings) -> Probe:

@@ -36,6 +36,8 @@ def known_scale_sentence(campaign: Campaign, texts: Texts) -> str | None:
         for setup in campaign.artefact.setups
         if setup.reading in BRINGS_SCALE and "scale" in setup.known
     )
+    if "scale" in campaign.probe.known:
+        instruments[campaign.probe.id] = None
     return texts("evaluation.known_scale", instruments=", ".join(instruments)) if instruments else None
 
 

@@ -11,15 +11,15 @@ from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.curve.fit import CurveFit
-from monitor.methods.method import Instruments, Unable
-from monitor.records import Verdict
-from monitor.store import Database, save_analysis
+from monitor.records import Campaign, CurveCampaign, Verdict
+from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison
 from monitor.workflow.explain.machine_answer import machine_comparison
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
+from monitor.workflow.identify.mistaken_setups import mistaken_setups
 from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.instruments.drifting import running_with_time
 from monitor.workflow.instruments.instruments import disagreement
@@ -38,11 +38,11 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
         make_folder(request.figures)  # a folder that cannot be made leaves no result behind
     fit = fitted(db, request.campaign, request.model)
     model = label(fit.model)
-    answer, draw = (
-        _compare_curve(fit.fit, model)
-        if isinstance(fit.fit, CurveFit)
-        else _compare_machine(fit.fit, request.campaign, model, campaign_method(fit.campaign).instruments)
-    )
+    if isinstance(fit.fit, CurveFit) or isinstance(fit.campaign, CurveCampaign):
+        assert isinstance(fit.fit, CurveFit)
+        answer, draw = _compare_curve(fit.fit, model)
+    else:
+        answer, draw = _compare_machine(fit.fit, fit.campaign, fit.model)
     save_analysis(
         db, "comparison", to_document(answer), method=fit.campaign.method, campaign=request.campaign,
         model=fit.model.name, model_version=fit.model.version,
@@ -50,10 +50,9 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
     return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
 
 
-def _compare_machine(
-    fit: Fit, campaign: str, model: str, ability: Instruments | Unable
-) -> tuple[CompareAnswer, Draw]:
-    comparison = compare_fit(fit, campaign, model)
+def _compare_machine(fit: Fit, campaign: Campaign, model: StoredModel) -> tuple[CompareAnswer, Draw]:
+    comparison = compare_fit(fit, campaign.name, label(model))
+    ability = campaign_method(campaign).instruments
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that a comparison without figures need not wait.
@@ -67,9 +66,11 @@ def _compare_machine(
     if beside is not None and comparison.verdict is Verdict.EXPLAINED:
         # The residual of many rows hides what one setup of few says against all others.
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
+    mistakes = mistaken_setups(campaign, model, fit.problem, fit.solution)
     answer = CompareAnswer(
-        machine_comparison(comparison, fit.problem), apart, beside, drifting or None, fit.problem.target_word
-    )
+        machine_comparison(comparison, fit.problem), apart, beside, mistakes or None, drifting or None,
+        fit.problem.target_word,
+    )  # fmt: skip
     return answer, draw
 
 

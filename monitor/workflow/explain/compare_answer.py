@@ -13,7 +13,7 @@ from typing import ClassVar
 from monitor.documents import INLINED, OMITTED
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
-from monitor.workflow.identify.answer import CurveNoise
+from monitor.workflow.identify.answer import CurveNoise, LikelyMistake
 from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
 
 
@@ -143,12 +143,14 @@ class CompareAnswer:
 
     ``instruments_disagree`` is there where instruments say of one parameter what chance does not explain,
     ``against_others`` where a setup or instrument contradicts all others together,
+    ``likely_mistakes`` where a sign, a unit or exchanged columns of it explain that,
     ``run_with_time`` where readings of a setup drift by more than chance explains.
     """
 
     comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
     instruments_disagree: Disagreement | None = field(default=None, metadata=OMITTED)
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
+    likely_mistakes: tuple[LikelyMistake, ...] | None = field(default=None, metadata=OMITTED)
     run_with_time: tuple[RunsWithTime, ...] | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -26,6 +26,7 @@ from monitor.discovery import (
 from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
+from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign, Verdict
@@ -40,6 +41,7 @@ from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.identify.mistaken_columns import refusal_of
+from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
@@ -116,6 +118,12 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
     answer = with_measurements(machine_explanation(explanation), campaign, as_model(model))
+    if not explanation.mistakes:
+        final, ability = explanation.final, campaign_method(campaign).instruments
+        beside = against_others(final.problem, final.solution, ability)
+        # Where several may be the wrong one, or none alone, the effects come first.
+        if beside is not None and len(beside.suspects) == 1:
+            answer = replace(answer, against_others=beside)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.

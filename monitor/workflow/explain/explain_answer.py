@@ -10,7 +10,8 @@ from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
-from monitor.workflow.identify.answer import CurveNoise, Estimate
+from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
+from monitor.workflow.instruments.answer import AgainstOthers
 from monitor.workflow.plan.test_answer import TestAnswer
 
 
@@ -226,15 +227,6 @@ class ChangedParameter:
 
 
 @dataclass(frozen=True)
-class LikelyMistake:
-    """What looks wrong in the file, and the RMS with it and with it undone."""
-
-    what: str
-    rms_as_recorded_um: float
-    rms_undone_um: float
-
-
-@dataclass(frozen=True)
 class InstrumentAlias:
     """Errors of instruments (``effects``) that the readings cannot tell from the ``parameters`` of the machine, which
     are reported in their stead. ``measurement`` is the test that would tell, None where no single one does, or where
@@ -273,7 +265,8 @@ class MachineExplanation:
     but could not be fitted, and were skipped. ``remaining`` is what is left with all that is missing in the model, None
     where nothing is. The residual is pictured where something is missing. ``taken_for_machine`` are errors of
     instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
-    other powers of its error, of which each alone says little.
+    other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
+    instrument contradicts all others with all of this in the model too: that comes first.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -296,6 +289,7 @@ class MachineExplanation:
     scattering: tuple[ScatteringTarget, ...] = ()
     unlike_runs: tuple[UnlikeRun, ...] = ()
     added_together: tuple[str, ...] = ()
+    against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)

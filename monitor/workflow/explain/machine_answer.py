@@ -36,7 +36,6 @@ from monitor.workflow.explain.explain_answer import (
     CurvePoint,
     DeviationsApart,
     InstrumentAlias,
-    LikelyMistake,
     MachineExplanation,
     MachineMissing,
     MovedTarget,
@@ -53,7 +52,7 @@ from monitor.workflow.explain.shared_answer import (
     searched_value,
 )
 from monitor.workflow.explain.ties import ties_of
-from monitor.workflow.identify.answer import Estimate, reversal_value
+from monitor.workflow.identify.answer import Estimate, LikelyMistake, reversal_value
 from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.

@@ -104,6 +104,15 @@ class ResponseOverInputs:
     unit: str
 
 
+@dataclass(frozen=True)
+class LikelyMistake:
+    """What looks wrong in the file, and the RMS with it and with it undone."""
+
+    what: str
+    rms_as_recorded_um: float
+    rms_undone_um: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class IdentifyAnswer:
     """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
@@ -112,6 +121,7 @@ class IdentifyAnswer:
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
     each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
+    ``likely_mistakes`` say what is wrong in a setup or instrument that contradicts the others, where that explains it.
     """
 
     campaign: str
@@ -128,6 +138,7 @@ class IdentifyAnswer:
     taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
     as_stated: tuple[AsStated, ...] | None = field(default=None, metadata=OMITTED)
     lack_of_fit_p: float | None = field(default=None, metadata=OMITTED)
+    likely_mistakes: tuple[LikelyMistake, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from threadpoolctl import threadpool_limits
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
     Database,
@@ -23,6 +25,7 @@ from monitor.workflow.identify.curve import curve_answer
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.mistaken_columns import with_mistake
+from monitor.workflow.identify.mistaken_setups import mistaken_setups
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve, resolve_for
@@ -64,14 +67,22 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
         if isinstance(measured, CurveCampaign):
             fit = campaign_method(measured).fit(curve_problem(measured, model))
             return Identified(curve_answer(fit, label(model)), None)
+        solved: list[tuple[ChainProblem, Solution]] = []
+
+        def remembered(problem: ChainProblem) -> Solution:
+            solved.append((problem, solve_problem(problem)))
+            return solved[-1][1]
+
         try:
-            identification, stored = identified(measured, model)
+            identification, stored = identified(measured, model, remembered)
         except DataError as refusal:
             raise with_mistake(
                 refusal, measured, lambda changed: machine_problem(changed, model)
             ) from refusal
         judged = None if stored.lack_of_fit is None else stored.lack_of_fit.p_value
-        return Identified(machine_answer(measured.machine, identification, judged), stored)
+        answer = machine_answer(measured.machine, identification, judged)
+        mistakes = mistaken_setups(measured, model, *solved[-1])
+        return Identified(replace(answer, likely_mistakes=mistakes or None), stored)
 
 
 def store(

@@ -7,10 +7,9 @@ import scipy
 
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.contrasts import comparisons_of
+from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, Instruments, Unable
 from monitor.workflow.instruments.answer import AgainstOthers, Suspect
-from monitor.workflow.instruments.instruments import DOUBTFUL
 
 
 def against_others(
@@ -25,14 +24,11 @@ def against_others(
     if not isinstance(ability, Instruments):
         return None
     run = int(problem.runs[-1]) if run is None else run
-    every = ability.contrasts(problem, solution, run)
-    comparisons = comparisons_of(every)
-    if not every or min(each.p for each in every) * comparisons > doubtful:
+    found = who_contradicts(ability.contrasts(problem, solution, run), doubtful)
+    if found is None:
         return None
-    # Also those that contradict the others less surely: their direction may be one of many.
-    explaining = [each for each in every if each.others_p is not None and each.others_p > doubtful]
-    suspects = [each for each in explaining if not any(other.members < each.members for other in explaining)]
-    worst = min(suspects or every, key=lambda contrast: (contrast.p, -contrast.size))
+    suspects, comparisons = found.suspects, found.comparisons
+    worst = min(suspects or found.every, key=lambda contrast: (contrast.p, -contrast.size))
     return AgainstOthers(
         run,
         worst.name,

@@ -12,6 +12,7 @@ from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.instruments import suspects
 from monitor.methods.method import Instruments, InstrumentShare, Unable
 from monitor.records import Array
 from monitor.store import Database
@@ -33,7 +34,7 @@ from monitor.workflow.uncertainty.machine_frame import refers_to
 #: Coverage factor of E_n.
 K = 2.0
 #: A disagreement that comes out by chance more often than this is doubtful: the level at which `compare` judges.
-DOUBTFUL = 0.01
+DOUBTFUL = suspects.DOUBTFUL
 
 
 def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:

@@ -48,7 +48,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
     if directed:
         # Any of the three columns will do: the frame of what is seen turns as it likes.
         yield MIRRORED, _of_channels(_scaled(DIRECTION[1:2], -1.0))
-    yield from _exchanged_axes(linear, turning)
+    yield from exchanged_axes(linear, turning)
     yield from turned_axes(linear, turning)
     yield from reading_mistakes(campaign)
     yield from _axes_in_other_units(linear, turning)
@@ -109,9 +109,14 @@ def _column(axis: str, linear: Sequence[str]) -> str:
     return f"{axis.lower()}_{'mm' if axis in linear else 'deg'}"
 
 
-def _exchanged_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+def exchanged_axes(
+    linear: Sequence[str], turning: Sequence[str], moved: Sequence[str] | None = None
+) -> Iterator[Trial]:
+    """Exchanged columns of axes, of which at least one is among those that ``moved``."""
     for group in (linear, turning):
         for first, second in combinations(group, 2):
+            if moved is not None and first not in moved and second not in moved:
+                continue
             columns = f"the columns {_column(first, linear)} and {_column(second, linear)}"
             yield f"{columns} were exchanged", _of_readings(_exchanged([(first, second)]))
 

@@ -1,14 +1,20 @@
-"""Mistakes of the readings of one setup: without it the others agree, and with a mistake undone in it they do with it.
+"""Mistakes of the readings of one setup, or of all setups of one instrument: undone, they agree with the others.
 
-Another sign of a bar, or two exchanged components of an R-test, contradict what the other instruments say of the same
-machine by micrometres: an effect that is sought for that takes them for a worn bearing.
+Another sign of a bar, three of its planes in mm, or two exchanged components of an R-test contradict what the other
+instruments say of the same machine: an effect that is sought for that takes them for a worn bearing. So who contradicts
+whom is asked first, and of whoever does the mistakes are undone one at a time.
+
+A real error of the machine or of an instrument contradicts too, by so many standard uncertainties in so many
+directions. That a mistake undone would bring it near the others by chance is as likely as that a point falls into the
+smaller of two balls: the ratio of their radii to the power of the directions. A mistake is named where that is next to
+impossible.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from itertools import chain
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import numpy as np
 import numpy.typing as npt
@@ -17,80 +23,159 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.mistakes.column_mistakes import (
     Trial,
     all_signs,
+    exchanged_axes,
     measured_columns,
     reading_mistakes,
     turned_axes,
     unit_mistakes,
 )
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted
+from monitor.methods import campaign_method
+from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
+from monitor.methods.method import Contrast, ContrastKind, Instruments, SetupScatter
 from monitor.records import Array, Campaign, Probings
 
-#: What agrees leaves no more than this, in stated standard uncertainties.
-AGREES = 1.1
-#: A mistake that does the same leaves the same, but for rounding.
-AS_WELL = 1.02
+#: So likely a real error may be to look like a mistake, all mistakes together that are tried.
+BY_CHANCE = 0.01
+#: A setup whose own readings scatter so many times as it states contradicts itself; within the last two it is in order.
+#: No owner states a hundred times what his instrument scatters: it is in a larger unit.
+SCATTERS, TOO_STILL, IN_ORDER = 3.0, 0.01, (0.5, 1.3)
+#: Mistakes that do the same leave sums of squares that differ by less: odds of a thousand to one.
+AS_WELL = 13.8
+#: So many of those that contradict are tried where none is a suspect alone.
+MOST_TRIED = 3
+#: Runs that are asked, the last one first.
+MOST_RUNS = 5
+
+
+@dataclass(frozen=True)
+class _Doubted:
+    """A setup or an instrument by ``name`` with its ``setups``: it contradicts others by ``size`` in so many
+    ``directions``; or, where there are none, what it states of itself, and is far too still for that or scatters."""
+
+    name: str
+    setups: tuple[str, ...]
+    size: float = 0.0
+    directions: int = 0
+    is_still: bool = False
+
+    @property
+    def in_words(self) -> str:
+        """Where a mistake of it stands."""
+        return f"in setup {self.name}" if self.setups == (self.name,) else f"in all setups of {self.name}"
+
+
+@dataclass(frozen=True)
+class _Cure:
+    """A mistake, and the sum of squares of the fit with it undone."""
+
+    mistake: Mistake
+    sum_of_squares: float
 
 
 def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
-    """The mistakes of a single setup; several where its readings cannot say which it was, the smallest remainder first.
+    """The mistakes of a single setup or of all setups of one instrument; several where the readings cannot say which it
+    was, the smallest remainder first.
 
-    ``first`` is the fit of the campaign as recorded. Empty where it agrees with what is stated, where the campaign has
-    fewer than three setups, or where no mistake of the one that contradicts the others brings all to agreement.
+    ``first`` is the fit of the campaign as recorded. Empty where nobody contradicts others or itself, or where no
+    mistake explains it.
     """
-    setups = [str(name) for name in np.unique(campaign.probings.target)]
-    described = {setup.id for setup in campaign.artefact.setups}
-    if len(setups) < 3 or not described.issuperset(setups) or _agrees(first):
+    ability = campaign_method(campaign).instruments
+    if not isinstance(ability, Instruments):
         return ()
-    cures = [
-        cure
-        for name in setups
-        if _agree_without(campaign, problem_of, name)
-        for cure in _cures(campaign, problem_of, first, name)
-    ]
-    least = min((cure.rms_undone for cure in cures), default=0.0)
-    return tuple(
-        sorted(
-            (cure for cure in cures if cure.rms_undone <= AS_WELL * least),
-            key=lambda cure: float(f"{cure.rms_undone:.3g}"),
+    for run in islice(reversed(first.problem.runs), MOST_RUNS):
+        doubted = _doubted(
+            ability.contrasts(first.problem, first.solution, int(run)),
+            ability.scatters(first.problem, first.solution, int(run)),
         )
-    )
+        if doubted:
+            cures = [cure for each in doubted for cure in _cures(campaign, problem_of, first, int(run), each)]
+            least = min((cure.sum_of_squares for cure in cures), default=0.0)
+            alike = [cure for cure in cures if cure.sum_of_squares <= least + AS_WELL]
+            return tuple(cure.mistake for cure in sorted(alike, key=lambda cure: cure.sum_of_squares))
+    return ()
 
 
-def _agrees(fit: Fit) -> bool:
-    """Whether what is left is what the stated uncertainties let expect."""
-    return fit.rms <= AGREES * fit.sigma
+def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> list[_Doubted]:
+    """Whose mistakes are tried: the suspects of those that contradict all others, else all that do; and the setups that
+    contradict themselves."""
+    found = who_contradicts(every)
+    against: Sequence[Contrast] = ()
+    if found is not None:
+        of_many = [each for each in found.every if each.p * found.comparisons <= DOUBTFUL]
+        against = sorted(found.suspects or of_many, key=lambda each: (each.p, -each.size))
+    still = {each.setup for each in scatters if each.times < TOO_STILL}
+    doubted = [
+        _Doubted(each.name, each.setups, each.size, each.directions, still.issuperset(each.setups))
+        for each in against[:MOST_TRIED]
+        if each.kind is not ContrastKind.STATED
+    ]
+    tried = {setup for each in doubted for setup in each.setups}
+    own = [each for each in scatters if not TOO_STILL < each.times < SCATTERS and each.setup not in tried]
+    return [*doubted, *(_Doubted(each.setup, (each.setup,), is_still=each.times < 1.0) for each in own)]
 
 
-def _agree_without(campaign: Campaign, problem_of: Maker, setup: str) -> bool:
-    """Whether all others agree without a setup."""
-    rest = campaign.probings.rows(campaign.probings.target != setup)
-    fit = fitted(replace(campaign, probings=rest), problem_of)
-    return fit is not None and _agrees(fit)
-
-
-def _cures(campaign: Campaign, problem_of: Maker, first: Fit, setup: str) -> list[Mistake]:
-    """The mistakes of a setup with which undone everything agrees; signs of axes where none of its readings is one."""
-    mask = campaign.probings.target == setup
+def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
+    """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
+    one."""
+    mask = np.isin(_setup_of_rows(campaign), doubted.setups)
     part = replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
-    of_readings = chain(reading_mistakes(part), all_signs(measured), unit_mistakes(measured, 1.0))
-    for trials in (of_readings, _turned_axes(part)):
+    of_units = [*unit_mistakes(measured, 1.0)]
+    of_readings = of_units if doubted.is_still else [*reading_mistakes(part), *all_signs(measured), *of_units]
+    # The axes of several setups of one instrument are those of the machine, which all others move too.
+    of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
+    count = len(of_readings) + len(of_axes)
+    for trials in (of_readings, of_axes):
         cures = []
         for what, undo in trials:
             fit = fitted(_with_rows(campaign, mask, undo(part).probings), problem_of)
-            if fit is not None and _agrees(fit):
-                cures.append(Mistake(f"{what.split(' (`')[0]} in setup {setup}", first.rms, fit.rms))
+            if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
+                what = f"{what.split(' (`')[0]} {doubted.in_words}"
+                cures.append(_Cure(Mistake(what, first.rms, fit.rms), fit.sum_of_squares))
         if cures:
             return cures
     return []
 
 
-def _turned_axes(part: Campaign) -> Iterator[Trial]:
+def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
+    """Whether who is doubted agrees in a ``fit`` with one of ``count`` mistakes undone."""
+    if fit.sum_of_squares >= first.sum_of_squares and not doubted.is_still:
+        return False
+    ability = campaign_method(campaign).instruments
+    assert isinstance(ability, Instruments)
+    every = ability.contrasts(fit.problem, fit.solution, run)
+    now = next((each for each in every if each.name == doubted.name), None)
+    if doubted.directions and not doubted.is_still:
+        if now is None or now.directions < doubted.directions:
+            return False
+        return count * (max(now.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
+    scatters = ability.scatters(fit.problem, fit.solution, run)
+    own = [each.times for each in scatters if each.setup in doubted.setups]
+    return (
+        len(own) == len(doubted.setups)
+        and IN_ORDER[0] < min(own)
+        and max(own) < IN_ORDER[1]
+        and (now is None or now.p > DOUBTFUL)
+    )
+
+
+def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
     readings = part.probings.readings
     moved = [axis for axis in readings if np.ptp(readings[axis]) > 0]
-    linear = [axis for axis in moved if part.machine.is_linear(axis)]
-    yield from turned_axes(linear, [axis for axis in moved if axis not in linear])
+    linear = [axis for axis in readings if part.machine.is_linear(axis)]
+    turning = [axis for axis in moved if axis not in linear]
+    return chain(
+        turned_axes([axis for axis in linear if axis in moved], turning),
+        exchanged_axes(linear, turning, moved),
+    )
+
+
+def _setup_of_rows(campaign: Campaign) -> npt.NDArray[np.str_]:
+    """The setup (n,) of every row."""
+    number = campaign.probings.channels["setup"].astype(np.int64) - 1
+    return np.array([setup.id for setup in campaign.artefact.setups])[number]
 
 
 def _with_its_columns(probings: Probings) -> Probings:

@@ -1,0 +1,88 @@
+"""Several records of a Q-DAS file, parts or clampings, are never one run in one frame unless the mapping says so."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from monitor.exceptions import CampaignError
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "files-of-a-plate"
+ENTRY = 'file = "plate.dfq"\n'
+
+
+def _moved(record: bytes, by: float) -> bytes:
+    """A record of a part that was clamped elsewhere."""
+    cells = [cell.split(b"\x14") for cell in record.split(b"\x0f")]
+    return b"\x0f".join(b"\x14".join([b"%.5f" % (float(cell[0]) + by), *cell[1:]]) for cell in cells)
+
+
+@pytest.fixture
+def two_records(tmp_path: Path) -> Path:
+    folder = tmp_path / "plate"
+    shutil.copytree(EXAMPLE, folder)
+    path = folder / "plate.dfq"
+    content = path.read_bytes()
+    *head, last = content.rstrip(b"\r\n").split(b"\n")
+    path.write_bytes(b"\n".join([*head, last, _moved(last, 3.0)]) + b"\n")
+    return folder
+
+
+def _mapped(folder: Path, *records: str) -> Campaign:
+    """The campaign with an export of the file for each of the ``records``, as keys."""
+    path = folder / "mapping.toml"
+    text = path.read_text(encoding="utf-8")
+    begin = text.index(f"[[exports]]\n{ENTRY}")
+    end = text.index("\n[[", begin + 1)
+    entry = text[begin:end]
+    entries = "\n".join(entry.replace(ENTRY, f"{ENTRY}{keys}\n") for keys in records)
+    path.write_text(text[:begin] + entries + text[end:], encoding="utf-8")
+    campaign = read_campaign(folder)
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+def _rows(campaign: Campaign) -> npt.NDArray[np.bool_]:
+    setups = [setup.id for setup in campaign.artefact.setups]
+    return campaign.probings.channels["setup"] == 1 + setups.index("plate-dfq")
+
+
+def test_two_records_are_refused_with_what_to_write(two_records: Path) -> None:
+    with pytest.raises(
+        CampaignError, match=r'every coordinate has 2 records .*record = 1, record = 2, .*"one clamping"'
+    ):
+        _mapped(two_records, "")
+
+
+def test_each_record_is_read_into_its_own_run(two_records: Path) -> None:
+    campaign = _mapped(two_records, "record = 1", "record = 2\nrun = 2")
+    rows = _rows(campaign)
+    points, run = campaign.probings.channels["point_x_mm"], campaign.probings.run
+    first, second = (points[rows & (run == number)] for number in (1, 2))
+    assert len(first) == len(second) == 24
+    assert second - first == pytest.approx(np.full(24, 3.0), abs=1e-9)
+
+
+def test_records_of_one_clamping_share_a_run_where_that_is_said(two_records: Path) -> None:
+    campaign = _mapped(two_records, 'record = "one clamping"')
+    assert np.count_nonzero(_rows(campaign)) == 48
+    assert np.unique(campaign.probings.run).tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("record = 3", r"column record: there is no record 3; the file has 2"),
+        ("record = 0", r"0 is no record; write its number from 1 on"),
+        ('record = "first"', r"'first' is no record; write its number"),
+    ],
+)
+def test_a_record_that_there_is_not_is_refused(two_records: Path, keys: str, message: str) -> None:
+    with pytest.raises(CampaignError, match=message):
+        _mapped(two_records, keys)
