@@ -88,7 +88,7 @@ def test_a_coarse_display_of_a_stable_machine_repeats_itself(seeds: Seeds, scatt
 def test_passes_that_scatter_far_less_than_a_digit_are_no_copies(
     seeds: Seeds, scatter_um: float, count: int
 ) -> None:
-    """Of 200 seeds each none is told (31 of ten passes at 0.05, 84 of three, when equal passes were taken for copies)."""
+    """Of 200 seeds each none is told (31 of ten passes at 0.05 and 84 of three, when they were taken for copies)."""
     assert told(cycles(seed, scatter_um, 1.0, count) for seed in seeds(100, 8)) == 0
 
 
