@@ -83,6 +83,23 @@ def test_a_coarse_display_of_a_stable_machine_repeats_itself(seeds: Seeds, scatt
     assert told(cycles(seed, scatter_um, 1.0) for seed in seeds(100, 15)) == 0
 
 
+@pytest.mark.parametrize("scatter_um", [0.05, 0.075, 0.1])
+@pytest.mark.parametrize("count", [2, 3, 4, 10, 20])
+def test_passes_that_scatter_far_less_than_a_digit_are_no_copies(
+    seeds: Seeds, scatter_um: float, count: int
+) -> None:
+    """Of 200 seeds each none is told (31 of ten passes at 0.05 and 84 of three, when they were taken for copies)."""
+    assert told(cycles(seed, scatter_um, 1.0, count) for seed in seeds(100, 8)) == 0
+
+
+def test_a_fine_display_that_repeats_its_passes_is_a_file_joined_with_itself() -> None:
+    campaign = cycles(3, 0.3, 0.01, 1)
+    rows = np.concatenate([np.tile(np.arange(11), 4), np.arange(11, len(campaign.probings))])
+    joined = numbered(replace(campaign, probings=campaign.probings.rows(rows)))
+    (sentence,) = repeated_rows(joined)
+    assert sentence.startswith("33 rows of run 1, from sequence 12 on, equal those from sequence 1 on")
+
+
 @pytest.mark.parametrize(
     ("resolution_um", "scatter_um", "least"),
     [(0.01, 0.3, 1.0), (0.1, 0.3, 1.0), (1.0, 1.0, 1.0), (1.0, 0.3, 0.8)],

@@ -30,7 +30,9 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     unit_mistakes,
 )
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted
+from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
+from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, ContrastKind, Instruments, SetupScatter
 from monitor.records import Array, Campaign, Probings
@@ -42,6 +44,8 @@ BY_CHANCE = 0.01
 SCATTERS, TOO_STILL, IN_ORDER = 3.0, 0.01, (0.5, 1.3)
 #: Mistakes that do the same leave sums of squares that differ by less: odds of a thousand to one.
 AS_WELL = 13.8
+#: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
+OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone.
 MOST_TRIED = 3
 #: Runs that are asked, the last one first.
@@ -127,16 +131,38 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     # The axes of several setups of one instrument are those of the machine, which all others move too.
     of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
     count = len(of_readings) + len(of_axes)
-    for trials in (of_readings, of_axes):
+    limit = np.inf if doubted.is_still else first.sum_of_squares
+    for trials, margin in ((of_readings, 1.0), (of_axes, OF_AXES)):
         cures = []
         for what, undo in trials:
-            fit = fitted(_with_rows(campaign, mask, undo(part).probings), problem_of)
+            undone = _with_rows(campaign, mask, undo(part).probings)
+            if not _sum_of_one_step(undone, problem_of) <= margin * limit:
+                continue
+            fit = fitted(undone, problem_of)
             if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
                 what = f"{what.split(' (`')[0]} {doubted.in_words}"
                 cures.append(_Cure(Mistake(what, first.rms, fit.rms), fit.sum_of_squares))
         if cures:
             return cures
     return []
+
+
+def _sum_of_one_step(undone: Campaign, problem_of: Maker) -> float:
+    """The sum of squares that one step of a fit foresees: of what is worse than before the fit is spared."""
+    try:
+        with np.errstate(all="ignore"):
+            problem = problem_of(undone)
+            at = problem.linearise(problem.start, problem.common_start)
+    except (MonitorError, np.linalg.LinAlgError):
+        return float("inf")
+    total = 0.0
+    for residual, local, common in zip(at.residual, at.local, at.common, strict=True):
+        columns = np.hstack([local, common])
+        size = np.linalg.norm(columns, axis=0)
+        columns = columns / np.where(size > 0.0, size, 1.0)
+        rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=RANK_TOLERANCE)[0]
+        total += float(rest @ rest)
+    return total
 
 
 def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
