@@ -56,7 +56,7 @@ def without_gross(campaign: Campaign, first: Fit) -> Campaign:
     for names in (probings.target, probings.run):
         for name in np.unique(names[first.left_out]):
             rows = names == name
-            if first.left_out[rows].mean() > MOST_GROSS:
+            if first.left_out[rows].sum() > max(1.0, MOST_GROSS * rows.sum()):
                 gross[rows] = False
     return replace(campaign, probings=probings.rows(~gross)) if gross.any() else campaign
 

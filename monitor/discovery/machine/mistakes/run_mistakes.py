@@ -28,7 +28,7 @@ FAR_MORE, FAR_LESS = 3.0, 0.1
 #: Runs that are alike differ by less.
 LIKE_OTHERS = 1.5
 #: A mistake that does the same leaves the same, but for rounding and the noise of a run.
-AS_WELL = 1.1
+AS_WELL = 1.25
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _read(part: Campaign) -> float:
 
 def _is_nearer(undone: float, recorded: float, others: float) -> bool:
     """Whether a size is nearer to that of others, as a ratio, with a mistake undone than as recorded."""
-    return abs(np.log(undone / others)) < abs(np.log(recorded / others))
+    return bool(abs(np.log(undone / others)) < abs(np.log(recorded / others)))
 
 
 def _trials(part: Campaign, *, is_small: bool) -> Iterator[Trial]:
