@@ -123,6 +123,76 @@ def test_two_runs_with_mistakes_of_their_own_are_both_named(tmp_path: Path) -> N
     assert ", and dx_um, dy_um, dz_um were in mm in run 3" in mistake.what
 
 
+def stated(found: Campaign, times: float, runs: tuple[int, ...]) -> Campaign:
+    """Some runs, of which the owner states so many times the standard uncertainty."""
+    setups = tuple(
+        replace(setup, standard_uncertainty=times * setup.standard_uncertainty)
+        for setup in found.artefact.setups
+    )
+    rows = np.isin(found.probings.run, runs)
+    return replace(
+        found,
+        artefact=replace(found.artefact, setups=setups),
+        probings=found.probings.rows(rows),
+        runs=tuple(run for run in found.runs if run.run in runs),
+    )
+
+
+def told(found: Campaign) -> list[str]:
+    problem_of = maker(found)
+    return [
+        mistake.what
+        for mistake in find_run_mistakes(found, problem_of, first_fit(found, model_of(found)).fit)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("times", "runs"),
+    [
+        (10.0, (1, 2)),
+        *(pytest.param(n, r, marks=pytest.mark.slow) for n in (3.0, 20.0) for r in ((1, 2), (1, 2, 3, 4))),
+    ],
+)
+def test_a_generous_statement_accuses_no_run_that_is_right(
+    tmp_path: Path, times: float, runs: tuple[int, ...]
+) -> None:
+    found = stated(campaign(tmp_path, 5, MISTAKES["sign"][0]), times, runs)
+    what = told(found)
+    assert "the sign of dx_um were the other way round in run 2" in what
+    assert all(each.endswith("in run 2") for each in what)
+
+
+@pytest.mark.parametrize(
+    "times", [20.0, pytest.param(1.0, marks=pytest.mark.slow), pytest.param(5.0, marks=pytest.mark.slow)]
+)
+def test_a_wave_of_one_run_of_two_is_no_mistake_of_either(tmp_path: Path, times: float) -> None:
+    """Of 40 µm twice a turn: the other run would be brought to its statement by thousandths of an inch."""
+
+    def with_wave(row: Row) -> Row:
+        return {
+            **row,
+            "dx_um": float(str(row["dx_um"])) + 40.0 * np.cos(2.0 * np.deg2rad(float(str(row["C"])))),
+        }
+
+    assert told(stated(campaign(tmp_path, 5, with_wave), times, (1, 2))) == []
+
+
+def test_a_run_in_mm_of_two_is_said_where_undone_it_is_as_stated(tmp_path: Path) -> None:
+    assert told(stated(campaign(tmp_path, 5, MISTAKES["mm"][0]), 1.0, (1, 2))) == [
+        "dx_um, dy_um, dz_um were in mm in run 2"
+    ]
+
+
+def test_a_gross_reading_hides_no_mistake_of_its_run(tmp_path: Path) -> None:
+    found = campaign(tmp_path, 7, MISTAKES["sign"][0])
+    dx = np.array(found.probings.channels["dx_um"])
+    dx[np.flatnonzero(found.probings.run == 2)[7]] += 2000.0
+    channels = {**found.probings.channels, "dx_um": dx}
+    found = replace(found, probings=replace(found.probings, channels=channels))
+    assert first_fit(found, model_of(found)).fit.left_out.sum() == 1
+    assert "the sign of dx_um were the other way round in run 2" in told(found)
+
+
 @pytest.mark.parametrize("hidden", [0.0, pytest.param(8e-3, marks=pytest.mark.slow)])
 def test_nothing_is_said_of_files_that_are_right(
     tmp_path: Path, seeds: Callable[[int, int], range], hidden: float

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit
+from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit, robust_fit
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
@@ -117,3 +117,15 @@ def test_exchanged_axes_of_a_setup_are_said_where_the_fit_settles(right: Campaig
     readings["X"][rows], readings["Y"][rows] = probings.readings["Y"][rows], probings.readings["X"][rows]
     told = _told(replace(right, probings=replace(probings, readings=readings)))
     assert told == ["the columns y_mm and x_mm were exchanged in setup bar-xy"]
+
+
+def test_a_gross_reading_of_another_setup_hides_no_mistake(right: Campaign) -> None:
+    spoilt = _spoilt(right, "bar-yz", {"reading_um": ("reading_um", -1.0)})
+    reading = np.array(spoilt.probings.channels["reading_um"])
+    reading[np.flatnonzero(spoilt.probings.target == "laser-X")[7]] += 80.0
+    channels = {**spoilt.probings.channels, "reading_um": reading}
+    spoilt = replace(spoilt, probings=replace(spoilt.probings, channels=channels))
+    first = robust_fit(_of_machine(spoilt)).fit
+    assert first.left_out.sum() == 1
+    mistakes = [each.what for each in find_setup_mistakes(spoilt, _of_machine, first)]
+    assert "the sign of reading_um were the other way round in setup bar-yz" in mistakes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ CURED_SHARE, CURED_TIMES = 0.05, 20.0
 NOISE_TIMES, WORTH_SHARE = 1.3, 0.5
 #: Readings that fit converge in some eight steps; a trial that does not is none.
 MOST_STEPS = 15
+#: A gross reading is one of many; of a target or a run that loses more of its rows all of it may be wrong.
+MOST_GROSS = 0.1
 
 #: Makes the problem of a campaign.
 Maker = Callable[[Campaign], ChainProblem]
@@ -43,6 +45,20 @@ def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:
     except (MonitorError, np.linalg.LinAlgError):
         # This is no machine of that file either.
         return None
+
+
+def without_gross(campaign: Campaign, first: Fit) -> Campaign:
+    """The campaign without the readings that its first fit left out: one of them would hide what a mistake undone does.
+
+    Those of a target or a run that lost many are kept, since the mistake may be why.
+    """
+    gross, probings = first.left_out.copy(), campaign.probings
+    for names in (probings.target, probings.run):
+        for name in np.unique(names[first.left_out]):
+            rows = names == name
+            if first.left_out[rows].sum() > max(1.0, MOST_GROSS * rows.sum()):
+                gross[rows] = False
+    return replace(campaign, probings=probings.rows(~gross)) if gross.any() else campaign
 
 
 def cured_rms(campaign: Campaign, problem_of: Maker, before: float) -> float | None:

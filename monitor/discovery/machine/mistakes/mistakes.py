@@ -19,7 +19,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     direction_mistakes,
     reading_mistakes,
 )
-from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms
+from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms, without_gross
 from monitor.discovery.machine.mistakes.run_mistakes import run_alone
 from monitor.discovery.machine.mistakes.target_mistakes import relabelled
 from monitor.methods import campaign_method
@@ -60,7 +60,7 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
 def find_reading_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit) -> tuple[Mistake, ...]:
     """The mistakes of the columns of what was measured, as ``find_mistakes``: deviations of micrometres with another
     sign leave no more than micrometres."""
-    return _cures(campaign, problem_of, fit, reading_mistakes)
+    return _cures(without_gross(campaign, fit), problem_of, fit, reading_mistakes)
 
 
 def _cures(

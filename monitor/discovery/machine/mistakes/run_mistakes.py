@@ -6,8 +6,8 @@ reading of the other runs is wrong. Each mistake is undone in that run alone, wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     measured_columns,
     unit_mistakes,
 )
-from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted
+from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted, without_gross
 from monitor.methods import campaign_method
 from monitor.records import Array, Campaign
 
@@ -28,24 +28,36 @@ FAR_MORE, FAR_LESS = 3.0, 0.1
 #: Runs that are alike differ by less.
 LIKE_OTHERS = 1.5
 #: A mistake that does the same leaves the same, but for rounding and the noise of a run.
-AS_WELL = 1.1
+AS_WELL = 1.25
+
+
+@dataclass(frozen=True)
+class _Odd:
+    """A run unlike the others, what it should leave in stated standard uncertainties, whether it leaves far less, and
+    whether most of the others are alike."""
+
+    run: int
+    usual: float
+    is_small: bool
+    by_most: bool = False
 
 
 def find_run_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistakes of single runs; several of one run where its readings cannot say which it was.
 
-    ``first`` is the fit of the campaign as recorded. Empty where no run is unlike the others, or none of the mistakes
-    that are tried makes it like them.
+    ``first`` is the fit of the campaign as recorded, whose gross readings take no part. Empty where no run is unlike
+    the others, or none of the mistakes that are tried makes it like them.
     """
     remainders = _remainders(first)
-    runs = {run: odd for run in remainders if (odd := _usual(remainders, run)) is not None}
-    cured = {
-        run: cures
-        for run, usual in runs.items()
-        if (cures := _cures(campaign, problem_of, run, remainders, usual))
-    }
-    # More than half of the runs are not the wrong ones.
-    if not cured or 2 * len(cured) > len(remainders):
+    campaign = without_gross(campaign, first)
+    for odd_runs in _odd_runs(remainders):
+        cured = {
+            odd.run: cures for odd in odd_runs if (cures := _cures(campaign, problem_of, odd, remainders))
+        }
+        # More than half of the runs are not the wrong ones.
+        if cured and 2 * len(cured) <= len(remainders):
+            break
+    else:
         return ()
     if len(cured) == 1:
         return next(iter(cured.values()))
@@ -68,34 +80,71 @@ def _lengths(white: Array) -> Array:
     return np.asarray(np.sqrt(np.nansum(white**2, axis=1) / np.where(count == 0, np.nan, count)))
 
 
-def _usual(remainders: dict[int, float], run: int) -> float | None:
-    """What the others leave, where a run leaves far more or far less and is farther from its statement than they."""
-    others = [value for number, value in remainders.items() if number != run and value > 0.0]
-    if not others or remainders[run] <= 0.0:
-        return None
-    usual = float(np.median(others))
-    is_far = not FAR_LESS < remainders[run] / usual < FAR_MORE
-    return usual if is_far and abs(np.log(remainders[run])) > abs(np.log(usual)) else None
+def _odd_runs(remainders: Mapping[int, float]) -> Iterator[tuple[_Odd, ...]]:
+    """The runs that are tried together: those unlike most; where two halves differ, the larger ones before the smaller.
+
+    A statement may be wrong by ten times, so most runs decide and not what is stated. Of two runs, or two halves, the
+    larger ones must be brought to the level of the smaller; the smaller ones, in a larger unit, to their own statement.
+    """
+    left = {run: value for run, value in remainders.items() if value > 0.0}
+    if len(left) < 2:
+        return
+    ordered = sorted(left.values())
+    lower, upper = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
+    if upper < FAR_MORE * lower:
+        usual = float(np.sqrt(lower * upper))
+        yield tuple(
+            _Odd(run, usual, value < usual, by_most=True)
+            for run, value in left.items()
+            if not FAR_LESS < value / usual < FAR_MORE
+        )
+        return
+    smaller = float(np.median([value for value in ordered if value <= lower]))
+    yield tuple(_Odd(run, smaller, is_small=False) for run, value in left.items() if value >= upper)
+    if lower < FAR_LESS * upper:
+        yield tuple(_Odd(run, 1.0, is_small=True) for run, value in left.items() if value <= lower)
 
 
 def _cures(
-    campaign: Campaign, problem_of: Maker, run: int, remainders: dict[int, float], usual: float
+    campaign: Campaign, problem_of: Maker, odd: _Odd, remainders: Mapping[int, float]
 ) -> tuple[Mistake, ...]:
     """The mistakes of a run that undone let it leave what the others do, the smallest remainder first."""
-    part = run_alone(campaign, run)
+    part = run_alone(campaign, odd.run)
     as_recorded = fitted(part, problem_of)
+    read = _read(part)
+    others = float(np.median([_read(run_alone(campaign, run)) for run in remainders if run != odd.run]))
     cures: list[tuple[float, Mistake]] = []
-    for what, undo in _trials(part, is_small=remainders[run] < usual):
-        undone = fitted(undo(part), problem_of)
+    for what, undo in _trials(part, is_small=odd.is_small):
+        corrected = undo(part)
+        scaled = _read(corrected)
+        of_unit = not np.isclose(scaled, read)
+        if of_unit and not _is_nearer(scaled, read, others):
+            continue
+        undone = fitted(corrected, problem_of)
         if undone is None:
             continue
-        leaves = _remainders(undone)[run]
-        if 1.0 / LIKE_OTHERS < leaves / usual < LIKE_OTHERS:
+        leaves = _remainders(undone)[odd.run]
+        # Either of two runs may be in another unit: that is decided by what is stated.
+        if of_unit and not odd.by_most and not _is_nearer(leaves, remainders[odd.run], 1.0):
+            continue
+        if 1.0 / LIKE_OTHERS < leaves / odd.usual < LIKE_OTHERS:
             before = float("inf") if as_recorded is None else as_recorded.rms
-            cures.append((leaves, Mistake(f"{what.split(' (`')[0]} in run {run}", before, undone.rms)))
+            cures.append((leaves, Mistake(f"{what.split(' (`')[0]} in run {odd.run}", before, undone.rms)))
     least = min((leaves for leaves, _ in cures), default=0.0)
     alike = [(leaves, mistake) for leaves, mistake in cures if leaves <= AS_WELL * least]
     return tuple(mistake for _, mistake in sorted(alike, key=lambda pair: float(f"{pair[0]:.2g}")))
+
+
+def _read(part: Campaign) -> float:
+    """The root mean square of all that was measured in a run: in a larger unit all of it is smaller, not only what a
+    fit leaves of it."""
+    channels = part.probings.channels
+    return float(np.sqrt(np.nanmean([channels[name] ** 2 for name in measured_columns(part)])))
+
+
+def _is_nearer(undone: float, recorded: float, others: float) -> bool:
+    """Whether a size is nearer to that of others, as a ratio, with a mistake undone than as recorded."""
+    return bool(abs(np.log(undone / others)) < abs(np.log(recorded / others)))
 
 
 def _trials(part: Campaign, *, is_small: bool) -> Iterator[Trial]:

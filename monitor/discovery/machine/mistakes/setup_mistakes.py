@@ -29,7 +29,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     turned_axes,
     unit_mistakes,
 )
-from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted
+from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted, without_gross
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
@@ -81,12 +81,13 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
     """The mistakes of a single setup or of all setups of one instrument; several where the readings cannot say which it
     was, the smallest remainder first.
 
-    ``first`` is the fit of the campaign as recorded. Empty where nobody contradicts others or itself, or where no
-    mistake explains it.
+    ``first`` is the fit of the campaign as recorded, whose gross readings take no part. Empty where nobody contradicts
+    others or itself, or where no mistake explains it.
     """
     ability = campaign_method(campaign).instruments
     if not isinstance(ability, Instruments):
         return ()
+    campaign = without_gross(campaign, first)
     for run in islice(reversed(first.problem.runs), MOST_RUNS):
         doubted = _doubted(
             ability.contrasts(first.problem, first.solution, int(run)),

@@ -81,7 +81,8 @@ def may_be_a_move(candidate: ChainCandidate) -> bool:
 def _sequence_of(candidate: ChainCandidate) -> int:
     """The reading from which on a move is there."""
     effect = candidate.effect
-    assert isinstance(effect, ArtefactEffect) and isinstance(effect.change, Moved)
+    assert isinstance(effect, ArtefactEffect)
+    assert isinstance(effect.change, Moved)
     return effect.change.sequence
 
 
