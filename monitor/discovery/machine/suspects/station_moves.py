@@ -1,9 +1,9 @@
 """A station that moved once within a run: from a reading on, all that a tracker sees stands elsewhere, or all that the
 machine carries.
 
-Every moment is tried, with a shift and a turn. A move has to say more at its price, all moments paid for, than the same
-motion by and by through that run, evenly or settling, and than a tracker that walks along a curve of some nodes; drifts
-of the catalogue compete with it in the scan.
+Every moment is tried, with a shift and a turn. A move has to say more at its price, all moments paid for, than such
+a motion of the tracker or of the machine by and by through that run, evenly or settling, and than a tracker that walks
+along a curve of some nodes; drifts of the catalogue compete with it in the scan.
 """
 
 from __future__ import annotations
@@ -43,30 +43,28 @@ def station_moves(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     found = [
         best for kind in (TrackerMoved, BaseMoved) if (best := _likeliest(scene, steady, kind)) is not None
     ]
-    walks = weigh_beside(scene, wander(scene, MOST_NODES), steady)
-    return [
-        each.candidate.variant
-        for each in found
-        if each.p_value <= rate
-        and each.score
-        > max((other.score for other in (*walks, *_by_and_by(scene, steady, each))), default=0.0)
-    ]
+    if not found:
+        return []
+    rivals = [*weigh_beside(scene, wander(scene, MOST_NODES), steady), *_by_and_by(scene, steady, found)]
+    least = max((rival.score for rival in rivals), default=0.0)
+    return [move.candidate.variant for move in found if move.p_value <= rate and move.score > max(least, 0.0)]
 
 
 def _by_and_by(
-    scene: ChainScene, steady: Sequence[ChainCandidate], move: Evidence[ChainCandidate]
+    scene: ChainScene, steady: Sequence[ChainCandidate], moves: Sequence[Evidence[ChainCandidate]]
 ) -> list[Evidence[ChainCandidate]]:
-    """The motion of a move through all of its run, evenly or settling, most likely first."""
-    variant, context = move.candidate.variant, scene.fit.problem.context
-    assert isinstance(variant.effect, ArtefactEffect)
-    change = variant.effect.change
-    assert isinstance(change, Moved)
-    of_run = context.run == change.run
-    lasted = float(np.ptp(context.time[of_run]))
-    drivers = [RunTime(), *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0)]
-    whole = replace(change, sequence=int(context.sequence[of_run].min()))
-    drifts = [ArtefactEffect(whole, driver, f"drift {number}") for number, driver in enumerate(drivers)]
-    variants = [Variant(drift.text, drift, len(drivers), variant.odds) for drift in drifts]
+    """The motions of moves through all of their run, evenly or settling, most likely first."""
+    context = scene.fit.problem.context
+    variants = []
+    for move in moves:
+        change = _change_of(move.candidate)
+        of_run = context.run == change.run
+        lasted = float(np.ptp(context.time[of_run]))
+        drivers = [RunTime(), *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0)]
+        whole = replace(change, sequence=int(context.sequence[of_run].min()))
+        for number, driver in enumerate(drivers):
+            drift = ArtefactEffect(whole, driver, f"drift {number}")
+            variants.append(Variant(drift.text, drift, len(drivers), move.candidate.variant.odds))
     return weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
 
 
@@ -78,12 +76,12 @@ def may_be_a_move(candidate: ChainCandidate) -> bool:
     return bool(driver) and (head.startswith("tracker:") or head.endswith(f"0{first}"))
 
 
-def _sequence_of(candidate: ChainCandidate) -> int:
-    """The reading from which on a move is there."""
+def _change_of(candidate: ChainCandidate) -> Moved:
+    """What moved, and when."""
     effect = candidate.effect
     assert isinstance(effect, ArtefactEffect)
     assert isinstance(effect.change, Moved)
-    return effect.change.sequence
+    return effect.change
 
 
 def _likeliest(
@@ -109,7 +107,7 @@ def _likeliest(
         step = max(len(sequences) // MOMENTS, 1)
         coarse = best_of(run, sequences[::step])
         if coarse is not None:
-            at = int(np.searchsorted(sequences, _sequence_of(coarse.candidate)))
+            at = int(np.searchsorted(sequences, _change_of(coarse.candidate).sequence))
             fine = best_of(run, sequences[max(at - step, 0) : at + step + 1])
             found.append(fine or coarse)
     return max(found, key=lambda each: each.score, default=None)
