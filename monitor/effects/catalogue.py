@@ -88,6 +88,29 @@ def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
 
 
+def of_ram(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> tuple[str, ...]:
+    """Return what grows before a head: shifts of linear axes that no axis has turned, in every direction for which the
+    ``base`` has no location error of the first turning axis.
+
+    Where no axis of the tool turns, such a shift is one of the tool.
+    """
+    if not any(joint.kind == "rotary" for joint in chain.tool):
+        return ()
+    stated = set(base)
+    shifts: list[str] = []
+    for branch in (chain.tool, chain.work):
+        turning = [index for index, joint in enumerate(branch) if joint.turns]
+        still = branch[: turning[0]] if turning else branch
+        shifts += [f"E{COMPONENTS[joint.main]}{joint.name}" for joint in still if joint.kind == "linear"]
+    firsts = [
+        next(joint.name for joint in branch if joint.turns)
+        for branch in (chain.tool, chain.work)
+        if any(joint.turns for joint in branch)
+    ]
+    unstated = [shift for shift in shifts if not stated & {f"{shift[:2]}0{name}" for name in firsts}]
+    return tuple(f"{shift}:const@{driver}" for driver in drivers for shift in unstated)
+
+
 def of_head(chain: Chain) -> tuple[str, ...]:
     """Return the constant errors of a head: of its turning axes, and of what it carries in place of the stated tool
     point.

@@ -14,6 +14,7 @@ from monitor.effects.catalogue import (
     catalogue,
     drivers_of,
     of_balls,
+    of_ram,
     of_single_touches,
     of_tool_end,
     of_tracker,
@@ -104,6 +105,7 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
         *of_balls(DRIVERS),
         *of_single_touches(),
         *of_tool_end(chain, DRIVERS),
+        *of_ram(chain, base, DRIVERS),
         *of_tracker(chain, DRIVERS),
     )
     described = _described(catalogue(chain, base, DRIVERS, more=others))

@@ -12,9 +12,10 @@ import numpy.typing as npt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
+from monitor.discovery.machine.scene_columns import raw_columns
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
-from monitor.discovery.machine.shapes.curves import Curve, curve_of
+from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_period
@@ -27,6 +28,7 @@ from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always, EachRun
+from monitor.effects.effect import ChainBasis
 from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe
 from monitor.records import Array
@@ -277,6 +279,14 @@ def _missing(
         amplitude, u = largest_deviation(
             effect.basis(scene.fit.problem.context).columns, coefficients, covariance
         )
+    raw, curve = candidate.raw, None
+    if candidate.variant.nearest is not None and not is_curve(candidate):
+        curve = curve_of(scene.fit.problem.context, effect, coefficients, covariance)
+    if curve is not None:
+        # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
+        largest = int(np.abs(curve.size).argmax())
+        amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
+        raw = _beyond_base(candidate)
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
@@ -300,7 +310,7 @@ def _missing(
         covariance=covariance,
         amplitude=amplitude,
         u=u,
-        peak=float(np.linalg.norm(candidate.raw @ coefficients, axis=1).max()),
+        peak=float(np.linalg.norm(raw @ coefficients, axis=1).max()),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
@@ -321,10 +331,17 @@ def _missing(
         travelled_periods=part_of_period(effect, scene.fit.problem.context),
         unit=unit,
         nearest=candidate.variant.nearest,
-        curve=None
-        if candidate.variant.nearest is None and not is_curve(candidate)
-        else curve_of(scene.fit.problem.context, effect, coefficients, covariance),
+        curve=curve,
     )
+
+
+def _beyond_base(candidate: ChainCandidate) -> Array:
+    """The displacement (n, d, k) in mm of a shape without what the base has of it already."""
+    effect, basis, fit = candidate.effect, candidate.basis, candidate.fit
+    if not isinstance(effect, ChainEffect) or not isinstance(basis, ChainBasis):
+        return candidate.raw
+    columns = beyond_base(fit.problem.context, effect)
+    return np.moveaxis(raw_columns(fit, replace(basis, columns=columns)), 0, 2)
 
 
 def _shows_within_runs_alone(scene: ChainScene, effect: MachineEffect) -> bool:

@@ -31,15 +31,12 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
     """The curve of an effect of the given coefficients (k,); None for what is no error of an axis."""
     if not isinstance(effect, ChainEffect):
         return None
-    columns = effect.shape.columns(context, effect.term.joint)
     at = effect.joint.sign * context.places[:, effect.term.joint]
     direction = context.travel[:, effect.term.joint]
     first = np.flatnonzero(context.run == context.run[0])
     rows = first[np.argsort(at[first], kind="stable")]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64))]
-    # What the base has already, a constant and a slope, is no part of the shape.
-    plain = np.column_stack([np.ones(len(rows)), at[rows]])
-    shape = columns[rows] - plain @ np.linalg.lstsq(plain, columns[rows], rcond=None)[0]
+    shape = beyond_base(context, effect)[rows]
     variance = np.einsum("mi,ij,mj->m", shape, covariance, shape)
     return Curve(
         effect.joint.name,
@@ -49,3 +46,13 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
         shape @ coefficients,
         np.sqrt(np.maximum(variance, 0.0)),
     )
+
+
+def beyond_base(context: Context, effect: ChainEffect) -> Array:
+    """The columns (n, k) of a shape without what the base has already, a constant and a slope: no part of the shape."""
+    columns, at = (
+        effect.shape.columns(context, effect.term.joint),
+        context.places[:, effect.term.joint],
+    )
+    plain = np.column_stack([np.ones(len(at)), at])
+    return np.asarray(columns - plain @ np.linalg.lstsq(plain, columns, rcond=None)[0])

@@ -18,6 +18,7 @@ import scipy
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
+from monitor.discovery.machine.shapes.cycles import cycle_instead
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.slight_shapes import slight_shape, slight_wave
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -27,12 +28,18 @@ from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
-from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
+from monitor.discovery.search.scan import (
+    WORTH_EXCHANGING,
+    ScanResult,
+    by_error_taken_away,
+    findings_of,
+    findings_without_rivals,
+)
 from monitor.discovery.search.scene import family_count
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import HARMONICS, Free
-from monitor.machine import COMPONENTS, MOTION
+from monitor.machine import MOTION
 from monitor.records import Array
 
 # The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
@@ -41,6 +48,8 @@ LEVEL = 1e-3
 FEWEST_PERIODS = 4
 # More parts than this of one shape are beyond what a plan can separate.
 MOST_PARTS = 8
+# So many times the stated noise is an error that is missing, not a statement that is wrong.
+FAR = 1.5
 # The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
 PRICE = float(np.log(45.0))
 
@@ -60,17 +69,17 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     """The result with one effect of free shape instead of those of the catalogue, for every error whose shape they are
     not."""
     selected = result.candidates
-    if not selected and not _lacks_something(scene):
+    if not selected and not _lacks_something(scene) and not _is_lost_sight(scene):
         scene, selected = _slight(scene)
         if not selected:
             return scene, result
     scene, selected = _with_free(scene, selected)
     margin = _margin(scene, selected)
-    alone = [] if margin is None else _alone(scene, selected, margin)
-    if alone:
-        selected = alone
-        for free in filter(_is_free, alone):
-            scene = _with_candidate(scene, free)
+    instead = [] if margin is None else _in_place(scene, selected, margin)
+    if instead:
+        new = [each for each in instead if _is_free(each) and not _is_among(each, selected)]
+        selected = instead
+        scene = replace(scene, candidates=(*scene.candidates, *new))
     scene, selected = _with_waves(scene, selected)
     if len(selected) == len(result.findings) and all(
         _is_among(shape, result.candidates) for shape in selected
@@ -80,24 +89,25 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
 
 
 def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
-    """The selected effects with waves by their names in place of the parts of a free shape."""
-    for free in [shape for shape in selected if _is_free(shape)]:
+    """The selected effects with waves by their names, or a cycle, in place of a free shape or a table."""
+    for free in [shape for shape in selected if _is_any_curve(shape)]:
         others = [shape for shape in selected if shape is not free]
         shapes = _shapes_by_error(scene).get(error_of(free), [])
         if not shapes:
             continue
-        split = waves_instead(
-            scene,
-            free,
-            {other.family for other in others},
-            partial(_of_parts, scene, error_of(free), shapes=shapes, others=others),
-            partial(_named_or_free, scene, others),
+        score = partial(_named_or_free, scene, others)
+        of_parts = partial(_of_parts, scene, error_of(free), shapes=shapes, others=others)
+        taken = {other.family for other in others}
+        split = waves_instead(scene, free, taken, of_parts, score) or cycle_instead(
+            scene, free, others, score
         )
         if split and all(_predicts(scene, wave, [*others, *split[:at]]) for at, wave in enumerate(split)):
             selected = [*others, *split]
             # The whole it came from is no rival of its parts.
             without_free = [
-                each for each in scene.candidates if not (_is_free(each) and error_of(each) == error_of(free))
+                each
+                for each in scene.candidates
+                if not (_is_any_curve(each) and error_of(each) == error_of(free))
             ]
             more = [each for each in split if not _is_among(each, without_free)]
             scene = replace(scene, candidates=(*without_free, *more))
@@ -122,8 +132,16 @@ def _margin(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float | No
         return UNDECIDED
     if any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         return WORTH_EXCHANGING
-    # Over a part of a turn flexure and refraction bend as any shape does.
-    return None if scene.fit.problem.needs_whole_periods else UNDECIDED
+    # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing.
+    if scene.fit.problem.needs_whole_periods and not _far_from_noise(scene, selected):
+        return None
+    return UNDECIDED
+
+
+def _far_from_noise(scene: ChainScene, selected: Sequence[ChainCandidate]) -> bool:
+    """Whether selected effects leave more than the stated noise, by a factor that no statement is wrong by."""
+    beside = scene.remainders.beside(selected)
+    return bool(beside.residual @ beside.residual > FAR**2 * beside.degrees_of_freedom)
 
 
 def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
@@ -151,6 +169,13 @@ def _lacks_something(scene: ChainScene) -> bool:
     return test is not None and test.p_value < LACK_OF_FIT_LEVEL
 
 
+def _is_lost_sight(scene: ChainScene) -> bool:
+    """Whether what points somewhere is far from its noise, in a night that repeats no pose and shows no lack of fit."""
+    problem = scene.fit.problem
+    is_pointing = problem.needs_whole_periods and problem.context.sight is not None
+    return is_pointing and _far_from_noise(scene, [])
+
+
 def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> bool:
     """Whether some candidate stands out beside selected effects: a scan that ends so was led astray by one of them."""
     pool = [candidate for candidate in scene.candidates if candidate.visible]
@@ -161,6 +186,11 @@ def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> 
 def _is_free(candidate: ChainCandidate) -> bool:
     effect = candidate.effect
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
+
+
+def _is_any_curve(candidate: ChainCandidate) -> bool:
+    """Whether an effect follows any curve: a free shape or an error table."""
+    return _is_free(candidate) or candidate.family.endswith(":table")
 
 
 def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
@@ -215,38 +245,72 @@ def _waves(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[ChainCa
     return scene_of(scene.fit, variants).candidates
 
 
-def _alone(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> list[ChainCandidate]:
-    """One error, of free shape or as several powers of the position, that says more at its price, by a margin, than all
-    selected effects together; none where none does.
+def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> list[ChainCandidate]:
+    """The selected effects with one error, of free shape or as several powers of the position, in place of all but
+    those that take away most, where that says more at its price, by a margin; none where none does.
 
-    The entry of the catalogue that comes nearest to an unknown shape may be one of another error.
+    The entries of the catalogue that come nearest to an unknown shape may be those of other errors, beside a right one
+    as well as alone. What stands beside the new error as well stays.
     """
-    chain = scene.fit.problem.context.chain
+    ordered = by_error_taken_away(
+        scene, ScanResult((*findings_without_rivals(scene, selected, 1),))
+    ).candidates
+    shapes_by_error: dict[str, list[ChainCandidate]] = {}
+    for shape in filter(_is_of_shape, scene.candidates):
+        shapes_by_error.setdefault(error_of(shape), []).append(shape)
+    errors = {
+        symbol: (shapes, _whole(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
+    }
     best: list[ChainCandidate] = []
     worth = _priced(scene, selected) + margin
-    for joint in chain.joints:
-        for component in COMPONENTS:
-            symbol = f"E{component}{joint.name}"
-            shapes = [
-                shape for shape in scene.candidates if _is_of_shape(shape) and error_of(shape) == symbol
-            ]
-            if not shapes:
-                continue
-            bends = bends_instead(scene, symbol, worth, [])
-            if bends and (score := _priced(scene, bends)) > worth:
-                best, worth = bends, score
-            parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
-            if parts:
-                free = _of_parts(scene, symbol, parts, shapes, [])
-                score = _priced(scene, [free])
-                if score > worth and _predicts(scene, free, []):
-                    best, worth = [free], score
+    for count in range(max(len(ordered), 1)):
+        kept, gone = ordered[:count], ordered[count:]
+        for symbol, (shapes, whole) in errors.items():
+            for new in _of_error(scene, symbol, shapes, whole, kept):
+                together = [*kept, *new, *_standing_beside(scene, [*kept, *new], gone)]
+                score = _priced(scene, together)
+                if score > worth:
+                    best, worth = together, score
     return best
 
 
-def _priced(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
-    """The score of effects together, free shapes at the price of the choice of their parts."""
-    return score_beside(scene, selected, []) - sum(map(price_of_parts, selected))
+def _of_error(
+    scene: ChainScene,
+    symbol: str,
+    shapes: Sequence[ChainCandidate],
+    whole: ChainCandidate,
+    kept: Sequence[ChainCandidate],
+) -> list[list[ChainCandidate]]:
+    """What an error may be beside effects that are kept: one free shape, or several powers of the position that say as
+    much; none where it is among them or foretells no poses."""
+    if symbol in map(error_of, kept):
+        return []
+    parts = _parts(scene, whole, kept)
+    if not parts:
+        return []
+    free = _of_parts(scene, symbol, parts, shapes, kept)
+    able = _predicts(scene, free, kept)
+    bends = bends_instead(scene, symbol, _priced(scene, [free], kept) if able else 0.0, kept)
+    return [some for some in ([free] if able else [], bends) if some]
+
+
+def _standing_beside(
+    scene: ChainScene, others: Sequence[ChainCandidate], effects: Sequence[ChainCandidate]
+) -> list[ChainCandidate]:
+    """Those of some effects that stand out beside others; one of them, the last, goes in any case."""
+    standing: list[ChainCandidate] = []
+    for effect in effects[:-1]:
+        (evidence,) = weigh_beside(scene, [effect], [*others, *standing])
+        if evidence.p_value * family_count(scene) < LEVEL:
+            standing.append(effect)
+    return standing
+
+
+def _priced(
+    scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate] = ()
+) -> float:
+    """The score of effects together beside others, free shapes at the price of the choice of their parts."""
+    return score_beside(scene, selected, others) - sum(map(price_of_parts, selected))
 
 
 def price_of_parts(candidate: ChainCandidate) -> float:

@@ -1,0 +1,58 @@
+"""A cycle in place of a free shape or a table of a linear axis: a wave of one pitch is a cosine and a sine.
+
+Pitches of positioning errors are in the catalogue; those of the other errors of an axis, and longer ones, are asked for
+where its error has no shape of the catalogue: rollers that recirculate, bolts of a rail, the machining of a way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.variants import (
+    FEWEST_PERIODS,
+    FREQUENCY_STEP,
+    SHORTEST_PITCH_MM,
+    resolvable,
+)
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.evidence import weigh_beside
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes.free import Free
+from monitor.effects.shapes.nodes import Nodes
+
+Score = Callable[[Sequence[ChainCandidate]], float]
+
+
+def cycle_instead(
+    scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate], score: Score
+) -> list[ChainCandidate]:
+    """The cycle of a searched pitch, alone, that says beside others at least as much at its price as a free shape or a
+    table of a linear axis; none where none does, or where it is none of these."""
+    effect = free.effect
+    if (
+        not isinstance(effect, ChainEffect)
+        or not isinstance(effect.shape, Free | Nodes)
+        or effect.joint.turns
+    ):
+        return []
+    context = scene.fit.problem.context
+    travel = float(np.ptp(context.positions[:, effect.term.joint]))
+    if travel < FEWEST_PERIODS * SHORTEST_PITCH_MM:
+        return []
+    frequencies = np.arange(FEWEST_PERIODS / travel, 1.0 / SHORTEST_PITCH_MM, FREQUENCY_STEP)
+    symbol = error_of(free)
+    texts = [f"{symbol}:cyclic{1.0 / frequency:.6g}mm" for frequency in frequencies]
+    variants = [Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(texts)) for text in texts]
+    cycles = [
+        cycle for cycle in scene_of(scene.fit, resolvable(variants, context)).candidates if cycle.visible
+    ]
+    weighed = weigh_beside(scene, cycles, others)
+    if not weighed:
+        return []
+    best = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
+    return [best] if score([best]) >= score([free]) else []
