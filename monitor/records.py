@@ -126,8 +126,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe; ``standard_uncertainty`` of a coordinate and ``tip`` (spindle frame) in mm, of a scale in mm/mm;
-    ``known`` names what holds without an uncertainty: the scale of a tracker."""
+    """A probe: u of a coordinate and ``tip`` (spindle frame) in mm, of a scale in mm/mm; what is ``known`` as exact."""
 
     id: str
     model: str
@@ -149,10 +148,8 @@ class Ball:
 
 @dataclass(frozen=True)
 class ScaleBar:
-    """A calibrated distance between the centres of two balls: length and standard uncertainty in mm.
-
-    ``expansion_coefficient`` is in 1/K and ``reference_temperature`` in °C, None where not given.
-    """
+    """A calibrated distance between the centres of two balls: length and standard uncertainty in mm,
+    ``expansion_coefficient`` in 1/K and ``reference_temperature`` in °C, None where not given."""
 
     balls: tuple[str, str]
     length: float

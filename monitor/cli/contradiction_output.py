@@ -17,10 +17,10 @@ LEAST_PERCENT = 0.001
 def likely_mistakes(mistakes: Sequence[LikelyMistake]) -> None:
     """Print what looks wrong in the file."""
     mm = MICROMETRE.to_internal
-    found = [
+    in_words = [
         MistakeFound(each.what, mm(each.rms_as_recorded_um), mm(each.rms_undone_um)) for each in mistakes
     ]
-    output.say(f"{mistake_sentence(found)} Nothing was changed: correct the file first.")
+    output.say(f"{mistake_sentence(in_words)} Nothing was changed: correct the file first.")
 
 
 def chance(by_chance: float) -> str:

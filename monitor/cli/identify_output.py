@@ -47,6 +47,11 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     _taken_up(answer)
     _as_stated(answer)
     _refuted(answer)
+    _added(answer)
+
+
+def _added(answer: IdentifyAnswer) -> None:
+    """The added effects, and those that have no number."""
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "

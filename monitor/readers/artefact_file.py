@@ -38,13 +38,13 @@ def read_probe(top: Table, *, required: bool = True, has_scale: bool = False) ->
     tip = table.numbers("tip_mm", 3, largest=FARTHEST_MM, unit="mm", example="[0.0, 0.0, -150.0]")
     certificate = table.text("certificate")
     scale = read_scale_uncertainty(table) if has_scale else None
-    known = read_known(table, (SCALE.name,)) if has_scale else ()
-    check_one_statement(table, known)
+    stated = read_known(table, (SCALE.name,)) if has_scale else ()
+    check_one_statement(table, stated)
     table.finish()
     if identity is None or model is None or uncertainty is None:
         return None
     point = None if tip is None else (tip[0], tip[1], tip[2])
-    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate, scale, known)
+    return Probe(identity, model, MICROMETRE.to_internal(uncertainty), point, certificate, scale, stated)
 
 
 def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:

@@ -7,11 +7,13 @@ what moved. Where none was measured on both sides of that moment the two are one
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.effects.artefact.tracker import measured_points
 from monitor.effects.context import Context
@@ -56,8 +58,12 @@ class Moved(BuiltIn):
         after = of_run & (context.sequence >= self.sequence) & self._takes_part(context)
         return np.asarray(after[:, None, None] * motion)
 
-    def _takes_part(self, context: Context) -> Array:
-        """Return the rows (n,) of targets that move along."""
+    @abstractmethod
+    def described(self, driven: str) -> Description:
+        """Return what moved, and what to do about it."""
+
+    def _takes_part(self, context: Context) -> npt.NDArray[np.bool_]:
+        """Return marks (n,) of the rows of targets that move along."""
         return np.ones(len(context), dtype=bool)
 
 
@@ -86,8 +92,8 @@ class BaseMoved(Moved):
     head: ClassVar[str] = "base"
     pattern: ClassVar[str] = "base:" + MOVED
 
-    def _takes_part(self, context: Context) -> Array:
-        return ~np.isin(context.target, list(context.resting))
+    def _takes_part(self, context: Context) -> npt.NDArray[np.bool_]:
+        return np.asarray(~np.isin(context.target, list(context.resting)))
 
     def described(self, driven: str) -> Description:
         return Description(

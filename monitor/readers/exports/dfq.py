@@ -66,7 +66,7 @@ def settings(table: Table) -> int | str | None:
     value = table.raw("record", required=False, example="1")
     is_number = isinstance(value, int) and not isinstance(value, bool) and value >= 1
     if value is None or value == ONE_CLAMPING or is_number:
-        return value
+        return None if value is None else ONE_CLAMPING if value == ONE_CLAMPING else int(value)
     table.fault("record", f'{quoted(value)} is no record; write its number from 1 on, or "{ONE_CLAMPING}"')
     return None
 

@@ -24,11 +24,11 @@ def against_others(
     if not isinstance(ability, Instruments):
         return None
     run = int(problem.runs[-1]) if run is None else run
-    found = who_contradicts(ability.contrasts(problem, solution, run), doubtful)
-    if found is None:
+    contradiction = who_contradicts(ability.contrasts(problem, solution, run), doubtful)
+    if contradiction is None:
         return None
-    suspects, comparisons = found.suspects, found.comparisons
-    worst = min(suspects or found.every, key=lambda contrast: (contrast.p, -contrast.size))
+    suspects, comparisons = contradiction.suspects, contradiction.comparisons
+    worst = min(suspects or contradiction.every, key=lambda contrast: (contrast.p, -contrast.size))
     return AgainstOthers(
         run,
         worst.name,

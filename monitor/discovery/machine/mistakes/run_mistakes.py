@@ -86,23 +86,23 @@ def _odd_runs(remainders: Mapping[int, float]) -> Iterator[tuple[_Odd, ...]]:
     A statement may be wrong by ten times, so most runs decide and not what is stated. Of two runs, or two halves, the
     larger ones must be brought to the level of the smaller; the smaller ones, in a larger unit, to their own statement.
     """
-    left = {run: value for run, value in remainders.items() if value > 0.0}
-    if len(left) < 2:
+    by_run = {run: value for run, value in remainders.items() if value > 0.0}
+    if len(by_run) < 2:
         return
-    ordered = sorted(left.values())
+    ordered = sorted(by_run.values())
     lower, upper = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
     if upper < FAR_MORE * lower:
         usual = float(np.sqrt(lower * upper))
         yield tuple(
             _Odd(run, usual, value < usual, by_most=True)
-            for run, value in left.items()
+            for run, value in by_run.items()
             if not FAR_LESS < value / usual < FAR_MORE
         )
         return
     smaller = float(np.median([value for value in ordered if value <= lower]))
-    yield tuple(_Odd(run, smaller, is_small=False) for run, value in left.items() if value >= upper)
+    yield tuple(_Odd(run, smaller, is_small=False) for run, value in by_run.items() if value >= upper)
     if lower < FAR_LESS * upper:
-        yield tuple(_Odd(run, 1.0, is_small=True) for run, value in left.items() if value <= lower)
+        yield tuple(_Odd(run, 1.0, is_small=True) for run, value in by_run.items() if value <= lower)
 
 
 def _cures(

@@ -104,11 +104,11 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
 def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> list[_Doubted]:
     """Whose mistakes are tried: the suspects of those that contradict all others, else all that do; and the setups that
     contradict themselves."""
-    found = who_contradicts(every)
+    contradiction = who_contradicts(every)
     against: Sequence[Contrast] = ()
-    if found is not None:
-        of_many = [each for each in found.every if each.p * found.comparisons <= DOUBTFUL]
-        against = sorted(found.suspects or of_many, key=lambda each: (each.p, -each.size))
+    if contradiction is not None:
+        of_many = [each for each in contradiction.every if each.p * contradiction.comparisons <= DOUBTFUL]
+        against = sorted(contradiction.suspects or of_many, key=lambda each: (each.p, -each.size))
     still = {each.setup for each in scatters if each.times < TOO_STILL}
     doubted = [
         _Doubted(each.name, each.setups, each.size, each.directions, still.issuperset(each.setups))
@@ -116,8 +116,13 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
         if each.kind is not ContrastKind.STATED
     ]
     tried = {setup for each in doubted for setup in each.setups}
-    own = [each for each in scatters if not TOO_STILL < each.times < SCATTERS and each.setup not in tried]
-    return [*doubted, *(_Doubted(each.setup, (each.setup,), is_still=each.times < 1.0) for each in own)]
+    scattering = [
+        each for each in scatters if not TOO_STILL < each.times < SCATTERS and each.setup not in tried
+    ]
+    return [
+        *doubted,
+        *(_Doubted(each.setup, (each.setup,), is_still=each.times < 1.0) for each in scattering),
+    ]
 
 
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
@@ -173,18 +178,18 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
     ability = campaign_method(campaign).instruments
     assert isinstance(ability, Instruments)
     every = ability.contrasts(fit.problem, fit.solution, run)
-    now = next((each for each in every if each.name == doubted.name), None)
+    contrast = next((each for each in every if each.name == doubted.name), None)
     if doubted.directions and not doubted.is_still:
-        if now is None or now.directions < doubted.directions:
+        if contrast is None or contrast.directions < doubted.directions:
             return False
-        return count * (max(now.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
+        return count * (max(contrast.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
     scatters = ability.scatters(fit.problem, fit.solution, run)
-    own = [each.times for each in scatters if each.setup in doubted.setups]
+    times = [each.times for each in scatters if each.setup in doubted.setups]
     return (
-        len(own) == len(doubted.setups)
-        and IN_ORDER[0] < min(own)
-        and max(own) < IN_ORDER[1]
-        and (now is None or now.p > DOUBTFUL)
+        len(times) == len(doubted.setups)
+        and IN_ORDER[0] < min(times)
+        and max(times) < IN_ORDER[1]
+        and (contrast is None or contrast.p > DOUBTFUL)
     )
 
 

@@ -264,10 +264,10 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     best: list[ChainCandidate] = []
     worth = _priced(scene, selected) + margin
     for count in range(max(len(ordered), 1)):
-        kept, gone = ordered[:count], ordered[count:]
+        first, rest = ordered[:count], ordered[count:]
         for symbol, (shapes, whole) in errors.items():
-            for new in _of_error(scene, symbol, shapes, whole, kept):
-                together = [*kept, *new, *_standing_beside(scene, [*kept, *new], gone)]
+            for new in _of_error(scene, symbol, shapes, whole, first):
+                together = [*first, *new, *_standing_beside(scene, [*first, *new], rest)]
                 score = _priced(scene, together)
                 if score > worth:
                     best, worth = together, score
