@@ -48,6 +48,8 @@ LEVEL = 1e-3
 FEWEST_PERIODS = 4
 # More parts than this of one shape are beyond what a plan can separate.
 MOST_PARTS = 8
+# What bends the line of sight of every telescope.
+BENDING_SIGHT = ("flexure:tool@gravity", "sight:up:formula(1/tan(elevation))")
 # So many times the stated noise is an error that is missing, not a statement that is wrong.
 FAR = 1.5
 # The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
@@ -262,16 +264,23 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
         symbol: (shapes, _whole(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
     }
     best: list[ChainCandidate] = []
-    worth = _priced(scene, selected) + margin
+    worth = max(_priced(scene, selected), _priced(scene, _bending_sight(scene))) + margin
     for count in range(max(len(ordered), 1)):
-        first, rest = ordered[:count], ordered[count:]
+        leading, gone = ordered[:count], ordered[count:]
         for symbol, (shapes, whole) in errors.items():
-            for new in _of_error(scene, symbol, shapes, whole, first):
-                together = [*first, *new, *_standing_beside(scene, [*first, *new], rest)]
+            for new in _of_error(scene, symbol, shapes, whole, leading):
+                together = [*leading, *new, *_standing_beside(scene, [*leading, *new], gone)]
                 score = _priced(scene, together)
                 if score > worth:
                     best, worth = together, score
     return best
+
+
+def _bending_sight(scene: ChainScene) -> list[ChainCandidate]:
+    """Flexure and refraction, which together bend the line of sight as a free shape may; none where nothing points."""
+    if scene.fit.problem.context.sight is None:
+        return []
+    return [each for each in scene.candidates if each.visible and each.family in BENDING_SIGHT]
 
 
 def _of_error(
@@ -279,18 +288,18 @@ def _of_error(
     symbol: str,
     shapes: Sequence[ChainCandidate],
     whole: ChainCandidate,
-    kept: Sequence[ChainCandidate],
+    leading: Sequence[ChainCandidate],
 ) -> list[list[ChainCandidate]]:
-    """What an error may be beside effects that are kept: one free shape, or several powers of the position that say as
-    much; none where it is among them or foretells no poses."""
-    if symbol in map(error_of, kept):
+    """What an error may be beside leading effects: one free shape, or several powers of the position that say as much;
+    none where it is among them or foretells no poses."""
+    if symbol in map(error_of, leading):
         return []
-    parts = _parts(scene, whole, kept)
+    parts = _parts(scene, whole, leading)
     if not parts:
         return []
-    free = _of_parts(scene, symbol, parts, shapes, kept)
-    able = _predicts(scene, free, kept)
-    bends = bends_instead(scene, symbol, _priced(scene, [free], kept) if able else 0.0, kept)
+    free = _of_parts(scene, symbol, parts, shapes, leading)
+    able = _predicts(scene, free, leading)
+    bends = bends_instead(scene, symbol, _priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]
 
 
