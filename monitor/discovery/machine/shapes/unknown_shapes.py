@@ -83,7 +83,7 @@ def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chai
     """The selected effects with waves by their names in place of the parts of a free shape."""
     for free in [shape for shape in selected if _is_free(shape)]:
         others = [shape for shape in selected if shape is not free]
-        shapes = _shapes_by_error(scene).get(error_of(free), [])
+        shapes = [each for each in filter(_is_of_shape, scene.candidates) if error_of(each) == error_of(free)]
         if not shapes:
             continue
         split = waves_instead(
