@@ -111,6 +111,14 @@ def of_ram(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> tuple[s
     return tuple(f"{shift}:const@{driver}" for driver in drivers for shift in unstated)
 
 
+def of_zeros(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
+    """Return what grows in a machine that instruments look at from its work: the places of its linear axes, and what
+    the last axis of a head carries."""
+    zeros = [f"E{COMPONENTS[joint.main]}0{joint.name}" for joint in chain.of_kind("linear")]
+    placed = tuple(f"{zero}@{driver}" for driver in drivers for zero in zeros)
+    return (*placed, *(of_tool_end(chain, drivers) if chain.tool and chain.tool[-1].turns else ()))
+
+
 def of_head(chain: Chain) -> tuple[str, ...]:
     """Return the constant errors of a head: of its turning axes, and of what it carries in place of the stated tool
     point.

@@ -72,11 +72,11 @@ def angles() -> tuple[np.ndarray, np.ndarray]:
 
 
 def sense(position: np.ndarray) -> np.ndarray:
-    """The sense of the last move of an axis; before its first one the first."""
-    moves = np.sign(np.diff(position, prepend=position[0]))
+    """The sense of the last move of an axis, which came from zero."""
+    moves = np.sign(np.diff(position, prepend=0.0))
     for index in range(1, len(moves)):
         moves[index] = moves[index] or moves[index - 1]
-    return np.where(moves == 0.0, moves[np.flatnonzero(moves)[0]], moves)
+    return np.asarray(moves)
 
 
 def week(rng: np.random.Generator, error: str, constant: bool, noise: str) -> list[Mapping[str, float]]:

@@ -25,9 +25,10 @@ from monitor.records import Array
 
 # With 999 flips a p-value of 0.01 is known to 0.003.
 FLIPS = 999
-# Fewer runs have fewer than 128 different flips, which no effect can pass at 1 %. An effect that mainly few of the runs
-# show (a warm-up in the first of each day) is as if there were only these.
-FEWEST = 7.0
+# So many runs or fewer have fewer than 128 different flips, which no effect can pass at 1 %. An effect that mainly few
+# of the runs show (a warm-up in the first of each day) is as if there were only these. Seven runs that show the same
+# are seven but for rounding.
+FEWEST, ROUNDING = 7.0, 1e-6
 # Up to so many runs all flips are made.
 ALL_FLIPS_UP_TO = 10
 # Draws the flips, always the same.
@@ -65,7 +66,7 @@ def p_value_by_flips(
     beside = scene.remainders.beside(others)
     basis, residual, dof = beside.basis, beside.residual, beside.degrees_of_freedom
     columns = orthonormal(without(basis, evidence.candidate.columns))
-    run = next((unit for unit in units if effective_number(columns, unit) > FEWEST), None)
+    run = next((unit for unit in units if effective_number(columns, unit) > FEWEST + ROUNDING), None)
     if run is None:
         return None
     runs = int(run[-1]) + 1

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import ArtefactEffect, ChainEffect, Effect
-from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sight
+from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sight, of_zeros
 from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
@@ -196,7 +196,8 @@ class InstrumentProblem(ChainProblem):
         chain, instruments = self.context.chain, self.context.instruments
         pointing = of_sight(chain) if self.context.sight is not None else ()
         of_setups = of_instruments(instruments, drivers) if instruments is not None else ()
-        return (*pointing, *of_drives(chain, dict(self.gear_ratios)), *of_head(chain), *of_setups)
+        grown = (*of_head(chain), *of_zeros(chain, drivers))
+        return (*pointing, *of_drives(chain, dict(self.gear_ratios)), *grown, *of_setups)
 
     def as_vectors(self, rows: Array) -> Array:
         """The shortest vectors (n, 3) mm, in the frame of the last work axis, that would show such numbers (n, d); of a

@@ -22,7 +22,7 @@ from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
-from monitor.effects import ChainEffect, with_time_constant
+from monitor.effects import ChainEffect, InstrumentEffect, with_time_constant
 from monitor.effects.drivers import EachRun, SettlingDriver
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic
 from monitor.effects.shapes.free import Free
@@ -52,10 +52,13 @@ class RivalSearch:
         remainder = without(basis, self.selected[index].columns) @ coefficients
         rivals = []
         for evidence in best_of_families(weigh_beside(self.scene, self._pool(index), others)):
-            if evidence.likelihood >= least - GRID_LOSS:
+            of_instrument = isinstance(evidence.candidate.effect, InstrumentEffect)
+            if evidence.likelihood >= least - GRID_LOSS or of_instrument:
                 best = self._at_best_value(index, evidence)
-                if best.likelihood >= least:
-                    rivals.append((best.candidate, coincides(basis, best.candidate, remainder[:, None])))
+                same = coincides(basis, best.candidate, remainder[:, None])
+                # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
+                if best.likelihood >= least or (of_instrument and same):
+                    rivals.append((best.candidate, same))
         return sorted(rivals, key=lambda pair: not pair[1])
 
     def _pool(self, index: int) -> list[ChainCandidate]:

@@ -94,7 +94,7 @@ def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chai
     """The selected effects with waves by their names, or a cycle, in place of a free shape or a table."""
     for free in [shape for shape in selected if _is_any_curve(shape)]:
         others = [shape for shape in selected if shape is not free]
-        shapes = _shapes_by_error(scene).get(error_of(free), [])
+        shapes = [each for each in filter(_is_of_shape, scene.candidates) if error_of(each) == error_of(free)]
         if not shapes:
             continue
         score = partial(_named_or_free, scene, others)
