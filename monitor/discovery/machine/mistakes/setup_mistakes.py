@@ -185,15 +185,19 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
     assert isinstance(ability, Instruments)
     every = ability.contrasts(fit.problem, fit.solution, run)
     now = next((each for each in every if each.name == doubted.name), None)
-    scatters = ability.scatters(fit.problem, fit.solution, run)
-    own = [each.times for each in scatters if each.setup in doubted.setups]
-    is_in_order = len(own) == len(doubted.setups) and IN_ORDER[0] < min(own) and max(own) < IN_ORDER[1]
+    is_in_order = _is_in_order(ability.scatters(fit.problem, fit.solution, run), doubted)
     if not doubted.directions or doubted.is_still:
         return is_in_order and (now is None or now.p > DOUBTFUL)
     if now is None or now.directions < doubted.directions:
         return False
     count_of_quiet = count * QUIETS if doubted.is_quiet and is_in_order else count
     return count_of_quiet * (max(now.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
+
+
+def _is_in_order(scatters: Sequence[SetupScatter], doubted: _Doubted) -> bool:
+    """Whether all setups of who is doubted scatter as they state."""
+    own = [each.times for each in scatters if each.setup in doubted.setups]
+    return len(own) == len(doubted.setups) and IN_ORDER[0] < min(own) and max(own) < IN_ORDER[1]
 
 
 def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
