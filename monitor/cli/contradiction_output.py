@@ -14,8 +14,10 @@ from monitor.workflow.instruments.answer import AgainstOthers, Suspect
 LEAST_PERCENT = 0.001
 
 
-def likely_mistakes(mistakes: Sequence[LikelyMistake]) -> None:
-    """Print what looks wrong in the file."""
+def likely_mistakes(mistakes: Sequence[LikelyMistake] | None) -> None:
+    """Print what looks wrong in the file; nothing where nothing does."""
+    if not mistakes:
+        return
     mm = MICROMETRE.to_internal
     in_words = [
         MistakeFound(each.what, mm(each.rms_as_recorded_um), mm(each.rms_undone_um)) for each in mistakes

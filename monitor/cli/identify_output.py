@@ -40,8 +40,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     )
     for note in (run.note for run in runs if run.note):
         output.say(note)
-    if answer.likely_mistakes:
-        likely_mistakes(answer.likely_mistakes)
+    likely_mistakes(answer.likely_mistakes)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     _taken_up(answer)

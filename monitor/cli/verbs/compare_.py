@@ -55,8 +55,7 @@ def run(options: Namespace) -> int:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
     if answer.against_others is not None:
         against_others(answer.against_others)
-    if answer.likely_mistakes:
-        likely_mistakes(answer.likely_mistakes)
+    likely_mistakes(answer.likely_mistakes)
     for drift in answer.run_with_time or ():
         _drift(answer.comparison.campaign, drift)
     _breakdown(answer)

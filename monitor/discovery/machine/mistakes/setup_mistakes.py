@@ -42,6 +42,9 @@ BY_CHANCE = 0.01
 #: A setup whose own readings scatter so many times as it states contradicts itself; within the last two it is in order.
 #: No owner states a hundred times what his instrument scatters: it is in a larger unit.
 SCATTERS, TOO_STILL, IN_ORDER = 3.0, 0.01, (0.5, 1.3)
+#: Setups that scatter less than this part of what they state do so by chance, or by the caution of their owners, in so
+#: many cases: that they are in order with a mistake undone counts.
+QUIET, QUIETS = 0.3, 0.05
 #: Mistakes that do the same leave sums of squares that differ by less: odds of a thousand to one.
 AS_WELL = 13.8
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
@@ -55,13 +58,15 @@ MOST_RUNS = 5
 @dataclass(frozen=True)
 class _Doubted:
     """A setup or an instrument by ``name`` with its ``setups``: it contradicts others by ``size`` in so many
-    ``directions``; or, where there are none, what it states of itself, and is far too still for that or scatters."""
+    ``directions``; or, where there are none, what it states of itself; ``is_still`` or
+    ``is_quiet`` where all of them scatter far less."""
 
     name: str
     setups: tuple[str, ...]
     size: float = 0.0
     directions: int = 0
     is_still: bool = False
+    is_quiet: bool = False
 
     @property
     def in_words(self) -> str:
@@ -109,9 +114,16 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
     if contradiction is not None:
         of_many = [each for each in contradiction.every if each.p * contradiction.comparisons <= DOUBTFUL]
         against = sorted(contradiction.suspects or of_many, key=lambda each: (each.p, -each.size))
-    still = {each.setup for each in scatters if each.times < TOO_STILL}
+    still, quiet = ({each.setup for each in scatters if each.times < limit} for limit in (TOO_STILL, QUIET))
     doubted = [
-        _Doubted(each.name, each.setups, each.size, each.directions, still.issuperset(each.setups))
+        _Doubted(
+            each.name,
+            each.setups,
+            each.size,
+            each.directions,
+            still.issuperset(each.setups),
+            quiet.issuperset(each.setups),
+        )
         for each in against[:MOST_TRIED]
         if each.kind is not ContrastKind.STATED
     ]
@@ -179,18 +191,19 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
     assert isinstance(ability, Instruments)
     every = ability.contrasts(fit.problem, fit.solution, run)
     contrast = next((each for each in every if each.name == doubted.name), None)
-    if doubted.directions and not doubted.is_still:
-        if contrast is None or contrast.directions < doubted.directions:
-            return False
-        return count * (max(contrast.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
-    scatters = ability.scatters(fit.problem, fit.solution, run)
+    is_in_order = _is_in_order(ability.scatters(fit.problem, fit.solution, run), doubted)
+    if not doubted.directions or doubted.is_still:
+        return is_in_order and (contrast is None or contrast.p > DOUBTFUL)
+    if contrast is None or contrast.directions < doubted.directions:
+        return False
+    count_of_quiet = count * QUIETS if doubted.is_quiet and is_in_order else count
+    return count_of_quiet * (max(contrast.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
+
+
+def _is_in_order(scatters: Sequence[SetupScatter], doubted: _Doubted) -> bool:
+    """Whether all setups of who is doubted scatter as they state."""
     times = [each.times for each in scatters if each.setup in doubted.setups]
-    return (
-        len(times) == len(doubted.setups)
-        and IN_ORDER[0] < min(times)
-        and max(times) < IN_ORDER[1]
-        and (contrast is None or contrast.p > DOUBTFUL)
-    )
+    return len(times) == len(doubted.setups) and IN_ORDER[0] < min(times) and max(times) < IN_ORDER[1]
 
 
 def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
