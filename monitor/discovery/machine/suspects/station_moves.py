@@ -20,6 +20,7 @@ from monitor.discovery.search.evidence import Evidence, weigh_beside
 from monitor.effects import ArtefactEffect
 from monitor.effects.artefact.station import BaseMoved, Moved, TrackerMoved
 from monitor.effects.artefact.tracker import TRACKER_COLUMNS
+from monitor.effects.driver import Driver
 from monitor.effects.drivers import Always, RunTime
 from monitor.effects.drivers.settling import Settling
 
@@ -40,14 +41,14 @@ def station_moves(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     if any(name not in context.columns for name in TRACKER_COLUMNS):
         return []
     steady = [candidate for candidate in selected if not may_be_a_move(candidate)]
-    found = [
+    moves = [
         best for kind in (TrackerMoved, BaseMoved) if (best := _likeliest(scene, steady, kind)) is not None
     ]
-    if not found:
+    if not moves:
         return []
-    rivals = [*weigh_beside(scene, wander(scene, MOST_NODES), steady), *_by_and_by(scene, steady, found)]
+    rivals = [*weigh_beside(scene, wander(scene, MOST_NODES), steady), *_by_and_by(scene, steady, moves)]
     least = max((rival.score for rival in rivals), default=0.0)
-    return [move.candidate.variant for move in found if move.p_value <= rate and move.score > max(least, 0.0)]
+    return [move.candidate.variant for move in moves if move.p_value <= rate and move.score > max(least, 0.0)]
 
 
 def _by_and_by(
@@ -60,7 +61,10 @@ def _by_and_by(
         change = _change_of(move.candidate)
         of_run = context.run == change.run
         lasted = float(np.ptp(context.time[of_run]))
-        drivers = [RunTime(), *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0)]
+        drivers: list[Driver] = [
+            RunTime(),
+            *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0),
+        ]
         whole = replace(change, sequence=int(context.sequence[of_run].min()))
         for number, driver in enumerate(drivers):
             drift = ArtefactEffect(whole, driver, f"drift {number}")
@@ -102,12 +106,12 @@ def _likeliest(
         weighed = weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
         return weighed[0] if weighed else None
 
-    found = []
+    of_runs = []
     for run, sequences in moments.items():
         step = max(len(sequences) // MOMENTS, 1)
         coarse = best_of(run, sequences[::step])
         if coarse is not None:
             at = int(np.searchsorted(sequences, _change_of(coarse.candidate).sequence))
             fine = best_of(run, sequences[max(at - step, 0) : at + step + 1])
-            found.append(fine or coarse)
-    return max(found, key=lambda each: each.score, default=None)
+            of_runs.append(fine or coarse)
+    return max(of_runs, key=lambda each: each.score, default=None)
