@@ -169,8 +169,8 @@ def test_lack_of_fit_is_held_against_runs_with_the_noise_of_neighbours_taken_out
 
 
 def test_seven_runs_have_too_few_flips_whatever_their_rounding(virtual_campaigns):
-    """63 flips of seven runs give 1/64 at least, which passes no level of 1 %. A number of 7.000000000001 made
-    them enough: an index error of 8 um in noise of 0.5 um was named in some weeks and not in others."""
+    """63 flips of seven runs give 1/64 at least, which passes no level of 1 %. An effective number of 7.000000000001
+    made them enough: a wobble of 8 um in noise of 0.5 um was named in some weeks and not in others."""
     campaign, _ = virtual_campaigns.virtual(5, days=7, runs_per_day=1)
     problem = problem_of(campaign).for_search()
     texts = ("EXX:poly2", "EYX:poly2", "ECC:harmonic2", "EAC:harmonic2", "EXX:reversal", "EYY:poly3")

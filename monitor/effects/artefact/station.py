@@ -7,7 +7,7 @@ what moved. Where none was measured on both sides of that moment the two are one
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -26,7 +26,7 @@ from monitor.units import MICROMETRE, Unit
 
 
 @dataclass(frozen=True)
-class Moved(BuiltIn):
+class Moved(BuiltIn, ABC):
     """A shift and a turn, about the middle of the run's points, of what is seen from a reading on (run, sequence) to
     the end of that run. The coefficients of a turn are what the farthest point moves by."""
 
@@ -58,13 +58,13 @@ class Moved(BuiltIn):
         after = of_run & (context.sequence >= self.sequence) & self._takes_part(context)
         return np.asarray(after[:, None, None] * motion)
 
+    def _takes_part(self, context: Context) -> npt.NDArray[np.bool_]:
+        """Return the rows (n,) of targets that move along."""
+        return np.ones(len(context), dtype=bool)
+
     @abstractmethod
     def described(self, driven: str) -> Description:
-        """Return what moved, and what to do about it."""
-
-    def _takes_part(self, context: Context) -> npt.NDArray[np.bool_]:
-        """Return marks (n,) of the rows of targets that move along."""
-        return np.ones(len(context), dtype=bool)
+        """Return the move in words; ``driven`` is the phrase of a driver, of which there is none."""
 
 
 @dataclass(frozen=True)

@@ -61,8 +61,10 @@ def _by_and_by(
         change = _change_of(move.candidate)
         of_run = context.run == change.run
         lasted = float(np.ptp(context.time[of_run]))
-        settling = [Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0]
-        drivers: list[Driver] = [RunTime(), *settling]
+        drivers: list[Driver] = [
+            RunTime(),
+            *(Settling(time_constant_s=part * lasted) for part in SETTLING if lasted > 0.0),
+        ]
         whole = replace(change, sequence=int(context.sequence[of_run].min()))
         for number, driver in enumerate(drivers):
             drift = ArtefactEffect(whole, driver, f"drift {number}")
