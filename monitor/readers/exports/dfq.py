@@ -64,9 +64,10 @@ class _Part:
 def settings(table: Table) -> int | str | None:
     """Read the key of a file of points with several records: ``record = 2``, or ``record = "one clamping"``."""
     value = table.raw("record", required=False, example="1")
-    is_number = isinstance(value, int) and not isinstance(value, bool) and value >= 1
-    if value is None or value == ONE_CLAMPING or is_number:
-        return None if value is None else ONE_CLAMPING if value == ONE_CLAMPING else int(value)
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+        return value
+    if value is None or value == ONE_CLAMPING:
+        return None if value is None else ONE_CLAMPING
     table.fault("record", f'{quoted(value)} is no record; write its number from 1 on, or "{ONE_CLAMPING}"')
     return None
 
