@@ -181,7 +181,7 @@ def test_a_gear_has_any_order(elbow, readings):
         ),
         ("EB0J2:compliance@gravity", "is a rotation of a rotary axis under a torque"),
         ("EBJ2:const@link_weights", "there is no driver '@link_weights'"),
-        ("tracker:moved", "tracker:shift@run_time and tracker:turn@run_time"),
+        ("tracker:jumped", "tracker:shift@run_time, tracker:turn@run_time, tracker:moved"),
     ],
 )
 def test_refusals_say_what_would_be_right(elbow, text, words):
