@@ -110,7 +110,8 @@ def test_the_mistake_of_one_run_is_said_before_effects_are_searched(tmp_path: Pa
 def test_the_same_in_all_runs_is_said_of_all(tmp_path: Path, name: str) -> None:
     change, words = MISTAKES[name]
     explanation = explained(campaign(tmp_path, 8, change, of=(1, 2, 3, 4)))
-    assert words in [mistake.what for mistake in explanation.mistakes]
+    # As of all runs, or of the setup that has them all.
+    assert any(mistake.what.startswith(words) for mistake in explanation.mistakes)
 
 
 @pytest.mark.slow

@@ -49,7 +49,8 @@ def common_of_lines(
     line_of = np.full(len(sums.machine), -1)
     line_of[selected] = np.arange(count)
     line = line_of[common.cell]
-    used = line >= 0
+    # Blocks of which no group counts have no column.
+    used = (line >= 0) & (common.block < groups.shape[1])
     used[used] = groups[line[used], common.block[used]] > 0.0
     key, pair_of_row = np.unique(
         np.column_stack([line[used], common.quantity[used]]), axis=0, return_inverse=True

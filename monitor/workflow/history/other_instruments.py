@@ -112,7 +112,7 @@ def between_instruments(
 ) -> dict[Change, OtherInstruments]:
     """Return what changed in the measuring at the steps of all parameters; nothing of those where nothing did."""
     by_quantity = with_unstored(history)[0]
-    parts = np.array(list(by_quantity.values())).reshape(-1, *history.values.shape)
+    parts = np.array(list(by_quantity.values())).reshape(len(by_quantity), *history.values.shape)
     measuring = _Measuring(history, tuple(by_quantity), parts)
     exchanges: dict[tuple[str, str], list[_Step]] = {}
     for parameter in past.values():
