@@ -19,7 +19,9 @@ scorer = load("challenge_score", HERE / "score.py")
     [
         pytest.param(68, 2, 0, id="an axis that stands still at the poses proposed"),
         pytest.param(218, 3, 0, id="three effects that foretell left-out poses only together"),
-        pytest.param(278, 1, 1, id="a wave that does not repeat each turn was three harmonics and a remainder"),
+        pytest.param(
+            278, 1, 1, id="a wave that does not repeat each turn was three harmonics and a remainder"
+        ),
     ],
 )
 def test_what_is_found_in_a_campaign(number: int, right: int, false: int, tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ _BEFORE = """
 SELECT campaign FROM identification JOIN campaign USING (campaign_id)
 WHERE identification_id IN ({marks})
 AND computed_at < (SELECT min(applied_at) FROM schema_migration WHERE number = ?)
+AND NOT EXISTS (SELECT 1 FROM common_part AS part WHERE part.identification_id = identification.identification_id)
 """
 
 
