@@ -162,3 +162,15 @@ def test_poses_are_readings_of_the_controller(virtual_campaigns):
     )
     assert any(pose["c_deg"] for pose in poses)
     assert [{**pose, "c_deg": -pose["c_deg"]} for pose in poses] == [dict(pose) for pose in in_mirror]
+
+
+@pytest.mark.slow
+def test_the_seventh_of_a_group_is_no_tie_that_poses_break(explained, campaign_with):
+    """Run-out of the spindle along X and its angle are one correction at all poses of a plan; of seven rivals six were
+    asked, and poses were promised for the angle."""
+    sim = simulator()
+    effect = sim.Effect("EXC1:harmonic1", peak_um=8.0)
+    first = explained(campaign_with(sim.five_days_plan(), 7005, effect)).missing[0]
+    assert "ECC1:harmonic1" in names(first)
+    assert len(names(first)) > 6
+    assert any(set(pair) == {"EXC1:harmonic1", "ECC1:harmonic1"} for pair in first.separation.together)

@@ -18,7 +18,7 @@ class Surroundings:
     """Folds, drivers and strokes of a campaign.
 
     ``runs`` and ``days`` (R,) are the fold of every run for held-out errors: itself, and its day; ``drivers`` are
-    those that the recorded columns allow; ``strokes`` the ranges of positions in mm or rad that the strokes of the machine file allow.
+    those that the recorded columns allow; ``strokes`` the positions in mm or rad that the strokes of the file allow.
     """
 
     runs: npt.NDArray[np.int64]
