@@ -165,3 +165,21 @@ def test_a_single_line_of_a_joint_is_named_beside_the_curve_of_another(robots, t
     assert len(named) == 3
     (line,) = [effect for effect in answer.missing if effect.effect == "EBJ5:harmonic100"]
     assert abs(line.amplitude - 90e-6) < 4.0 * line.u
+
+
+@pytest.mark.slow
+def test_a_base_that_settles_beside_curves_is_no_drift_of_the_tracker(robots, session, tmp_path):
+    """With curves of joints resting reflectors were not asked, and tracker:shift@warmup was told."""
+    tracked = session.tracked
+    tool = np.array([name.startswith("R") for name in tracked.target])
+    settled = tool * (1.0 - np.exp(-4.0 * np.linspace(0.0, 1.0, len(tool))))
+    points = tracked.points + np.outer(settled, [0.1, 0.1, 0.1])
+    moved = replace(session, tracked=replace(tracked, points=points))
+    campaign = read_campaign(robots.write_session(tmp_path / "robot", moved))
+    answer = explain(campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(0))
+    named = [effect.effect for effect in answer.missing]
+    assert any("0J1@" in name for name in named)
+    assert not any(name.startswith("tracker:") for name in named)
+    curves = [effect for effect in answer.missing if "harmonic" in effect.effect]
+    assert len(curves) == 2
+    assert all(effect.q_value <= 0.01 for effect in curves)

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from by_path import simulator
 
+from monitor.discovery import explain
 from monitor.discovery.machine.separation.distances import Pair, distance_of
 from monitor.discovery.machine.separation.setups import decides, of_effects, setups_of
 from monitor.machine import parse_topology
+from monitor.methods.samba.method import problem_of
 from monitor.records import SecondSetup
+from monitor.workflow.explain.machine_answer import machine_explanation
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +131,46 @@ def test_set_ups_move_the_tip_or_the_targets():
     assert moved[SecondSetup.HIGHER].tip == pytest.approx(tip)
     # Readings of the tip itself say nothing of the stylus' length.
     assert SecondSetup.LONGER_STYLUS not in {each.setup for each in setups_of(chain, np.zeros(3))}
+
+
+def test_poses_are_readings_of_the_controller(virtual_campaigns):
+    """The same touches on a machine whose C counts the other way: the poses that tell rivals apart are the same ones in
+    its readings. They were those of the other side."""
+    hidden = [simulator().Effect("EXC:harmonic2", peak_um=8.0)]
+    campaign, _ = virtual_campaigns.virtual(7100, hidden, cold=True, runs=4)
+    axes = campaign.machine.axes
+    probings = campaign.probings
+    mirrored = replace(
+        campaign,
+        machine=replace(
+            campaign.machine,
+            axes={**axes, "C": replace(axes["C"], sign=-1, stroke=(-np.pi / 2.0, np.pi))},
+        ),
+        probings=replace(probings, readings={**probings.readings, "C": -probings.readings["C"]}),
+    )
+    campaign = replace(
+        campaign,
+        machine=replace(
+            campaign.machine, axes={**axes, "C": replace(axes["C"], stroke=(-np.pi, np.pi / 2.0))}
+        ),
+    )
+    poses, in_mirror = (
+        machine_explanation(explain(each, problem_of(each), "samba", rng=np.random.default_rng(1)))
+        .missing[0]
+        .tell_apart_by
+        for each in (campaign, mirrored)
+    )
+    assert any(pose["c_deg"] for pose in poses)
+    assert [{**pose, "c_deg": -pose["c_deg"]} for pose in poses] == [dict(pose) for pose in in_mirror]
+
+
+@pytest.mark.slow
+def test_the_seventh_of_a_group_is_no_tie_that_poses_break(explained, campaign_with):
+    """Run-out of the spindle along X and its angle are one correction at all poses of a plan; of seven rivals six were
+    asked, and poses were promised for the angle."""
+    sim = simulator()
+    effect = sim.Effect("EXC1:harmonic1", peak_um=8.0)
+    first = explained(campaign_with(sim.five_days_plan(), 7005, effect)).missing[0]
+    assert "ECC1:harmonic1" in names(first)
+    assert len(names(first)) > 6
+    assert any(set(pair) == {"EXC1:harmonic1", "ECC1:harmonic1"} for pair in first.separation.together)

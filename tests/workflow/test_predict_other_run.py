@@ -1,10 +1,12 @@
 """Rows of another campaign are predicted from its own start: its time, its conditions, its first moves.
 
-The readings are made here from a closed form: a laser along X whose gain grows with the time of the run.
+Readings of a laser along X are made here from a closed form, a gain that grows with the time of the run; those of a
+tracker by the simulator of robots.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from monitor.workflow.predict.answer import PredictAnswer
 from monitor.workflow.predict.predict import predict
 from monitor.workflow.predict.request import PredictRequest
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.robot_campaign import FIXED, track, write_tracked
 
 #: Of a reading in mm, and what the gain grows by.
 NOISE, GROWTH = 3e-4, 40e-6
@@ -101,3 +104,24 @@ def test_a_drift_of_the_fitted_run_alone_is_none_of_the_other_one(tmp_path: Path
     assert answer.fitted_rms_um == pytest.approx(0.3, rel=0.3)
     assert answer.rms_um == pytest.approx(0.3, rel=0.4)
     assert answer.from_own_start == ()
+
+
+def test_rows_of_a_tracker_that_stayed_are_predicted_in_its_frame(tmp_path: Path) -> None:
+    """One session in two files: what is left of the second is what the first leaves, on the tool and beside it. Each
+    file had a guessed frame of its own: 0.2 mm and more were left."""
+    whole = track(np.random.default_rng(11), poses=150, fixed_every=15)
+    cut = next(row for row, name in enumerate(whole.target) if name in FIXED and row > 350)
+    folders = [
+        write_tracked(
+            tmp_path / name,
+            replace(
+                whole, target=whole.target[part], readings=whole.readings[part], points=whole.points[part]
+            ),
+        )
+        for name, part in (("fitted", slice(0, cut)), ("other", slice(cut, None)))
+    ]
+    with Database(tmp_path / "one.duckdb") as db:
+        import_folders(db, ImportRequest(folders))
+        answer = predict(db, PredictRequest("fitted", None, "other"))
+    assert answer.fitted_rms_um == pytest.approx(20.0, rel=0.1)
+    assert answer.rms_um == pytest.approx(20.0, rel=0.15)

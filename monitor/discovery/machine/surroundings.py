@@ -18,7 +18,7 @@ class Surroundings:
     """Folds, drivers and strokes of a campaign.
 
     ``runs`` and ``days`` (R,) are the fold of every run for held-out errors: itself, and its day; ``drivers`` are
-    those that the recorded columns allow; ``strokes`` the ranges of axes in mm or rad that the machine file gives.
+    those that the recorded columns allow; ``strokes`` the positions in mm or rad that the strokes of the file allow.
     """
 
     runs: npt.NDArray[np.int64]
@@ -30,10 +30,14 @@ class Surroundings:
 def surroundings_of(campaign: Campaign, problem: ChainProblem) -> Surroundings:
     """The surroundings of the runs of a problem."""
     days = {run.run: run.day for run in campaign.runs}
-    axes = campaign.machine.axes.items()
+    strokes = {name: axis.stroke for name, axis in campaign.machine.axes.items()}
     return Surroundings(
         runs=np.arange(len(problem.runs)),
         days=np.array([days[int(run)] for run in problem.runs]),
         drivers=drivers_of(problem.context),
-        strokes={name: axis.stroke for name, axis in axes if axis.stroke is not None},
+        strokes={
+            joint.name: stroke if joint.sign > 0 else (-stroke[1], -stroke[0])
+            for joint in problem.context.chain.joints
+            if (stroke := strokes.get(joint.name)) is not None
+        },
     )

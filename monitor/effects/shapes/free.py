@@ -64,6 +64,11 @@ class Free(DescribedShape):
         return f", of a shape that no entry of the catalogue has: it depends on position and direction of {error.name}"
 
 
+def parts_of_position(turns: bool) -> int:
+    """How many of the first parts follow the position of an axis alone: hats, or cosines and sines if it turns."""
+    return 2 * HARMONICS if turns else HATS
+
+
 def flexible_basis(context: Context, joint: int) -> Array:
     """All parts (n, k) of the flexible basis of an axis."""
     columns = _unscaled(context, joint)

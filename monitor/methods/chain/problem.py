@@ -204,6 +204,11 @@ class ChainProblem(MeasuredChain):
         }
         return replace(self, context=replace(self.context.taken(rows), run=run), **arrays)
 
+    def guessed_anew(self) -> Self:
+        """The problem with its first guess made of its rows as they are now; rows that came to other runs have the
+        frame of these."""
+        return self
+
     @property
     def is_in_parts(self) -> bool:
         """Whether the rows are so many that a fit takes some at a time. Added effects look at all rows together."""

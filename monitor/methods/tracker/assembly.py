@@ -11,7 +11,7 @@ from monitor.effects.artefact.tracker import measured_points
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.model import Model, chain_of
-from monitor.methods.tracker.problem import TrackingProblem, first_guess
+from monitor.methods.tracker.problem import TrackingProblem, as_triples, first_guess
 from monitor.records import Array, Campaign
 from monitor.sources import SCALE, CommonQuantity
 
@@ -51,7 +51,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
         base=model.base_of(chain, outside=True),
         added=model.added_to(chain, outside=True),
         sigma=np.full((len(context), 3), campaign.probe.standard_uncertainty),
-        reflectors=tuple((float(x), float(y), float(z)) for x, y, z in places),
+        reflectors=as_triples(places),
         fixed=fixed,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
         observer=campaign.probe.id,

@@ -12,11 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import Context
+from monitor.effects.artefact.tracker import measured_points
 from monitor.effects.catalogue import of_tracker
 from monitor.exceptions import DataError
 from monitor.machine import ChainPose, evaluate
@@ -70,6 +72,11 @@ class TrackingProblem(ChainProblem):
             [np.zeros(6), np.array(self.reflectors).reshape(-1), np.zeros(len(self.extra_names))]
         )
         return np.tile(start, (len(self.runs), 1))
+
+    def guessed_anew(self) -> Self:
+        """The problem with one frame a run, guessed of all rows that belong to it now."""
+        carried, places = first_guess(self.context, measured_points(self.context), self.fixed)
+        return replace(self, context=replace(self.context, nominal=carried), reflectors=as_triples(places))
 
     @property
     def shared_by_rows(self) -> tuple[str, ...]:
@@ -203,6 +210,11 @@ class TrackingProblem(ChainProblem):
             f"after the fit {rms:.3g} mm are left over points that spread by {spread:.3g} mm, which no errors of this "
             "chain explain; check the order of the axes, their signs, directions and offsets, and the units"
         )
+
+
+def as_triples(places: Array) -> tuple[tuple[float, float, float], ...]:
+    """Places (T, 3) as the problem keeps them."""
+    return tuple((float(x), float(y), float(z)) for x, y, z in places)
 
 
 def first_guess(context: Context, points: Array, fixed: Sequence[str]) -> tuple[Array, Array]:

@@ -149,7 +149,10 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         indistinguishable_from=rivals(effect),
         coinciding=coinciding(effect),
         tell_apart_by=tuple(
-            {f"{axis.lower()}_deg": round(DEGREE.to_display(angle), 6) for axis, angle in pose.items()}
+            {
+                f"{axis.lower()}_deg": round(chain.joint(axis).sign * DEGREE.to_display(angle), 6) + 0.0
+                for axis, angle in pose.items()
+            }
             for pose in effect.separation.poses
         ),
         standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),

@@ -114,7 +114,8 @@ def _of_one_set_up(problem: ChainProblem) -> ChainProblem:
     context = problem.context
     added = tuple(_of_its_stretch(effect) for effect in problem.added)
     apart = replace(problem, added=added, context=replace(context, stretch=context.run))
-    return apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0]))
+    # Until now each run has its rows in a frame of its own, a guess that is millimetres off.
+    return apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0])).guessed_anew()
 
 
 @dataclass(frozen=True)

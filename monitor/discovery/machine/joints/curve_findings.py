@@ -38,7 +38,11 @@ def with_curves(
     ]
     ordered = _by_error_taken_away(pool, entries)
     candidates = [entry.candidate for entry in ordered]
-    findings = findings_without_rivals(pool, candidates, family_count(pool) + len(curves))
+    findings = [
+        # Lines are looked for by themselves, before the catalogue: their p-value has paid for all of them.
+        replace(finding, q_value=finding.evidence.p_value) if is_curve(finding.candidate) else finding
+        for finding in findings_without_rivals(pool, candidates, family_count(pool))
+    ]
     return pool, ScanResult(tuple(findings)), ordered
 
 

@@ -210,14 +210,22 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
         # The search beside curves looks for no lines: those of the other joints come along.
         curves = {index: _text_of(orders) for index, orders in lines.items() if orders} | curves
     chain = fit.problem.context.chain
-    orders = float(sum(len(joint.orders) for joint in joints))
     return tuple(
         Variant(
-            f"{joint.term}:curve", parse_effect(f"{joint.term}:{curves[joint.index]}", chain), int(orders)
+            f"{joint.term}:curve",
+            parse_effect(f"{joint.term}:{curves[joint.index]}", chain),
+            _tries(joints, lines[joint.index]),
         )
         for joint in joints
         if joint.index in curves
     )
+
+
+def _tries(joints: Sequence[_Joint], lines: Sequence[float]) -> int:
+    """How many lines were asked, of all joints, where those of one were found: its low ones among the low ones."""
+    if lines and max(lines) <= LOW[-1]:
+        return len(LOW) * len(joints)
+    return sum(len(joint.orders) for joint in joints)
 
 
 def _text_of(orders: Sequence[float]) -> str:

@@ -18,6 +18,7 @@ from monitor.discovery.machine.joints.joint_curves import Pursuit, protecting
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.suspects.wander import base_instead
 from monitor.discovery.search.candidate import side_by_side
 from monitor.discovery.search.evidence import pool_of
 from monitor.discovery.search.plausible import nearly_cancelled
@@ -43,6 +44,7 @@ def search_beside_curves(
     steps = _StepsBesideCurves(scene, rate)
     tests = len(steps.pool)
     selected = step_by_step(steps, [], most=MOST_EFFECTS, most_steps=tests + 1)
+    selected = base_instead(scene, selected, rate) or selected
     findings = findings_without_rivals(scene, selected, tests)
     return scene, ScanResult(tuple(sorted(findings, key=lambda finding: -finding.evidence.score)))
 

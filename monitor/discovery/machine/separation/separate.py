@@ -30,8 +30,9 @@ from monitor.records import Array, SecondSetup
 STEP_RAD = np.pi / 6.0
 # A spindle is oriented to any angle: quarters of a turn for its base parameters, eighths for its harmonics.
 QUARTERS, EIGHTHS = 4, 8
-# Effects of a group that are separated from each other, the most convincing ones.
-MOST_EFFECTS = 6
+# Effects of a group that are separated from each other, the most convincing ones: groups of 5 300 campaigns had ten at
+# most, and of one that is left out it would be said that poses break its tie, whether any do or not.
+MOST_EFFECTS = 10
 # A second set-up of which the machine reaches less than this part of the poses is no plan.
 SMALLEST_PART = 0.5
 # Linear axes without a stroke in the machine file may go this much further than they went.

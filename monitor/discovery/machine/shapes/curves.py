@@ -32,7 +32,7 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
     if not isinstance(effect, ChainEffect):
         return None
     at = effect.joint.sign * context.places[:, effect.term.joint]
-    direction = context.travel[:, effect.term.joint]
+    direction = effect.joint.sign * context.travel[:, effect.term.joint]
     first = np.flatnonzero(context.run == context.run[0])
     rows = first[np.argsort(at[first], kind="stable")]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64))]

@@ -5,6 +5,9 @@ them. Here every part of the flexible basis of every error is asked for itself, 
 more periods a turn than the catalogue has, cosine and sine together, some 80. The most certain one has to stand
 against that number twice: in the whitened residual, and, where runs are many enough, under sign flips of whole runs,
 which holds whatever the noise within a run depends on (A. M. Winkler et al., NeuroImage 92 (2014) 381).
+
+One run or two show no lack of fit. There a bend to and fro about the middle of the travel, which no single part comes
+near, is asked for as all parts of an error that follow its position alone.
 """
 
 from __future__ import annotations
@@ -19,6 +22,8 @@ from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.sign_flips import signs
+from monitor.effects import ChainEffect
+from monitor.effects.shapes.free import parts_of_position
 from monitor.records import Array
 
 # The search may be wrong in one empty campaign of a hundred; these are its parts of that, and that of the flips. Waves
@@ -84,6 +89,34 @@ def slight_wave(scene: ChainScene, waves: Sequence[ChainCandidate]) -> SlightSha
         return None
     best = _most_certain(scene, np.stack(columns, axis=1), LEVEL_OF_WAVES)
     return None if best is None else SlightShape(waves[able[best[0]]].family, able[best[0]], best[1])
+
+
+def slight_error(scene: ChainScene, wholes: Sequence[ChainVariant]) -> str | None:
+    """The family of the error that stands out of one run or two in whatever shape of its position; None where none
+    does. ``wholes`` are the errors in any shape."""
+    if poses_of_rows(scene.fit) is not None or len(scene.fit.problem.runs) >= FEWEST:
+        return None
+    p_values = {
+        whole.family: _p_value_of_position(scene, whole) for whole in scene_of(scene.fit, wholes).candidates
+    }
+    family = min(p_values, key=lambda name: p_values[name], default=None)
+    return None if family is None or p_values[family] * len(p_values) > LEVEL_OF_FEW else family
+
+
+def _p_value_of_position(scene: ChainScene, whole: ChainCandidate) -> float:
+    """The p-value of all parts of an error in any shape that follow its position alone; 1 where nothing is left of
+    them."""
+    effect = whole.effect
+    assert isinstance(effect, ChainEffect)
+    beside = scene.remainders.beside([])
+    count = parts_of_position(effect.joint.turns)
+    columns = orthonormal(without(beside.basis, whole.columns[:, :count]))
+    explained, size = float(np.sum((columns.T @ beside.residual) ** 2)), columns.shape[1]
+    dof = beside.degrees_of_freedom - size
+    rest = float(beside.residual @ beside.residual) - explained
+    if size == 0 or dof < 1 or rest <= 0.0:
+        return 1.0
+    return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
 
 
 def _most_certain(scene: ChainScene, columns: Array, level: float) -> tuple[int, float] | None:

@@ -20,7 +20,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVar
 from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
 from monitor.discovery.machine.shapes.cycles import cycle_instead
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.slight_shapes import slight_shape, slight_wave
+from monitor.discovery.machine.shapes.slight_shapes import slight_error, slight_shape, slight_wave
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.waves import waves_instead, worth_keeping
 from monitor.discovery.search.candidate import Variant
@@ -197,11 +197,13 @@ def _is_any_curve(candidate: ChainCandidate) -> bool:
 
 def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
     """One part of an error of free shape, or one wave of many periods a turn, that stands out and predicts poses and
-    runs that were left out, if any; and the scene with it, with all such waves of its error where it is one."""
+    runs that were left out, or an error that does so in several parts, if any; and the scene with it, with all such
+    waves of its error where it is one."""
     shapes = _shapes_by_error(scene)
     if not shapes:
         return scene, []
-    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
+    wholes = [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()]
+    part = slight_shape(scene, wholes)
     waves = [wave for of in shapes.values() for wave in _waves(scene, of)]
     wave = slight_wave(scene, waves)
     if wave is not None and (part is None or wave.p_value <= part.p_value):
@@ -211,10 +213,26 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
         slight = _of_parts(scene, part.family, [part.number], shapes[part.family], [])
         more = [slight]
     else:
-        return scene, []
+        symbol = slight_error(scene, wholes)
+        return (scene, []) if symbol is None else _in_several_parts(scene, symbol, shapes[symbol])
     if not _predicts_runs(scene, slight) or not _predicts(scene, slight, []):
         return scene, []
     return replace(scene, candidates=(*scene.candidates, *more)), [slight]
+
+
+def _in_several_parts(
+    scene: ChainScene, symbol: str, shapes: Sequence[ChainCandidate]
+) -> tuple[ChainScene, list[ChainCandidate]]:
+    """An error as several powers of the position where these say as much as its free shape, else in that, and the scene
+    with it; nothing where it foretells no poses."""
+    parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
+    free = _of_parts(scene, symbol, parts, shapes, []) if parts else None
+    if free is not None and not _predicts(scene, free, []):
+        free = None
+    bends = bends_instead(scene, symbol, _priced(scene, [free]) if free else 0.0, [])
+    if bends or free is None:
+        return scene, bends
+    return _with_candidate(scene, free), [free]
 
 
 def _shapes_by_error(scene: ChainScene) -> dict[str, list[ChainCandidate]]:

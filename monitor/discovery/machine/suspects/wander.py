@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
@@ -84,7 +85,14 @@ def wander(scene: ChainScene, nodes: int) -> tuple[ChainCandidate, ...]:
 
 
 def with_base_instead(scene: ChainScene, result: ChainScan, rate: float) -> ChainScan:
-    """The result with a base of the machine that moves in place of a tracker that does, where resting targets say so.
+    """The result of a scan with what ``base_instead`` has in place of its effects."""
+    instead = base_instead(scene, result.candidates, rate)
+    return ScanResult(findings_of(scene, instead)) if instead else result
+
+
+def base_instead(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> list[ChainCandidate]:
+    """Effects with a base of the machine that moves in place of a tracker that does, where resting targets say so; none
+    where they do not.
 
     A shift of the tracker has three coefficients and is found in one step; each direction in which a base moves is an
     effect of its own and stands behind it until all are tried together. That something moves is certain already: only
@@ -94,24 +102,25 @@ def with_base_instead(scene: ChainScene, result: ChainScan, rate: float) -> Chai
     problem = scene.fit.problem
     first = problem.context.chain.joints[len(problem.context.chain.work)].name
     of_base = [candidate for candidate in scene.candidates if _moves_base(candidate, first)]
-    named = [each for each in result.candidates if _is_tracker(each) or _moves_base(each, first)]
+    named = [each for each in selected if _is_tracker(each) or _moves_base(each, first)]
     if not of_base or not problem.resting or not any(map(_is_tracker, named)):
-        return result
-    others = [each for each in result.candidates if not (_is_tracker(each) or _moves_base(each, first))]
+        return []
+    others = [each for each in selected if not (_is_tracker(each) or _moves_base(each, first))]
     base, worth = _best_base(scene, of_base, others)
     present = sum(
         weigh_beside(scene, [candidate], [*others, *named[:index]])[0].score
         for index, candidate in enumerate(named)
     )
     if worth <= present + WORTH_EXCHANGING or not _is_seen_beside_wander(scene, base, others, rate):
-        return result
-    return ScanResult(findings_of(scene, [*others, *base]))
+        return []
+    return [*others, *base]
 
 
 def _best_base(
     scene: ChainScene, of_base: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
 ) -> tuple[list[ChainCandidate], float]:
-    """Drifts of the base, each of another direction, as long as one is worth its price, and their score together."""
+    """Drifts of the base, each of another direction and at its best time constant, as long as one is worth its price,
+    and their score together."""
     base: list[ChainCandidate] = []
     worth = 0.0
     while True:
@@ -120,8 +129,10 @@ def _best_base(
         weighed = weigh_beside(scene, rest, [*others, *base]) if rest else []
         if not weighed or weighed[0].score <= 0.0:
             return base, worth
-        base.append(weighed[0].candidate)
-        worth += weighed[0].score
+        beside = [*others, *base]
+        drift = refine(scene, [*beside, weighed[0].candidate], len(beside)).candidate
+        worth += weigh_beside(scene, [drift], beside)[0].score
+        base.append(drift)
 
 
 def _is_seen_beside_wander(
