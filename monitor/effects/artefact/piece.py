@@ -12,7 +12,7 @@ import numpy.typing as npt
 from monitor.effects.context import Context
 from monitor.effects.description import OWN_DOCUMENT, Description
 from monitor.effects.registry import BuiltIn
-from monitor.effects.slip import MOVED, moment_of
+from monitor.effects.slip import MOVED, moment_of, shifts_and_turns
 from monitor.records import Array
 from monitor.units import MICROMETRE, Unit
 
@@ -60,10 +60,7 @@ def rigid_motion(context: Context) -> Array:
     _, first = np.unique(context.target[is_known], return_index=True)
     middle = places[is_known][first].mean(axis=0) if len(first) else np.zeros(3)
     arms = np.where(is_known[:, None], places - middle, 0.0)
-    farthest = float(np.linalg.norm(arms, axis=1).max())
-    turns = np.stack([np.cross(axis, arms) for axis in np.eye(3)], axis=-1) / max(farthest, 1e-12)
-    shifts = np.broadcast_to(np.eye(3), turns.shape)
-    return np.asarray(np.concatenate([shifts, turns], axis=-1))
+    return shifts_and_turns(arms, float(np.linalg.norm(arms, axis=1).max()))
 
 
 REGISTERED = (ArtefactMoved,)

@@ -19,7 +19,7 @@ from monitor.effects.artefact.tracker import measured_points
 from monitor.effects.context import Context
 from monitor.effects.description import Description
 from monitor.effects.registry import BuiltIn
-from monitor.effects.slip import MOVED, moment_of
+from monitor.effects.slip import MOVED, moment_of, shifts_and_turns
 from monitor.exceptions import EffectError
 from monitor.records import Array
 from monitor.units import MICROMETRE, Unit
@@ -52,9 +52,7 @@ class Moved(BuiltIn, ABC):
         if not of_run.any():
             raise EffectError(f"'{self.text}': this campaign has no run {self.run}")
         arms = context.nominal - context.nominal[of_run].mean(axis=0)
-        farthest = float(np.linalg.norm(arms[of_run], axis=1).max())
-        turns = np.stack([np.cross(axis, arms) for axis in np.eye(3)], axis=-1) / max(farthest, 1e-12)
-        motion = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
+        motion = shifts_and_turns(arms, float(np.linalg.norm(arms[of_run], axis=1).max()))
         after = of_run & (context.sequence >= self.sequence) & self._takes_part(context)
         return np.asarray(after[:, None, None] * motion)
 
