@@ -300,6 +300,9 @@ def test_an_older_identification_says_so_and_counts_all_of_its_u(db: Database) -
 
 def test_identifications_of_before_the_parts_are_known_by_their_time(db: Database) -> None:
     assert not machine_history(db, "CENTRE-9").calibrations.unstored
+    # As an older version left it: identified before the parts had a table, and none of them in it.
+    db.execute("CREATE TEMP TABLE parts_set_aside AS FROM common_part")
+    db.execute("DELETE FROM common_part")
     db.execute("UPDATE schema_migration SET applied_at = now()::TIMESTAMP + INTERVAL 1 DAY WHERE number = 17")
     try:
         again = machine_history(db, "CENTRE-9", parameter=None, since=datetime(2026, 1, 1, tzinfo=UTC))
@@ -308,6 +311,8 @@ def test_identifications_of_before_the_parts_are_known_by_their_time(db: Databas
         (note,) = (note for note in answer.notes if "older version identified" in note)
         assert "type `monitor identify` for each" in note
     finally:
+        db.execute("INSERT INTO common_part FROM parts_set_aside")
+        db.execute("DROP TABLE parts_set_aside")
         db.execute(
             "UPDATE schema_migration SET applied_at = now()::TIMESTAMP - INTERVAL 1 DAY WHERE number = 17"
         )
