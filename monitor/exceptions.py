@@ -130,7 +130,10 @@ class CampaignError(InputError):
         positions = {fault: position for position, fault in enumerate(self.faults)}
         shown = sorted(groups, key=lambda group: positions[group[0]])[: self.SHOWN_IN_FULL]
         for first, *more in shown:
-            last = f" (and {len(more)} more like it, to line {more[-1].line})" if more else ""
+            last = ""
+            if more:
+                end = "" if more[-1].line is None else f", to line {more[-1].line}"
+                last = f" (and {len(more)} more like it{end})"
             lines.append(f"  {first}{last}")
         remaining = count - sum(len(group) for group in shown)
         if remaining:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.exceptions import CampaignError
+from monitor.exceptions import CampaignError, Fault
 
 T = "campaign.toml"
 TOPOLOGY = '"w C B X b Z Y (C1) t"'
@@ -95,6 +95,13 @@ def test_format_1_a_key_misspelt_in_every_ball_is_one_line(small, faults_of):
     said = str(CampaignError("small", faults)).splitlines()
     assert len(said) == 2
     assert said[1].endswith(f"(and {count - 1} more like it, to line {faults[-1].line})")
+
+
+def test_faults_without_a_line_are_counted_without_one():
+    faults = tuple(
+        Fault("campaign.toml", None, "setups", f"setup '{name}' has no row in probings.csv") for name in "abcdefgh"
+    )
+    assert str(CampaignError("week", faults)).endswith("has no row in probings.csv (and 7 more like it)")
 
 
 @pytest.mark.parametrize("table", ["machine", "probe"])
