@@ -99,7 +99,8 @@ def test_format_1_a_key_misspelt_in_every_ball_is_one_line(small, faults_of):
 
 def test_faults_without_a_line_are_counted_without_one():
     faults = tuple(
-        Fault("campaign.toml", None, "setups", f"setup '{name}' has no row in probings.csv") for name in "abcdefgh"
+        Fault("campaign.toml", None, "setups", f"setup '{name}' has no row in probings.csv")
+        for name in "abcdefgh"
     )
     assert str(CampaignError("week", faults)).endswith("has no row in probings.csv (and 7 more like it)")
 
