@@ -1,6 +1,7 @@
 """The fleet table against one bare GROUP BY over the same rows, in time and memory; the data are made by SQL.
 
-``python tests/benchmarks/test_fleet.py MACHINES climate`` compares fleets without and with a recorded temperature.
+``python tests/benchmarks/test_fleet.py MACHINES climate`` compares fleets without and with a recorded temperature,
+``certificates`` instead of it fleets without and with a laser whose scale is certified anew every year.
 ``python tests/benchmarks/test_fleet.py MACHINES`` makes a file of so many machines (15 parameters, weekly campaigns of
 4 runs over 5 years; 10 000 machines are 156 million values and 1.7 GB) and prints the times; a second argument
 names the file, which is then kept, and used as it is where it exists. As a test a small copy is checked for its
@@ -161,26 +162,41 @@ def _kept(db: Database) -> None:
     db.execute("DROP TABLE bare")
 
 
-def climate(machines: int) -> None:
-    """Print the time of the fleet table of machines without and with a recorded temperature, in turns."""
+def _certify(db: Database) -> None:
+    """Store what the parameters of every run have of a laser's scale, under one certificate a machine and year."""
+    db.execute(
+        "INSERT INTO common_part SELECT identification_id, run, 'laser', machine || '-' || year(started_at), 'scale', 1e-6, "
+        "[0.2e-3 * (1 + i % 3) FOR i IN range(15)] "
+        "FROM identification JOIN campaign USING (campaign_id) JOIN run USING (campaign_id)"
+    )
+
+
+#: What a fleet may have beside its values: the conditions of its runs, and what is done to the file.
+BESIDE: Mapping[str, tuple[str, Callable[[Database], None]]] = {
+    "climate": (CLIMATE, lambda db: None),
+    "certificates": ("MAP {}", _certify),
+}
+
+
+def beside(machines: int, name: str) -> None:
+    """Print the time of the fleet table of machines without and with what ``BESIDE`` has by that name, in turns."""
     with tempfile.TemporaryDirectory() as folder:
-        files = {"without": "MAP {}", "with": CLIMATE}
-        for name, conditions in files.items():
-            with Database(Path(folder) / f"{name}.duckdb") as db:
+        files = {"without": ("MAP {}", lambda db: None), "with": BESIDE[name]}
+        for file, (conditions, prepare) in files.items():
+            with Database(Path(folder) / f"{file}.duckdb") as db:
                 generate(db, machines, conditions=conditions)
-        least = {name: [np.inf, np.inf] for name in files}
+                prepare(db)
+        least = {file: [np.inf, np.inf] for file in files}
         for _ in range(4):
-            for name in files:
-                with Database(Path(folder) / f"{name}.duckdb") as db:
+            for file in files:
+                with Database(Path(folder) / f"{file}.duckdb") as db:
                     db.execute("SET memory_limit = '3GB'")
                     _fleet_table(db)
-                    least[name] = [
-                        min(pair) for pair in zip(least[name], _cost(_fleet_table, db), strict=True)
+                    least[file] = [
+                        min(pair) for pair in zip(least[file], _cost(_fleet_table, db), strict=True)
                     ]
-        for name, (wall, own) in least.items():
-            print(
-                f"{machines} machines, {name} a temperature: {wall:.2f} s, processor {own:.2f} s", flush=True
-            )
+        for file, (wall, own) in least.items():
+            print(f"{machines} machines, {file} {name}: {wall:.2f} s, processor {own:.2f} s", flush=True)
         wall, own = (least["with"][part] / least["without"][part] for part in (0, 1))
         print(f"ratio {wall:.2f}, processor {own:.2f}")
 
@@ -223,8 +239,8 @@ def _print(costs: Mapping[str, Sequence[float]]) -> None:
 
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    if sys.argv[2:] == ["climate"]:
-        climate(number)
+    if len(sys.argv) > 2 and sys.argv[2] in BESIDE:
+        beside(number, sys.argv[2])
     elif len(sys.argv) > 2:
         main(number, Path(sys.argv[2]))
     else:
