@@ -165,8 +165,8 @@ def _kept(db: Database) -> None:
 def _certify(db: Database) -> None:
     """Store what the parameters of every run have of a laser's scale, under one certificate a machine and year."""
     db.execute(
-        "INSERT INTO common_part SELECT identification_id, run, 'laser', machine || '-' || year(started_at), 'scale', 1e-6, "
-        "[0.2e-3 * (1 + i % 3) FOR i IN range(15)] "
+        "INSERT INTO common_part SELECT identification_id, run, 'laser', machine || '-' || year(started_at), 'scale', "
+        "1e-6, [0.2e-3 * (1 + i % 3) FOR i IN range(15)] "
         "FROM identification JOIN campaign USING (campaign_id) JOIN run USING (campaign_id)"
     )
 
