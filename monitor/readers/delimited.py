@@ -14,6 +14,8 @@ SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "space": " "}
 DECIMALS = {"comma": ",", "point": "."}
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
+#: Whole numbers that a mark cuts into groups of three digits; a decimal number of three digits looks alike.
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}([.,][0-9]{3})+")
 _POINT = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 #: ``Position [mm]``, ``Position (mm)``, ``Position / mm``, ``Position in mm``.
 _WITH_UNIT = re.compile(
@@ -105,11 +107,23 @@ def with_points(
     if decimal is None:
         comma = _first_of(rows, lines, _COMMA)
         point = _first_of(rows, lines, _POINT)
+        grouped = _grouped(rows, lines)
         if comma is not None and point is not None:
             faults.add(
                 file, comma[0], None,
-                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; say in the mapping "
-                'which is the decimal mark: decimal = "comma" or decimal = "point"',
+                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; "
+                + (
+                    "the numbers have thousands separators: export them without"
+                    if grouped is not None
+                    else "say in the mapping which is the decimal mark: decimal = \"comma\" or decimal = \"point\""
+                ),
+            )  # fmt: skip
+        elif grouped is not None:
+            faults.add(
+                file, grouped[0], None,
+                f"{quoted(grouped[1])} may have a decimal mark or a thousands separator, as others of its column are "
+                'whole; export it without, or say in the mapping which is the decimal mark: decimal = "comma" or '
+                'decimal = "point"',
             )  # fmt: skip
         decimal = "." if comma is None else ","
     if decimal == ".":
@@ -117,6 +131,21 @@ def with_points(
     return [
         [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
     ], decimal
+
+
+def _grouped(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[int, str] | None:
+    """Return the first number of a column whose numbers are whole below 1000 or have groups of three digits."""
+    for column in zip(*rows, strict=True):
+        numbers = [cell for cell in column if is_number(cell)]
+        groups = [cell for cell in numbers if _GROUPED.fullmatch(cell)]
+        whole = [cell for cell in numbers if cell.lstrip("+-").isdigit()]
+        if groups and whole and len(groups) + len(whole) == len(numbers) and max(map(_size, whole)) < 1000:
+            return lines[column.index(groups[0])], groups[0]
+    return None
+
+
+def _size(cell: str) -> int:
+    return int(cell.lstrip("+-")[:9])
 
 
 def _first_of(
@@ -140,6 +169,11 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     if stem and foreign_unit(suffix) is not None:
         return stem, suffix
     return header, None
+
+
+def plain_key(key: str) -> str:
+    """Return a key of a head in small letters, without the unit behind it: ``Radius (mm)`` is radius."""
+    return re.sub(r"\s*[\[(].*", "", key).strip().casefold()
 
 
 def fact_of(line: str) -> tuple[str, str] | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_text import decode_foreign
 
@@ -57,6 +57,10 @@ class _Record:
             else:
                 self.texts[pair[1]] = pair[2]
 
+    def facts(self) -> tuple[Fact, ...]:
+        """Return its heading and its words."""
+        return (Fact("protocol", self.title, self.line), *(Fact(*text) for text in self.texts.items()))
+
     def _note(self, key: str, number: str) -> None:
         self.cells[f"{self.heading}/{key}" if self.heading else key] = number
 
@@ -85,7 +89,7 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
     date = " ".join(value for key, value in first.texts.items() if key.casefold() in _DATES)
     return Export(
         columns, {name: unit for name, unit in stated.items() if unit}, [record.line for record in records],
-        decoded[1], (("protocol", first.title), *first.texts.items()), date or None,
+        decoded[1], first.facts(), date or None,
     )  # fmt: skip
 
 
