@@ -8,10 +8,10 @@ from monitor.records import Campaign
 TABLE, DESCRIPTION = "probings", "campaign.toml"
 
 
-def is_of_folder(campaign: Campaign) -> bool:
-    """Return whether the rows came from the table of a campaign folder, and not from files of instruments."""
+def is_of_mapping(campaign: Campaign) -> bool:
+    """Return whether the rows came from files of instruments by a mapping, which is the first file then."""
     names = [file.name for file in campaign.files]
-    return not names or DESCRIPTION in names
+    return bool(names) and names[0].endswith(".toml") and names[0] != DESCRIPTION
 
 
 def rows_in(campaign: Campaign) -> str:
@@ -19,16 +19,15 @@ def rows_in(campaign: Campaign) -> str:
     names = [file.name for file in campaign.files]
     if not names:
         return f"{TABLE}.csv"
-    if is_of_folder(campaign):
-        return next((name for name in names if name.startswith(TABLE)), names[-1])
-    # The mapping is the first.
-    return ", ".join(names[1:])
+    if is_of_mapping(campaign):
+        return ", ".join(names[1:])
+    return next((name for name in names if name.startswith(TABLE)), names[-1])
 
 
 def runs_in(campaign: Campaign) -> str:
     """Return where the runs are listed: runs.csv, a workbook, or the tables of the mapping."""
     names = [file.name for file in campaign.files]
-    if not is_of_folder(campaign):
+    if is_of_mapping(campaign):
         return f"[[runs]] of {names[0]}"
     books = [name for name in names if name.endswith(".xlsx")]
     return next((name for name in names if name.startswith("runs")), books[-1] if books else "runs.csv")

@@ -9,7 +9,7 @@ from pathlib import Path
 from monitor.exceptions import CampaignError
 from monitor.readers.mapping.reading import Exports, read_exports
 from monitor.records import Campaign
-from monitor.row_files import is_of_folder, rows_in
+from monitor.row_files import is_of_mapping, rows_in
 
 
 class RowPlaces:
@@ -31,7 +31,7 @@ class RowPlaces:
     def _exports(self) -> Exports | None:
         """The files of instruments, read again; None for a campaign folder, and where they were archived."""
         files = self._campaign.files
-        if is_of_folder(self._campaign) or not all(file.content for file in files):
+        if not is_of_mapping(self._campaign) or not all(file.content for file in files):
             return None
         with tempfile.TemporaryDirectory() as folder:
             paths = [Path(folder, file.name) for file in files]

@@ -130,7 +130,7 @@ def read(file: ExportFile, how: BallBarSettings, faults: Faults) -> Export | Non
     if decoded is None:
         return None
     before = len(faults)
-    circles = _circles(decoded[0].split("\n"), how.style)
+    circles, rest = _circles(decoded[0].split("\n"), how.style)
     if not circles:
         faults.add(
             file.name,
@@ -139,6 +139,8 @@ def read(file: ExportFile, how: BallBarSettings, faults: Faults) -> Export | Non
             "there is no table of angles and deviations; say in the mapping how it is written",
         )
         return None
+    if not rest.lines:
+        _note_head_alone(file.name, rest, faults)
     read_circles = _read_circles(file.name, circles, decoded[1], how, faults)
     if read_circles is None or len(faults) > before or how.axes is None:
         return None
@@ -208,6 +210,19 @@ def _read_circles(
     return columns, lines, units[0], layout
 
 
+def _note_head_alone(name: str, circle: _Circle, faults: Faults) -> None:
+    """Refuse a head of a circle at the end of a file that no table follows."""
+    known = ("radius", "feed", "sense")
+    fact = next((fact for what in known if (fact := circle.fact(what)) is not None), None)
+    if fact is not None:
+        faults.add(
+            name,
+            fact.line,
+            fact.key,
+            "a circle begins here and has no table: the file is cut; export it again",
+        )
+
+
 def _whole(name: str, arcs: Sequence[tuple[float, float, int]], faults: Faults) -> None:
     """Refuse a circle that ends before the longest of its file: arcs and steps in degrees, each with its last line."""
     longest = max(arc for arc, _, _ in arcs)
@@ -220,8 +235,11 @@ def _whole(name: str, arcs: Sequence[tuple[float, float, int]], faults: Faults) 
             )  # fmt: skip
 
 
-def _circles(lines: Sequence[str], style: Style) -> list[_Circle]:
-    """Cut a file into circles: a head, a line of names and units, and rows of numbers until the next head."""
+def _circles(lines: Sequence[str], style: Style) -> tuple[list[_Circle], _Circle]:
+    """Cut a file into circles: a head, a line of names and units, and rows of numbers until the next head.
+
+    The second is the last one, also where it has a head alone.
+    """
     circles: list[_Circle] = []
     circle = _Circle()
     names: tuple[int, list[str]] | None = None
@@ -245,7 +263,7 @@ def _circles(lines: Sequence[str], style: Style) -> list[_Circle]:
             circle.facts.append(Fact(*fact, number))
         else:
             names = (number - 1, [line]) if names is None else (names[0], [*names[1], line])
-    return circles
+    return circles, circle
 
 
 def _cells(

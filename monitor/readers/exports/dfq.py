@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.foreign_text import decode_foreign
@@ -93,6 +94,10 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
     if decoded is None:
         return None
     before = len(faults)
+    coded = "\n".join(line for line in decoded[0].split("\n") if line.startswith(f"K{_VALUE}"))
+    if coded and decoded[0].endswith(coded.rpartition("\n")[2]) and is_cut(coded):
+        faults.add(file.name, decoded[0].count("\n") + 1, None, CUT)
+        return None
     part = _Part()
     for number, line in enumerate(decoded[0].split("\n"), start=1):
         if line.strip():
@@ -106,7 +111,21 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
     if len(faults) > before:
         return None
     points = _points(part, file.name, decoded[1], record, faults)
-    return None if len(faults) > before else points or _table(part, decoded[1])
+    export = points or _table(part, decoded[1])
+    return None if len(faults) > before else replace(export, notes=_unmeasured(part))
+
+
+def _unmeasured(part: _Part) -> tuple[str, ...]:
+    """Return a sentence on the last characteristics where they are named and have no value."""
+    named = {number for key, number in part.fields if key == _NAME}
+    most = max(part.values)
+    if most >= max(named, default=0):
+        return ()
+    line = part.fields[_NAME, min(number for number in named if number > most)][1]
+    return (
+        f"characteristics from {most + 1} on (line {line}) are named and have no value: were they measured, "
+        "the file is cut",
+    )
 
 
 def _line(part: _Part, line: str, number: int) -> str | None:

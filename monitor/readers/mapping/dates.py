@@ -19,7 +19,7 @@ _NAMED = re.compile(
     r"(?:[A-Za-z]{2,9},?\s+)?(?P<day>[0-9]{1,2})[. -]+(?P<month>[A-Za-zäÄ]{3,9})[. -]+(?P<year>[0-9]{4})(?P<rest>.*)"
 )
 _TIME = re.compile(
-    r"[\sT,/]*(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(:(?P<second>[0-9]{2})([.,][0-9]+)?)?\s*(?P<half>[AaPp][Mm])?\s*(?P<offset>Z|[+-][0-9]{2}:?[0-9]{2})?\s*"
+    r"[\sT,/]*(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(:(?P<second>[0-9]{2})(?P<part>[.,][0-9]+)?)?\s*(?P<half>[AaPp][Mm])?\s*(?P<offset>Z|[+-][0-9]{2}:?[0-9]{2})?\s*"
 )
 #: Seconds of a day.
 _DAY = 86_400
@@ -137,7 +137,7 @@ def _clock(cell: str) -> Decimal | None:
         hour = int(time["hour"])
         if time["half"]:
             hour = hour % 12 + (12 if time["half"].lower() == "pm" else 0)
-        part = (time[4] or "").replace(",", ".")
+        part = (time["part"] or "").replace(",", ".")
         return Decimal(hour * 3600 + int(time["minute"]) * 60 + int(time["second"] or 0)) + Decimal(
             f"0{part}"
         )

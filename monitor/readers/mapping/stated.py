@@ -26,6 +26,8 @@ _TRAVEL = 1.0
 _POSITION = re.compile(r"(?:axis|achse)?[\s:-]*([A-Z][0-9]?)(?:[\s-]*(?:axis|achse))?", re.IGNORECASE)
 _PLANE = re.compile(r"([XYZUVW])\s*[-/,]?\s*([XYZUVW])(?:[\s-]*(?:plane|ebene))?", re.IGNORECASE)
 _PLANES = {"g17": "XY", "g18": "ZX", "g19": "YZ"}
+#: So many times an axis has to turn at its ends before a pass that stops short says something, and by which part.
+_LEAST_TURNS, _LEFT = 2, 0.01
 _COUNT = re.compile(r"[0-9]{1,6}")
 #: What a file may call itself, by the kinds of readings that it can be.
 _KINDS: Mapping[str, tuple[str, ...]] = {
@@ -67,6 +69,7 @@ def compare(entry: Entry, file: str, export: Export, rows: Rows, wanted: Wanted)
             f'{wrong}; or write {OVERRULED} = ["{what}"] in [[exports]] where the file is wrong',
         )  # fmt: skip
     yield from _announced(entry, file, export)
+    yield from _last_pass(rows, wanted)
 
 
 def _axis(fact: Fact, rows: Rows, wanted: Wanted) -> str | None:
@@ -166,6 +169,30 @@ def _announced(entry: Entry, file: str, export: Export) -> Iterator[str]:
         )  # fmt: skip
     elif asked > 1 and rows % asked and (rows - 1) % (asked - 1):
         yield f"{asked} {points.key} are announced, and {rows} rows are no whole number of passes: is it cut?"
+
+
+def _last_pass(rows: Rows, wanted: Wanted) -> Iterator[str]:
+    """Yield a sentence where one axis goes to and fro between two ends and its last pass stops before its end."""
+    moving = _moving(rows, wanted)
+    if len(moving) != 1:
+        return
+    column = next(axis.column for axis in wanted.axes if axis.name == moving[0])
+    positions = np.array([float(cell) for cell in rows.cells[column]])
+    steps = np.diff(positions)
+    signs = np.sign(steps[np.abs(steps) > _STILL])
+    turns = np.flatnonzero(np.diff(signs))
+    places = positions[np.concatenate([[True], np.abs(steps) > _STILL])]
+    if len(turns) < _LEAST_TURNS:
+        return
+    ends = places[turns + 1]
+    reach = float(np.ptp(places))
+    is_whole = all(min(end - places.min(), places.max() - end) < _STILL for end in ends)
+    left = float(abs((places.max() if signs[-1] > 0.0 else places.min()) - places[-1]))
+    if is_whole and left > _LEFT * reach:
+        yield (
+            f"the last pass of {moving[0]} ends at {places[-1]:g}, {left:g} before the end of the {len(ends)} others, "
+            f"on line {rows.lines[-1]}: is the file cut?"
+        )
 
 
 def _count(export: Export, keys: tuple[str, ...]) -> Fact | None:
