@@ -7,8 +7,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from monitor.readers.export import Fact
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_units import foreign_unit, sexagesimal
+from monitor.readers.foreign_units import decimal_of, foreign_unit, sexagesimal
 
 SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "space": " "}
 DECIMALS = {"comma": ",", "point": "."}
@@ -21,6 +22,7 @@ _POINT = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?\S)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|\s/\s*(?P<c>\S+)|\sin\s+(?P<d>\S+))"
 )
+_QUANTITY = re.compile(r"([+-]?[0-9]*[.,]?[0-9]+)\s*([^\s0-9]\S*)?")
 #: Lines at the head of a file in which a table has to begin.
 _LOOKED_AT = 400
 
@@ -172,8 +174,8 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
 
 
 def plain_key(key: str) -> str:
-    """Return a key of a head in small letters, without the unit behind it: ``Radius (mm)`` is radius."""
-    return re.sub(r"\s*[\[(].*", "", key).strip().casefold()
+    """Return a key of a head in small letters, without its unit or a mark of comments: ``# Radius (mm)`` is radius."""
+    return re.sub(r"\s*[\[(].*", "", key).strip("#%*/ ").casefold()
 
 
 def fact_of(line: str) -> tuple[str, str] | None:
@@ -184,3 +186,21 @@ def fact_of(line: str) -> tuple[str, str] | None:
         if key.strip() and value.strip(" ;\t,") and len(key) <= 60:
             return key.strip(' "'), value.strip(' ;\t,"')
     return None
+
+
+def length_of(fact: Fact) -> tuple[float | None, float | None]:
+    """Return the number of a length and how many mm its unit has, behind the number or in the key; None without."""
+    number, unit = quantity_of(fact)
+    stated = foreign_unit(unit)
+    is_length = stated is not None and stated.quantity == "length"
+    return number or None, float(stated.factor) if is_length and stated else None
+
+
+def quantity_of(fact: Fact) -> tuple[float | None, str]:
+    """Return the number of a line of a head and its unit as it stands, behind the number or in brackets of the key."""
+    match = _QUANTITY.fullmatch(fact.value)
+    if match is None:
+        return None, ""
+    bracket = re.search(r"[\[(](.*?)[\])]", fact.key)
+    number = decimal_of(match[1].replace(",", "."))
+    return None if number is None else float(number), match[2] or (bracket[1] if bracket else "")

@@ -14,6 +14,14 @@ from monitor.readers.faults import Faults
 _CONTROL = re.compile("[\x00-\x08\x0b\x0e\x10-\x13\x15-\x19\x1b-\x1f\x7f]")
 
 
+#: How files of other kinds begin, and what is said of them.
+_OTHERS = {
+    b"pk\x03\x04": "a workbook or another archive; name a workbook of Excel .xlsx, or save it as CSV",
+    b"\xd0\xcf\x11\xe0": "a workbook of an old Excel (.xls); save it as .xlsx or as CSV",
+    b"<html": "a web page; export the measurement as text or CSV",
+    b"<!doctype html": "a web page; export the measurement as text or CSV",
+    b"%pdf": "a PDF; export the measurement as text or CSV",
+}
 #: Bytes at the head that are looked at, characters that say something, and the part of them that is plain letters.
 _HEAD, _LEAST, _MOSTLY = 400, 8, 0.9
 
@@ -26,6 +34,10 @@ def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str]
     if not content.strip():
         faults.add(name, 1, None, "the file is empty; export the measurement again")
         return None
+    for begin, what in _OTHERS.items():
+        if content.lstrip()[: len(begin)].lower() == begin:
+            faults.add(name, 1, None, f"this is {what}, whatever its name says")
+            return None
     decoded = _decoded(name, content, faults)
     if decoded is None:
         return None

@@ -277,6 +277,9 @@ def test_a_log_keeps_what_a_serial_line_adds_and_one_without_its_end_is_said(tmp
         (COLUMNS + "0 mm;1 um\n100 mm;2 um\n", "line 2: '0 mm' has its unit behind the number"),
         (COLUMNS + "0;0\n500;3\n1,000;5\n1,500;7\n", "line 4: '1,000' may have a decimal mark or a thousands"),
         (COLUMNS + "0;0.10\n500;3.20\n1,000;5.00\n", "the numbers have thousands separators: export them without"),
+        ("# Achse: Y\n" + COLUMNS + passes(2), "line 1, column # Achse: the file says axis Y"),
+        ("PK\x03\x04 and more", "line 1: this is a workbook or another archive; name a workbook of Excel .xlsx"),
+        ("<html><body>0;1</body></html>", "line 1: this is a web page; export the measurement as text or CSV"),
         ((COLUMNS + passes(2)).encode("utf-16")[:-3], "the file is UTF-16 and ends within a character: it is cut"),
     ],
 )  # fmt: skip
@@ -355,3 +358,36 @@ def test_the_files_of_rows_and_runs_go_by_their_own_names():
     assert RowPlaces(folder).row(1, 3) == "the row in week.xlsx"
     bare = replace(shipped, files=())
     assert (rows_in(bare), runs_in(bare)) == ("probings.csv", "runs.csv")
+
+
+def test_rows_that_cannot_be_read_are_the_fault_and_not_a_setup_without_rows(tmp_path):
+    with pytest.raises(CampaignError) as caught:
+        laser(tmp_path, COLUMNS + "0;(1.0)\n100;(2.0)\n")
+    assert "has no row" not in str(caught.value)
+    assert "laser.csv, line 2, column Deviation (reading_um): '(1.0)' is not a number" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("-200.00000", "********", "axis' of this protocol is '********' and no number; measure"),
+        ("Diameter: 12.0031", "Diameter: 12.0031\nDiameter: 99.0", "'Actual values/Diameter' stands twice in"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_a_protocol_is_said_of_that_protocol(tmp_path, old, new, said):
+    with pytest.raises(CampaignError, match=re.escape(said)):
+        changed(tmp_path, PLATE, "TCHPR421.TXT", (old, new))
+
+
+@pytest.mark.parametrize("end", ["9.00", "9.000E", "9.000E-", "9.000E-0"])
+def test_a_table_that_ends_within_a_power_of_ten_is_refused(tmp_path, end):
+    rows = "".join(f"{place}.0;{place:.3E}\n" for place in range(100, 800, 100))
+    assert len(laser(tmp_path, f"{COLUMNS}{rows}800.0;9.000E-04").campaign.probings) == 8
+    with pytest.raises(CampaignError, match="line 9: the last number is shorter than those above it"):
+        laser(tmp_path, f"{COLUMNS}{rows}800.0;{end}")
+
+
+def test_a_circle_that_ends_within_an_angle_is_refused(tmp_path):
+    text = (EXAMPLES / LASERS / "bar-xy.bar").read_text()
+    with pytest.raises(CampaignError, match="'36' is the beginning of a row: the file is cut here"):
+        changed(tmp_path, LASERS, "bar-xy.bar", (text, text.replace(".", ",") + "36"))

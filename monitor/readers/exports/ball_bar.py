@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from monitor.readers.delimited import Style, cells_of, fact_of, is_data, plain_key
+from monitor.readers.delimited import Style, cells_of, fact_of, is_data, length_of, plain_key, quantity_of
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.exports import table as plain_table
 from monitor.readers.faults import Faults, quoted
@@ -40,7 +40,8 @@ _SENSES = {
         "CCW",
     ),
 }
-_QUANTITY = re.compile(r"([+-]?[0-9]*[.,]?[0-9]+)\s*([^\s0-9]\S*)?")
+#: A last line without an end that may be the first digits of a row.
+_FRAGMENT = re.compile(r"\s*[+-]?[0-9][0-9.,]*[;\t]?")
 #: Units of a feed, by how many mm in a minute they are.
 _FEEDS = {
     **dict.fromkeys(("mm/min", "mmpm", "mm/minute"), 1.0),
@@ -141,6 +142,14 @@ def read(file: ExportFile, how: BallBarSettings, faults: Faults) -> Export | Non
         return None
     if not rest.lines:
         _note_head_alone(file.name, rest, faults)
+    last = decoded[0].rpartition("\n")[2]
+    if _FRAGMENT.fullmatch(last) and not any(is_data(cells_of(last, mark)) for mark in ";\t, "):
+        faults.add(
+            file.name,
+            decoded[0].count("\n") + 1,
+            None,
+            f"{quoted(last)} is the beginning of a row: the file is cut here",
+        )
     read_circles = _read_circles(file.name, circles, decoded[1], how, faults)
     if read_circles is None or len(faults) > before or how.axes is None:
         return None
@@ -172,7 +181,7 @@ def _without_feed(facts: Sequence[Fact]) -> tuple[str, ...]:
 
 def _feed_of(fact: Fact | None) -> float:
     """Return the feed in mm/min that a line of a head states; 0 where it states none."""
-    number, unit = (None, "") if fact is None else _quantity(fact)
+    number, unit = (None, "") if fact is None else quantity_of(fact)
     return (number or 0.0) * _FEEDS.get(unit.casefold(), 0.0)
 
 
@@ -212,8 +221,9 @@ def _read_circles(
 
 def _note_head_alone(name: str, circle: _Circle, faults: Faults) -> None:
     """Refuse a head of a circle at the end of a file that no table follows."""
-    known = ("radius", "feed", "sense")
-    fact = next((fact for what in known if (fact := circle.fact(what)) is not None), None)
+    fact = next(
+        (fact for what in ("radius", "feed", "sense") if (fact := circle.fact(what)) is not None), None
+    )
     if fact is not None:
         faults.add(
             name,
@@ -391,24 +401,6 @@ def _radius_of(fact: Fact, mapped: float | None) -> float | str:
         f"the file says {read_radius:g} mm, the mapping {mapped:g} mm{hint}: correct radius_mm, or write "
         'overruled = ["radius"] where the file is wrong, or states the bar and radius_mm a smaller circle'
     )
-
-
-def length_of(fact: Fact) -> tuple[float | None, float | None]:
-    """Return the number of a length and how many mm its unit has, behind the number or in the key; None without."""
-    number, unit = _quantity(fact)
-    stated = foreign_unit(unit)
-    is_length = stated is not None and stated.quantity == "length"
-    return number or None, float(stated.factor) if is_length and stated else None
-
-
-def _quantity(fact: Fact) -> tuple[float | None, str]:
-    """Return the number of a line of a head and its unit as it stands, behind the number or in brackets of the key."""
-    match = _QUANTITY.fullmatch(fact.value)
-    if match is None:
-        return None, ""
-    bracket = re.search(r"[\[(](.*?)[\])]", fact.key)
-    number = decimal_of(match[1].replace(",", "."))
-    return None if number is None else float(number), match[2] or (bracket[1] if bracket else "")
 
 
 def _sense(name: str, circle: _Circle, turns: Sequence[float], at: Sequence[int], faults: Faults) -> str:

@@ -10,6 +10,7 @@ Source: the manuals of the TNC controls, "Recording the results of measurement",
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
@@ -37,6 +38,7 @@ class _Record:
     ended: bool = False
     heading: str = ""
     waiting: str = ""
+    twice: str | None = None
 
     def read(self, text: str) -> None:
         """Read one line: a heading, a key with its value, or the value of the key above."""
@@ -62,7 +64,16 @@ class _Record:
         return (Fact("protocol", self.title, self.line), *(Fact(*text) for text in self.texts.items()))
 
     def _note(self, key: str, number: str) -> None:
-        self.cells[f"{self.heading}/{key}" if self.heading else key] = number
+        name = f"{self.heading}/{key}" if self.heading else key
+        if self.cells.setdefault(name, number) != number:
+            self.twice = name
+
+    def no_number(self, names: Iterable[str]) -> tuple[str, str] | None:
+        """Return the first of the names under which this protocol has a text instead, and that text."""
+        lacking = (name for name in names if name not in self.cells)
+        return next(
+            ((name, text) for name in lacking if (text := self.texts.get(name.rpartition("/")[2]))), None
+        )
 
 
 def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
@@ -110,7 +121,21 @@ def _sound(name: str, records: list[_Record], faults: Faults) -> bool:
     """Refuse protocols that are cut, of other cycles than the first, or in another unit."""
     before = len(faults)
     first = records[0]
+    names = dict.fromkeys(name for record in records for name in record.cells)
     for record in records:
+        if record.twice is not None:
+            faults.add(
+                name, record.line, None,
+                f"{quoted(record.twice)} stands twice in this protocol with two values; write the log again",
+            )  # fmt: skip
+            return False
+        if (odd := record.no_number(names)) is not None:
+            faults.add(
+                name, record.line, None,
+                f"{quoted(odd[0])} of this protocol is {quoted(odd[1])} and no number; measure this point again, or "
+                "take its protocol out",
+            )  # fmt: skip
+            return False
         if not record.ended:
             faults.add(
                 name, record.line, None, 'this protocol has no end mark ("End of measuring log"): it is cut'

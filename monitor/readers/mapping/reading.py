@@ -328,7 +328,7 @@ def _at_home(
 ) -> list[Fault]:
     """Return faults of the two tables as faults of the files, lines and columns that their cells came from."""
     translated = []
-    for fault in faults:
+    for fault in _without_consequences(faults):
         if fault.file == probings_file.FILE and fault.line is not None and fault.line >= 2:
             translated.append(_of_row(fault, parts, places))
         elif fault.file in (probings_file.FILE, runs_file.FILE):
@@ -346,6 +346,13 @@ def _at_home(
         else:
             translated.append(fault)
     return translated
+
+
+def _without_consequences(faults: Sequence[Fault]) -> list[Fault]:
+    """Return the faults without setups that have no row because none of their rows could be read."""
+    if not any(fault.file == probings_file.FILE and fault.line is not None for fault in faults):
+        return list(faults)
+    return [fault for fault in faults if not (fault.column == "setups" and "has no row" in fault.message)]
 
 
 def _of_row(fault: Fault, parts: Sequence[_Part], places: Sequence[tuple[int, int]]) -> Fault:

@@ -79,6 +79,7 @@ def valid(
 
 
 def no_column(file: str, name: str, export: Export) -> str:
+    """Return what is said of a column that a file has not, or has several times."""
     alike = [column for column in export.columns if column.casefold().startswith(f"{name.casefold()} ")]
     if len(alike) > 1:
         return f"{file} has several columns {quoted(name)}; write which, by its name: {one_of(map(quoted, alike))}"

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from monitor.readers.delimited import plain_key
+from monitor.readers.delimited import length_of, plain_key
 from monitor.readers.export import Export, Fact
-from monitor.readers.exports.ball_bar import RADIUS_KEYS, length_of
+from monitor.readers.exports.ball_bar import RADIUS_KEYS
 from monitor.readers.faults import one_of
 from monitor.readers.foreign_units import decimal_of
 from monitor.readers.mapping.mapping_file import OVERRULED, STATED, Entry
@@ -187,10 +187,10 @@ def _last_pass(rows: Rows, wanted: Wanted) -> Iterator[str]:
     ends = places[turns + 1]
     reach = float(np.ptp(places))
     is_whole = all(min(end - places.min(), places.max() - end) < _STILL for end in ends)
-    left = float(abs((places.max() if signs[-1] > 0.0 else places.min()) - places[-1]))
-    if is_whole and left > _LEFT * reach:
+    short = float(abs((places.max() if signs[-1] > 0.0 else places.min()) - places[-1]))
+    if is_whole and short > _LEFT * reach:
         yield (
-            f"the last pass of {moving[0]} ends at {places[-1]:g}, {left:g} before the end of the {len(ends)} others, "
+            f"the last pass of {moving[0]} ends at {places[-1]:g}, {short:g} before the end of the {len(ends)} others, "
             f"on line {rows.lines[-1]}: is the file cut?"
         )
 
