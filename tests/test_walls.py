@@ -37,6 +37,7 @@ GROUND = {
     "moments",
     "toml_text",
     "topology_text",
+    "row_files",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

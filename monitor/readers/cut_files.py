@@ -18,6 +18,9 @@ CUT = (
 #: A number at the end of a row; a comma is a decimal mark where something else separates the cells.
 _LAST_NUMBER = re.compile(r"(?:^|[\s;,:A-Za-z])[+-]?[0-9]+(?:\.([0-9]+))?\Z")
 _LAST_WITH_COMMA = re.compile(r"(?:^|[\s;:A-Za-z])[+-]?[0-9]+(?:,([0-9]+))?\Z")
+#: A number with a power of ten at the end of a row, and what may be the beginning of one.
+_POWER = re.compile(r"[0-9][eE][+-]?([0-9]+)\Z")
+_BEGINNING = re.compile(r"[0-9][.,]?(?:[eE][+-]?([0-9]*))?\Z")
 _SEPARATED = re.compile(r"[;\t ]")
 #: So many rows that end in numbers of equal length are printed so; of one decimal, which a program may leave out as a
 #: zero, more of them.
@@ -29,6 +32,8 @@ def is_cut(text: str) -> bool:
     if text.endswith("\n"):
         return False
     *lines, last = text.replace("\r\n", "\n").split("\n")
+    if _is_cut_in_exponent(lines, last):
+        return True
     pattern = _LAST_WITH_COMMA if _SEPARATED.search(last) and "." not in last else _LAST_NUMBER
     end = pattern.search(last.rstrip(".,"))
     cells = len(_SEPARATED.findall(last)) + last.count(",")
@@ -43,3 +48,13 @@ def is_cut(text: str) -> bool:
         return False
     usual = decimals.pop()
     return len(end[1] or "") < usual and len(above) >= (_ROWS if usual > 1 else _ROWS_OF_ONE)
+
+
+def _is_cut_in_exponent(lines: list[str], last: str) -> bool:
+    """Whether all rows above end in powers of ten of equally many digits, and the last row in the beginning of one."""
+    powers = [_POWER.search(line) for line in lines[-_ROWS_OF_ONE:] if line.count("E") + line.count("e")]
+    digits = {len(power[1]) for power in powers if power is not None}
+    end = _BEGINNING.search(last)
+    if end is None or len(digits) != 1 or None in powers[-_ROWS:] or len(powers) < _ROWS:
+        return False
+    return len(end[1] or "") < digits.pop()

@@ -7,18 +7,22 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from monitor.readers.export import Fact
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_units import foreign_unit, sexagesimal
+from monitor.readers.foreign_units import decimal_of, foreign_unit, sexagesimal
 
 SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "space": " "}
 DECIMALS = {"comma": ",", "point": "."}
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
+#: Whole numbers that a mark cuts into groups of three digits; a decimal number of three digits looks alike.
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}([.,][0-9]{3})+")
 _POINT = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 #: ``Position [mm]``, ``Position (mm)``, ``Position / mm``, ``Position in mm``.
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?\S)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|\s/\s*(?P<c>\S+)|\sin\s+(?P<d>\S+))"
 )
+_QUANTITY = re.compile(r"([+-]?[0-9]*[.,]?[0-9]+)\s*([^\s0-9]\S*)?")
 #: Lines at the head of a file in which a table has to begin.
 _LOOKED_AT = 400
 
@@ -105,11 +109,23 @@ def with_points(
     if decimal is None:
         comma = _first_of(rows, lines, _COMMA)
         point = _first_of(rows, lines, _POINT)
+        grouped = _grouped(rows, lines)
         if comma is not None and point is not None:
             faults.add(
                 file, comma[0], None,
-                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; say in the mapping "
-                'which is the decimal mark: decimal = "comma" or decimal = "point"',
+                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; "
+                + (
+                    "the numbers have thousands separators: export them without"
+                    if grouped is not None
+                    else "say in the mapping which is the decimal mark: decimal = \"comma\" or decimal = \"point\""
+                ),
+            )  # fmt: skip
+        elif grouped is not None:
+            faults.add(
+                file, grouped[0], None,
+                f"{quoted(grouped[1])} may have a decimal mark or a thousands separator, as others of its column are "
+                'whole; export it without, or say in the mapping which is the decimal mark: decimal = "comma" or '
+                'decimal = "point"',
             )  # fmt: skip
         decimal = "." if comma is None else ","
     if decimal == ".":
@@ -117,6 +133,21 @@ def with_points(
     return [
         [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
     ], decimal
+
+
+def _grouped(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[int, str] | None:
+    """Return the first number of a column whose numbers are whole below 1000 or have groups of three digits."""
+    for column in zip(*rows, strict=True):
+        numbers = [cell for cell in column if is_number(cell)]
+        groups = [cell for cell in numbers if _GROUPED.fullmatch(cell)]
+        whole = [cell for cell in numbers if cell.lstrip("+-").isdigit()]
+        if groups and whole and len(groups) + len(whole) == len(numbers) and max(map(_size, whole)) < 1000:
+            return lines[column.index(groups[0])], groups[0]
+    return None
+
+
+def _size(cell: str) -> int:
+    return int(cell.lstrip("+-")[:9])
 
 
 def _first_of(
@@ -142,6 +173,11 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     return header, None
 
 
+def plain_key(key: str) -> str:
+    """Return a key of a head in small letters, without its unit or a mark of comments: ``# Radius (mm)`` is radius."""
+    return re.sub(r"\s*[\[(].*", "", key).strip("#%*/ ").casefold()
+
+
 def fact_of(line: str) -> tuple[str, str] | None:
     """Return the key and the value of a line ``key: value`` or ``key = value``; None for any other."""
     marks = sorted((line.index(mark), mark) for mark in (":", "=", ";", "\t") if mark in line)
@@ -150,3 +186,21 @@ def fact_of(line: str) -> tuple[str, str] | None:
         if key.strip() and value.strip(" ;\t,") and len(key) <= 60:
             return key.strip(' "'), value.strip(' ;\t,"')
     return None
+
+
+def length_of(fact: Fact) -> tuple[float | None, float | None]:
+    """Return the number of a length and how many mm its unit has, behind the number or in the key; None without."""
+    number, unit = quantity_of(fact)
+    stated = foreign_unit(unit)
+    is_length = stated is not None and stated.quantity == "length"
+    return number or None, float(stated.factor) if is_length and stated else None
+
+
+def quantity_of(fact: Fact) -> tuple[float | None, str]:
+    """Return the number of a line of a head and its unit as it stands, behind the number or in brackets of the key."""
+    match = _QUANTITY.fullmatch(fact.value)
+    if match is None:
+        return None, ""
+    bracket = re.search(r"[\[(](.*?)[\])]", fact.key)
+    number = decimal_of(match[1].replace(",", "."))
+    return None if number is None else float(number), match[2] or (bracket[1] if bracket else "")

@@ -17,6 +17,7 @@ from monitor.readers.axes_doubts import mistaken_axes
 from monitor.readers.repeated_rows import repeated_rows
 from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
+from monitor.row_files import runs_in
 from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
@@ -269,7 +270,7 @@ def _days(campaign: Campaign) -> Iterator[str]:
             f"{earlier.started_at:%Y-%m-%d} less than {APART.total_seconds() / 3600.0:g} hours apart ({len(close)} of "
             f"{len(began) - 1} such): are the numbers in the column day those of days? What days differ by is "
             f"estimated from them; runs of one date have one number, so give run {later.run} day {earlier.day} in "
-            "runs.csv"
+            f"{runs_in(campaign)}"
         )
 
 
@@ -281,8 +282,8 @@ def _to_come(campaign: Campaign) -> Iterator[str]:
         run = later[0]
         yield (
             f"run {run.run} started at {run.started_at:%Y-%m-%d %H:%M}, which is still to come ({len(later)} of "
-            f"{len(campaign.runs)} runs): correct started_at in runs.csv (year, order of day and month, offset from "
-            "UTC); trend, report and plans of the next calibration count from the latest run"
+            f"{len(campaign.runs)} runs): correct started_at in {runs_in(campaign)} (year, order of day and month, "
+            "offset from UTC); trend, report and plans of the next calibration count from the latest run"
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from monitor.readers.faults import Faults
 from monitor.readers.toml_table import Table
@@ -21,21 +21,31 @@ class ExportFile:
     content: bytes
 
 
+class Fact(NamedTuple):
+    """What the head of a file says: ``key: value``, and the ``line`` on which it stands; None where nobody knows."""
+
+    key: str
+    value: str
+    line: int | None = None
+
+
 @dataclass(frozen=True)
 class Export:
     """What a file holds: cells (n) by the name of their column, numbers with a decimal point.
 
     ``units`` has the columns whose unit the file states; ``lines`` (n) is the line that each row stands on. ``layout``
-    says how the file is written, ``facts`` what its head says; ``started`` is a date as it stands there.
+    says how the file is written, ``facts`` what its head says; ``started`` is a date as it stands there. ``invalid``
+    has the rows (0 to n - 1) of which the file itself says that the cell of a column does not count, with its words.
     """
 
     columns: Mapping[str, Sequence[str]]
     units: Mapping[str, str]
     lines: Sequence[int]
     layout: str
-    facts: tuple[tuple[str, str], ...] = ()
+    facts: tuple[Fact, ...] = ()
     started: str | None = None
     notes: tuple[str, ...] = ()
+    invalid: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
 
 
 def no_settings(table: Table) -> None:

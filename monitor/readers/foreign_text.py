@@ -14,6 +14,18 @@ from monitor.readers.faults import Faults
 _CONTROL = re.compile("[\x00-\x08\x0b\x0e\x10-\x13\x15-\x19\x1b-\x1f\x7f]")
 
 
+#: How files of other kinds begin, and what is said of them.
+_OTHERS = {
+    b"pk\x03\x04": "a workbook or another archive; name a workbook of Excel .xlsx, or save it as CSV",
+    b"\xd0\xcf\x11\xe0": "a workbook of an old Excel (.xls); save it as .xlsx or as CSV",
+    b"<html": "a web page; export the measurement as text or CSV",
+    b"<!doctype html": "a web page; export the measurement as text or CSV",
+    b"%pdf": "a PDF; export the measurement as text or CSV",
+}
+#: Bytes at the head that are looked at, characters that say something, and the part of them that is plain letters.
+_HEAD, _LEAST, _MOSTLY = 400, 8, 0.9
+
+
 def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str] | None:
     """Return the text with LF line ends and the name of its encoding; None with the fault noted.
 
@@ -22,6 +34,10 @@ def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str]
     if not content.strip():
         faults.add(name, 1, None, "the file is empty; export the measurement again")
         return None
+    for begin, what in _OTHERS.items():
+        if content.lstrip()[: len(begin)].lower() == begin:
+            faults.add(name, 1, None, f"this is {what}, whatever its name says")
+            return None
     decoded = _decoded(name, content, faults)
     if decoded is None:
         return None
@@ -50,6 +66,15 @@ def decode_foreign(name: str, content: bytes, faults: Faults) -> tuple[str, str]
     return text, encoding
 
 
+def _unmarked(content: bytes) -> str | None:
+    """Return the UTF-16 of a text without a mark, whose every other byte at the head is zero; None for any other."""
+    even, odd = content[:_HEAD:2], content[1:_HEAD:2]
+    for zero, other, encoding in ((odd, even, "utf-16-le"), (even, odd, "utf-16-be")):
+        if len(zero) >= _LEAST and zero.count(0) >= _MOSTLY * len(zero) and not other.count(0):
+            return encoding
+    return None
+
+
 def _decoded(name: str, content: bytes, faults: Faults) -> tuple[str, str] | None:
     for mark, encoding, label in (
         (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with byte-order mark"),
@@ -61,8 +86,19 @@ def _decoded(name: str, content: bytes, faults: Faults) -> tuple[str, str] | Non
                 return content.decode(encoding), label
             except UnicodeDecodeError as error:
                 line = content.count(b"\n", 0, error.start) + 1
-                faults.add(name, line, None, f"the file begins as {label} and is not; save it as UTF-8 text")
+                is_cut_within = error.end >= len(content) - 1
+                faults.add(
+                    name, line, None,
+                    f"the file is {label} and ends within a character: it is cut; export it again"
+                    if is_cut_within
+                    else f"the file begins as {label} and is not; save it as UTF-8 text",
+                )  # fmt: skip
                 return None
+    if (unmarked := _unmarked(content)) is not None:
+        try:
+            return content.decode(unmarked), "UTF-16 without byte-order mark"
+        except UnicodeDecodeError:
+            pass
     try:
         return content.decode("utf-8"), "ASCII" if content.isascii() else "UTF-8"
     except UnicodeDecodeError:

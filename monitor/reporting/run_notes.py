@@ -29,7 +29,8 @@ class AxisAt:
 class GrossReadingNoted(Sentence):
     """A reading that is wrong beyond doubt: where it stands in the file; ``others`` may be the wrong one instead.
 
-    ``is_along_surface``: the touch stands elsewhere on its surface than in the other runs.
+    ``is_along_surface``: the touch stands elsewhere on its surface than in the other runs. ``row`` says which row to
+    correct, by its file.
     """
 
     run: int
@@ -41,6 +42,7 @@ class GrossReadingNoted(Sentence):
     axis: str
     others: tuple[int, ...]
     is_along_surface: bool = False
+    row: str = "the row in probings.csv"
 
     def __str__(self) -> str:
         stands = f" at {' '.join(map(str, self.pose))}" if self.pose else ""
@@ -55,8 +57,7 @@ class GrossReadingNoted(Sentence):
         )
         return (
             f"run {self.run}: sequence {self.sequence}, {self.target_word} {self.target}{stands}, is off by {size} in "
-            f"{self.axis}{instead}: {holds}; correct or remove the row in probings.csv, withdraw "
-            "the campaign and import it again"
+            f"{self.axis}{instead}: {holds}; correct or remove {self.row}, withdraw the campaign and import it again"
         )
 
 

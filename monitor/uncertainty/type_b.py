@@ -18,6 +18,7 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.records import Array, Campaign
+from monitor.row_files import runs_in
 from monitor.sources import HALF_WIDTHS, Law, Quantity, Sharing, Source
 from monitor.uncertainty.marginals import Arcsine, Marginal, Normal, Rectangular, StudentT, Triangular
 from monitor.uncertainty.monte_carlo.sampling import JointDistribution
@@ -176,6 +177,6 @@ def _strain(campaign: Campaign, number: int, source: Source) -> float:
         raise InputError(
             f"source '{source.name}': how much an expansion coefficient does needs the distance from the reference "
             "temperature; write reference_temperature_degC in [artefact.scale_bar] and bar_degC or ambient_degC in "
-            "runs.csv, or temperature_offset_K beside the source"
+            f"{runs_in(campaign)}, or temperature_offset_K beside the source"
         )
     return temperature.degrees - bar.reference_temperature

@@ -250,7 +250,7 @@ def outcome(case: Case, machine: OwnMachine, rng: np.random.Generator, *, identi
 
 def _identified(campaign: Campaign, model: StoredModel) -> tuple[float, bool]:
     """The share of parameters of the last run that `identify` holds within 2 u, and whether it has a note."""
-    last = machine_answer(campaign.machine, identified(campaign, model)[0]).runs[-1]
+    last = machine_answer(campaign, identified(campaign, model)[0]).runs[-1]
     inside = [abs(each.value - TRUE[name]) <= 2.0 * each.u for name, each in last.parameters.items()]
     return float(np.mean(inside)), bool(last.note)
 

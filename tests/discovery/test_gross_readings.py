@@ -17,6 +17,7 @@ from monitor.methods.chain.gross import gross_readings
 from monitor.methods.chain.parts import parts_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
+from monitor.readers.row_places import RowPlaces
 from monitor.workflow.identify.notes import gross_noted
 from monitor.workflow.intake.gross_doubts import gross_doubts
 
@@ -178,7 +179,7 @@ def test_the_sentence_says_run_row_ball_pose_and_size(virtual_campaigns):
     assert gross_doubts(campaign) == ()
     method = campaign_method(spoiled)
     (reading,) = method.identify(spoiled, Model("samba")).gross
-    assert str(gross_noted(reading, method.nouns.target)) == sentence
+    assert str(gross_noted(reading, method.nouns.target, RowPlaces(spoiled))) == sentence
 
 
 def test_identify_says_which_reading_of_a_touch_far_off_is_wrong_and_what_would_be_right():

@@ -19,6 +19,7 @@ from monitor.effects import parse_effect
 from monitor.exceptions import DataError
 from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
+from monitor.readers.row_places import RowPlaces
 from monitor.records import Campaign
 from monitor.workflow.identify.notes import note
 
@@ -89,7 +90,7 @@ def edited(robots: ModuleType, folder: Path, old: str, new: str) -> Campaign:
 def test_a_link_typed_ten_times_too_short_is_told(robots, tmp_path):
     found = edited(robots, tmp_path, "455.0", "45.5")
     identified = tracker.identify(found)
-    words = note(found.machine, identified, identified.runs[0])
+    words = note(found.machine, identified, identified.runs[0], RowPlaces(found))
     assert "EZ0J3 comes to 40" in words
     assert "puts J3 45.5 mm from the axis before it" in words
     assert "check offset_mm of J3" in words
@@ -100,7 +101,7 @@ def test_a_joint_whose_zero_is_off_by_seven_degrees_is_told(robots, tmp_path):
     location["J3"][4] += np.deg2rad(7.0)
     found = campaign(robots, tmp_path, 8, poses=60, location=location)
     identified = tracker.identify(found)
-    words = note(found.machine, identified, identified.runs[0])
+    words = note(found.machine, identified, identified.runs[0], RowPlaces(found))
     assert "EB0J3 comes to 7" in words
     assert "check the zero, the direction and the sign of J3" in words
 
@@ -108,7 +109,7 @@ def test_a_joint_whose_zero_is_off_by_seven_degrees_is_told(robots, tmp_path):
 def test_nothing_is_noted_of_a_robot_as_it_is(robots, tmp_path):
     found = campaign(robots, tmp_path, 9, poses=60)
     identified = tracker.identify(found)
-    assert note(found.machine, identified, identified.runs[0]) == ""
+    assert note(found.machine, identified, identified.runs[0], RowPlaces(found)) == ""
 
 
 def test_points_in_metres_are_refused(robots, tmp_path):

@@ -15,6 +15,7 @@ from monitor.methods.chain import parts, problem
 from monitor.methods.chain.memory import free_memory
 from monitor.progress import listening
 from monitor.readers import read_campaign
+from monitor.readers.row_places import RowPlaces
 from monitor.records import Campaign
 from monitor.workflow.identify.notes import note
 
@@ -128,7 +129,8 @@ def test_a_run_that_cannot_be_searched_in_parts_is_identified_and_says_so(
     assert [reading.row for reading in found.gross] == [row]
     assert found.unsearched == (2,)
     assert [
-        note(campaign.machine, found, run).count("not looked at for wrong readings") for run in found.runs
+        note(campaign.machine, found, run, RowPlaces(campaign)).count("not looked at for wrong readings")
+        for run in found.runs
     ] == [0, 1]
 
 

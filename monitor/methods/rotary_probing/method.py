@@ -14,6 +14,7 @@ from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.problem import FARTHEST_APART, NAME, problem_of
 from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
+from monitor.row_files import rows_in
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
@@ -38,7 +39,7 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     )
     raise DataError(
         f"touches stand more than {FARTHEST_APART:g} mm apart from the others of their point: {touches}. Correct the "
-        "rows, or leave them out of probings.csv: no number of their run would hold"
+        f"rows, or leave them out of {rows_in(campaign)}: no number of their run would hold"
     )
 
 

@@ -12,9 +12,11 @@ clampings have no common frame: ``record`` says which record is read, or that al
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.cut_files import CUT, is_cut
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import foreign_unit
@@ -34,31 +36,45 @@ _NAME, _NOMINAL, _UNIT, _VALUE, _ATTRIBUTE, _DATE = "2002", "2101", "2142", "000
 
 @dataclass
 class _Part:
-    """What has been read: fields of each characteristic by its number, and its values with their lines."""
+    """What has been read: fields of each characteristic by its number, its values with their lines, the records that
+    its attributes mark invalid, and of each line of values how many fields every one of them has."""
 
     fields: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
     values: dict[int, list[tuple[str, int]]] = field(default_factory=dict)
-    facts: list[tuple[str, str]] = field(default_factory=list)
+    facts: list[Fact] = field(default_factory=list)
     started: dict[int, str] = field(default_factory=dict)
+    invalid: dict[int, dict[int, str]] = field(default_factory=dict)
+    lines: dict[int, list[int]] = field(default_factory=dict)
 
     def text(self, key: str, number: int) -> str | None:
         """Return a field of a characteristic, or that of all of them."""
         entry = self.fields.get((key, number)) or self.fields.get((key, 0))
         return None if entry is None else entry[0]
 
+    def mark(self, number: int, record: int, attribute: str) -> None:
+        """Note that a record of a characteristic does not count."""
+        self.invalid.setdefault(number, {})[record] = f"attribute K0002 = {attribute}"
+
     def add(self, number: int, cells: list[str], line: int) -> str | None:
         """Note a value with its attribute and date; what is wrong with it."""
         value = cells[0].strip()
         attribute = cells[1].strip() if len(cells) > 1 else ""
-        if attribute.isdigit() and int(attribute) >= _INVALID:
+        if is_invalid(attribute):
+            self.mark(number, len(self.values.get(number, ())), attribute)
             value = ""
-        elif not _NUMBER.fullmatch(value):
+        elif value and not _NUMBER.fullmatch(value):
+            # An empty one may be marked invalid on the line below.
             return f"{quoted(value)} is not a value; attributive characteristics have none"
         of_number = self.values.setdefault(number, [])
         if len(cells) > 2 and cells[2].strip():
             self.started.setdefault(len(of_number), cells[2].strip().replace("/", " "))
         of_number.append((value.replace(",", "."), line))
         return None
+
+
+def is_invalid(attribute: str) -> bool:
+    """Return whether an attribute says that the value beside it does not count."""
+    return attribute.isdigit() and int(attribute) >= _INVALID
 
 
 def settings(table: Table) -> int | str | None:
@@ -78,6 +94,10 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
     if decoded is None:
         return None
     before = len(faults)
+    coded = "\n".join(line for line in decoded[0].split("\n") if line.startswith(f"K{_VALUE}"))
+    if coded and decoded[0].endswith(coded.rpartition("\n")[2]) and is_cut(coded):
+        faults.add(file.name, decoded[0].count("\n") + 1, None, CUT)
+        return None
     part = _Part()
     for number, line in enumerate(decoded[0].split("\n"), start=1):
         if line.strip():
@@ -91,7 +111,21 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
     if len(faults) > before:
         return None
     points = _points(part, file.name, decoded[1], record, faults)
-    return None if len(faults) > before else points or _table(part, decoded[1])
+    export = points or _table(part, decoded[1])
+    return None if len(faults) > before else replace(export, notes=_unmeasured(part))
+
+
+def _unmeasured(part: _Part) -> tuple[str, ...]:
+    """Return a sentence on the last characteristics where they are named and have no value."""
+    named = {number for key, number in part.fields if key == _NAME}
+    most = max(part.values)
+    if most >= max(named, default=0):
+        return ()
+    line = part.fields[_NAME, min(number for number in named if number > most)][1]
+    return (
+        f"characteristics from {most + 1} on (line {line}) are named and have no value: were they measured, "
+        "the file is cut",
+    )
 
 
 def _line(part: _Part, line: str, number: int) -> str | None:
@@ -105,19 +139,21 @@ def _line(part: _Part, line: str, number: int) -> str | None:
     if key == _VALUE:
         return part.add(which, [value], number)
     if key == _ATTRIBUTE and part.values.get(which):
-        if value.isdigit() and int(value) >= _INVALID:
+        if is_invalid(value):
             part.values[which][-1] = ("", part.values[which][-1][1])
+            part.mark(which, len(part.values[which]) - 1, value)
         return None
     if key == _DATE:
         part.started.setdefault(max(len(part.values.get(which, ())) - 1, 0), value.replace("/", " "))
     elif key.startswith("1") and value:
-        part.facts.append((f"K{key}", value))
+        part.facts.append(Fact(f"K{key}", value, number))
     part.fields[key, which] = (value, number)
     return None
 
 
 def _values(part: _Part, line: str, number: int) -> str | None:
     """Read a line of values, one a characteristic; what is wrong with it."""
+    part.lines[number] = [value.count("\x14") + 1 for value in line.split("\x0f")]
     for index, value in enumerate(line.split("\x0f"), start=1):
         if index > _MOST:
             return "the line has more characteristics than any part"
@@ -134,6 +170,15 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
             name, 1, None, "the file has no value; export the measurement with its values, not the test plan"
         )
         return
+    for number, values in part.values.items():
+        for record, (value, line) in enumerate(values):
+            if not value and record not in part.invalid.get(number, {}):
+                faults.add(
+                    name, line, None,
+                    f"characteristic {number} has no value here and no attribute that marks it invalid (K0002 = 255); "
+                    "export the measurement again",
+                )  # fmt: skip
+                return
     stated = part.fields.get(("0100", 0))
     named = {number for key, number in part.fields if key == _NAME}
     if stated is not None and stated[0].isdigit() and int(stated[0]) != len(named):
@@ -143,6 +188,7 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
             "K0100",
             f"{stated[0]} characteristics are announced and {len(named)} named; the file is cut",
         )
+    _whole_line(part, named, name, faults)
     nameless = sorted(set(part.values) - named)
     if nameless:
         line = part.values[nameless[0]][0][1]
@@ -157,6 +203,25 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
             name, part.values[short][-1][1], None,
             f"characteristic {short} has {counts[short]} values where others have {most}; the file is cut",
         )  # fmt: skip
+
+
+def _whole_line(part: _Part, named: set[int], name: str, faults: Faults) -> None:
+    """Refuse lines of values that end before the last characteristic, or within the fields of the last value."""
+    for line, fields in part.lines.items():
+        if len(fields) < max(named, default=0):
+            faults.add(
+                name, line, None,
+                f"the line has values of {len(fields)} characteristics where {max(named)} are named; the file is cut "
+                "here: export it again",
+            )  # fmt: skip
+            return
+        if len(fields) > 1 and fields[-1] < min(fields[:-1]):
+            faults.add(
+                name, line, None,
+                f"the last value of the line has {fields[-1]} fields where the others have {min(fields[:-1])}; the "
+                "file is cut here: export it again",
+            )  # fmt: skip
+            return
 
 
 def _coordinates(part: _Part) -> dict[str, dict[str, int]] | None:
@@ -208,6 +273,7 @@ def _points(part: _Part, name: str, layout: str, record: int | str | None, fault
         return None
     columns: dict[str, list[str]] = {}
     lines: list[int] = []
+    invalid: dict[str, dict[int, str]] = {}
     records = _records(part, name, record, faults)
     if not records:
         return None
@@ -218,27 +284,39 @@ def _points(part: _Part, name: str, layout: str, record: int | str | None, fault
                 nominal = (part.text(_NOMINAL, number) or "").replace(",", ".")
                 columns.setdefault(letter, []).append(part.values[number][visit][0])
                 columns.setdefault(f"nominal_{letter}", []).append(nominal)
+                if visit in part.invalid.get(number, {}):
+                    why = f"{part.invalid[number][visit]} of {target}"
+                    invalid.setdefault(letter, {})[len(lines)] = why
             lines.append(part.values[min(numbers.values())][visit][1])
-    columns = {key: cells for key, cells in columns.items() if any(cells)}
+    columns = _without_empty(columns, invalid)
     unit = next(iter(units)) or ""
     stated = dict.fromkeys(columns.keys() - {"target"}, unit) if foreign_unit(unit) else {}
     started = next((part.started[visit] for visit in records if visit in part.started), None)
-    return Export(columns, stated, lines, layout, tuple(part.facts), started)
+    return Export(columns, stated, lines, layout, tuple(part.facts), started, invalid=invalid)
+
+
+def _without_empty(
+    columns: Mapping[str, list[str]], invalid: Mapping[str, Mapping[int, str]]
+) -> dict[str, list[str]]:
+    """Return the columns that have a cell, or whose cells are marked invalid."""
+    return {key: cells for key, cells in columns.items() if any(cells) or key in invalid}
 
 
 def _table(part: _Part, layout: str) -> Export:
     columns: dict[str, list[str]] = {}
     units: dict[str, str] = {}
+    invalid: dict[str, dict[int, str]] = {}
     for number in sorted(part.values):
         label = part.text(_NAME, number) or str(number)
         label = label if label not in columns else f"{label} {number}"
+        invalid[label] = part.invalid.get(number, {})
         columns[label] = [value for value, _ in part.values[number]]
         unit = part.text(_UNIT, number)
         if unit is not None and foreign_unit(unit) is not None:
             units[label] = unit
     lines = [line for _, line in part.values[min(part.values)]]
     started = part.started[min(part.started)] if part.started else None
-    return Export(columns, units, lines, layout, tuple(part.facts), started)
+    return Export(columns, units, lines, layout, tuple(part.facts), started, invalid=invalid)
 
 
 EXPORT = ExportFormat(

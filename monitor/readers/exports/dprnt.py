@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.toml_table import Table
@@ -25,6 +25,18 @@ _ROW = re.compile(rf"(?:{_WORD.pattern}[\s,;*]*)+")
 _BEGINS = re.compile(r"[A-Z]{1,2}\s*=?\s*[+-]?[0-9]*\.[0-9]")
 #: A power of ten behind a number, which would read as a letter of its own.
 _POWER = re.compile(r"[0-9.]+E[+-]?[0-9]{1,3}(?=[A-Z\s,;*]|$)")
+#: Text of the macro itself, and a bracket where a number should stand.
+_PROGRAM = re.compile(
+    r"\bB?D?PRNT\s*\[|\bP(?:OPEN|CLOS)\b|\bIF\s*\[|#[0-9]{1,5}\s*(?:=|\[[0-9]{2}\])", re.IGNORECASE
+)
+_BRACKET = re.compile(r"(?:^|[\s,;0-9.])[A-Z]{1,2}\s*=?\s*[\[({<]\s*[#+-]?\s*[0-9.]")
+_COMMA = re.compile(r"(?:^|[\s;])[A-Z]{1,2}\s*=?\s*[+-]?[0-9]+,[0-9]")
+#: What a serial line and a punch add to a log: DC1 to DC4 of POPEN and PCLOS, and empty places before and behind it.
+_SERIAL, _LEADER = b"\x11\x12\x13\x14", b"\x00"
+#: The mark that POPEN and PCLOS print around a log.
+_MARK = "%"
+#: Longest line that is shown as part of the log.
+LONGEST_FACT = 80
 _UNITS = {"G20": "inch", "INCH": "inch", "G70": "inch", "G21": "mm", "MM": "mm", "G71": "mm", "METRIC": "mm"}
 _UNIT = re.compile(r"\b(G20|G21|G70|G71|INCH|MM|METRIC)\b")
 _LENGTHS = frozenset("XYZUVWIJKDR")
@@ -54,98 +66,140 @@ def settings(table: Table) -> WordSettings:
 
 def read(file: ExportFile, how: WordSettings, faults: Faults) -> Export | None:
     """Read the lines of words; None with the faults noted."""
-    decoded = decode_foreign(file.name, file.content, faults)
+    content = file.content.strip(_LEADER).translate(None, delete=_SERIAL)
+    decoded = decode_foreign(file.name, content, faults)
     if decoded is None:
         return None
-    rows: list[tuple[int, dict[str, str]]] = []
-    facts: list[tuple[str, str]] = []
-    units: dict[str, int] = {}
-    started = None
+    log = _Log(file.name)
     for number, line in enumerate(decoded[0].split("\n"), start=1):
-        text = line.strip().strip("%").strip()
-        if not text:
-            continue
-        for name in _UNIT.findall(text.upper()):
-            units.setdefault(_UNITS[name], number)
-        body = _UNIT.sub("", text.upper()).strip()
-        if "E" not in how.letters and _ROW.fullmatch(body) and (power := _POWER.search(body)):
-            faults.add(
-                file.name, number, None,
-                f"{quoted(power[0])} may be a power of ten or a number with the letter E behind it; print decimals, or "
-                'name the letter in the mapping: words = ["X", "E"]',
-            )  # fmt: skip
+        text = line.strip().strip(_MARK).strip()
+        log.marks += line.strip() == _MARK
+        fault = _line(log, how, number, text) if text else None
+        if fault is not None:
+            faults.add(file.name, number, None, fault)
             return None
-        if _ROW.fullmatch(body):
-            pairs = _WORD.findall(body)
-            if len({letter for letter, _ in pairs}) < len(pairs):
-                faults.add(
-                    file.name,
-                    number,
-                    None,
-                    f"{quoted(text)} has a letter twice; print each value under its own",
-                )
-                return None
-            rows.append((number, dict(pairs)))
-            continue
-        if _BEGINS.match(body):
-            faults.add(
-                file.name, number, None, f"{quoted(text)} is damaged: a row has a number behind every letter"
-            )
-            return None
-        if date := _DATE.search(text):
-            started = date[1].strip("() ")
-        facts.append(("log", text[:80]))
-    if len(units) > 1:
-        first, second = units
+    if len(log.units) > 1:
+        first, second = log.units
         faults.add(
-            file.name, units[second], None,
-            f"the log goes from {first} (line {units[first]}) to {second}; measure and print in one unit",
+            file.name, log.units[second], None,
+            f"the log goes from {first} (line {log.units[first]}) to {second}; measure and print in one unit",
         )  # fmt: skip
         return None
-    return _export(file.name, how, rows, facts, next(iter(units), None), decoded[1], started, faults)
+    return _export(log, how, decoded[1], faults)
 
 
-def _export(
-    name: str,
-    how: WordSettings,
-    rows: list[tuple[int, dict[str, str]]],
-    facts: list[tuple[str, str]],
-    unit: str | None,
-    layout: str,
-    started: str | None,
-    faults: Faults,
-) -> Export | None:
-    if not rows:
-        faults.add(
-            name,
-            1,
-            None,
-            "no line has letters with numbers, such as X123.4567 Y-12.0; is it that log?",
-        )
+@dataclass
+class _Log:
+    """What was read of a log: its rows by line, other lines, its units by the line that says them, the date, and how
+    many lines are the mark of its ends."""
+
+    name: str
+    rows: list[tuple[int, dict[str, str]]] = field(default_factory=list)
+    facts: list[Fact] = field(default_factory=list)
+    units: dict[str, int] = field(default_factory=dict)
+    started: str | None = None
+    marks: int = 0
+
+
+def _line(log: _Log, how: WordSettings, number: int, text: str) -> str | None:
+    """Read one line; what is wrong with it."""
+    for name in _UNIT.findall(text.upper()):
+        log.units.setdefault(_UNITS[name], number)
+    body = _UNIT.sub("", text.upper()).strip()
+    if _ROW.fullmatch(body):
+        if "E" not in how.letters and (power := _POWER.search(body)):
+            return (
+                f"{quoted(power[0])} may be a power of ten or a number with the letter E behind it; print decimals, or "
+                'name the letter in the mapping: words = ["X", "E"]'
+            )
+        pairs = _WORD.findall(body)
+        if len({letter for letter, _ in pairs}) < len(pairs):
+            return f"{quoted(text)} has a letter twice; print each value under its own"
+        log.rows.append((number, dict(pairs)))
         return None
-    letters = how.letters or Counter(tuple(row) for _, row in rows).most_common(1)[0][0]
-    taken = [(number, row) for number, row in rows if set(letters) <= set(row)]
-    others = [(number, row) for number, row in rows if not set(letters) <= set(row)]
+    if _BEGINS.match(body):
+        return f"{quoted(text)} is damaged: a row has a number behind every letter"
+    if date := _DATE.search(text):
+        log.started = date[1].strip("() ")
+    log.facts.append(Fact("log", text[:LONGEST_FACT], number))
+    return None
+
+
+def _export(log: _Log, how: WordSettings, layout: str, faults: Faults) -> Export | None:
+    if not log.rows:
+        _note_without_rows(log, faults)
+        return None
+    letters = how.letters or Counter(tuple(row) for _, row in log.rows).most_common(1)[0][0]
+    if _has_damaged_row(log.name, letters, log.facts, faults):
+        return None
+    taken = [(number, row) for number, row in log.rows if set(letters) <= set(row)]
+    others = [(number, row) for number, row in log.rows if not set(letters) <= set(row)]
     if others and not how.letters:
         number, row = others[0]
         faults.add(
-            name, number, None,
+            log.name, number, None,
             f"the line has {one_of(row)} where others have {one_of(letters)}; the log is cut here, or say in the "
             f"mapping which lines are rows: words = {list(letters)}",
         )  # fmt: skip
         return None
     if not taken:
         faults.add(
-            name,
-            rows[0][0],
-            None,
-            f"no line has all of {one_of(letters)}; the first has {one_of(rows[0][1])}",
-        )
+            log.name, log.rows[0][0], None,
+            f"no line has all of {one_of(letters)}; the first has {one_of(log.rows[0][1])}",
+        )  # fmt: skip
         return None
     columns = {letter: [row[letter] for _, row in taken] for letter in letters}
-    notes = (f"{len(others)} lines without {one_of(letters)} were passed over",) if others else ()
+    units = _units_of(letters, next(iter(log.units), None))
     lines = [number for number, _ in taken]
-    return Export(columns, _units_of(letters, unit), lines, layout, tuple(facts), started, notes)
+    notes = _notes(log, len(others), letters)
+    return Export(columns, units, lines, layout, tuple(log.facts), log.started, notes)
+
+
+def _note_without_rows(log: _Log, faults: Faults) -> None:
+    """Note a log without a row, by the line that shows why where one does."""
+    said = ((fact.line, _instead_of_numbers(fact.value)) for fact in log.facts)
+    line, what = next((pair for pair in said if pair[1] is not None), (1, None))
+    other = "no line has letters with numbers, such as X123.4567 Y-12.0; is it that log?"
+    faults.add(log.name, line, None, what or other)
+
+
+def _notes(log: _Log, others: int, letters: Sequence[str]) -> tuple[str, ...]:
+    """Return sentences on rows that were passed over, and on a log without its end."""
+    notes = []
+    if others:
+        notes.append(f"{others} lines without {one_of(letters)} were passed over")
+    if log.marks % 2:
+        notes.append(f"the log has {_MARK} at one end only, which POPEN and PCLOS print at both: is it cut?")
+    return tuple(notes)
+
+
+def _instead_of_numbers(text: str) -> str | None:
+    """Say what stands behind the letters of a line where numbers should; None where no letter has such."""
+    if _PROGRAM.search(text):
+        return (
+            f"{quoted(text)} is a line of the macro, not of what it printed: give the file that the control wrote "
+            "between POPEN and PCLOS"
+        )
+    if _BRACKET.search(text.upper()):
+        return (
+            f"{quoted(text)} has a bracket behind a letter, where the number should stand: print the value itself, "
+            "DPRNT[X#101[44]] prints X123.4567"
+        )
+    if _COMMA.search(text.upper()):
+        return f"{quoted(text)} has a comma within a number: print decimal points, as DPRNT does"
+    return None
+
+
+def _has_damaged_row(name: str, letters: Sequence[str], facts: Sequence[Fact], faults: Faults) -> bool:
+    """Whether a line that is no row names all letters of one and nothing else: the first is noted by its line."""
+    row = re.compile("".join(rf"{letter}[^A-Z]*" for letter in letters))
+    for fact in facts:
+        bracket = _instead_of_numbers(fact.value)
+        if bracket is not None or row.fullmatch(fact.value.upper()):
+            wrong = f"{quoted(fact.value)} is damaged: a row has a number behind every letter"
+            faults.add(name, fact.line, None, bracket or f"{wrong}, an empty variable prints none")
+            return True
+    return False
 
 
 def _units_of(letters: Sequence[str], unit: str | None) -> dict[str, str]:

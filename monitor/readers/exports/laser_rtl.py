@@ -8,14 +8,21 @@ line is run, number of the target, deviation. The file states no units.
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import decimal_of
 
+#: Run, number of the target, deviation, line.
+Row = tuple[int, int, str, int]
 _SECTION = re.compile(r"\s*([A-Za-z][A-Za-z0-9 _-]*?)\s*::\s*")
 _FACT = re.compile(r"\s*([A-Za-z][\w /.-]*?)\s*:\s*(.*?)\s*")
+#: A line of numbers, as targets and deviations are.
+_NUMBERS = re.compile(r"[ \t0-9.+-]+")
 _COUNT = re.compile(r"[0-9]{1,6}")
 _DATE = "date"
 
@@ -23,11 +30,13 @@ _DATE = "date"
 class _Parser:
     """What has been read of a file so far, section by section."""
 
-    def __init__(self, name: str, faults: Faults) -> None:
+    def __init__(self, name: str, faults: Faults, decimal: str) -> None:
         self.name, self.faults = name, faults
+        #: What a comma is: a point where the file has no other decimal mark, else itself, which no number has.
+        self.decimal = decimal
         self.targets: list[str] = []
-        self.rows: list[tuple[int, int, str, int]] = []
-        self.facts: list[tuple[str, str]] = []
+        self.rows: list[Row] = []
+        self.facts: list[Fact] = []
         self.counts: dict[str, tuple[int, int]] = {}
         self.sections: list[str] = []
         self._below = ""
@@ -37,6 +46,11 @@ class _Parser:
         if not text.strip():
             return
         if section := _SECTION.fullmatch(text):
+            if section[1].upper() == "HEADER" and self.sections:
+                self.faults.add(
+                    self.name, number, None,
+                    "a second measurement begins here (HEADER::); split the file, and give each part its run",
+                )  # fmt: skip
             self.sections.append(section[1].upper())
             self._below = ""
         elif not self.sections:
@@ -61,10 +75,10 @@ class _Parser:
             else:
                 self.faults.add(self.name, number, key, f"{quoted(value)} is no number of targets or runs")
         elif value and not self._below:
-            self.facts.append((key, value))
+            self.facts.append(Fact(key, value, number))
 
     def _targets(self, number: int, text: str) -> None:
-        for cell in text.split():
+        for cell in text.replace(",", self.decimal).split():
             if decimal_of(cell) is None:
                 self.faults.add(
                     self.name, number, "Targets", f"{quoted(cell)} is not a number; export the file again"
@@ -72,7 +86,7 @@ class _Parser:
             self.targets.append(cell)
 
     def _deviation(self, number: int, text: str) -> None:
-        cells = text.split()
+        cells = text.replace(",", self.decimal).split()
         if (
             len(cells) != 3
             or not all(_COUNT.fullmatch(cell) for cell in cells[:2])
@@ -92,24 +106,46 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
     if decoded is None:
         return None
     before = len(faults)
-    parser = _Parser(file.name, faults)
-    for number, line in enumerate(decoded[0].split("\n"), start=1):
+    text_lines = decoded[0].split("\n")
+    has_points = any("." in line and _NUMBERS.fullmatch(line) for line in text_lines)
+    parser = _Parser(file.name, faults, "," if has_points else ".")
+    for number, line in enumerate(text_lines, start=1):
         parser.line(number, line)
-        if len(faults) > before + 50:
+        if len(faults) > before + 50 or parser.sections.count("HEADER") > 1:
             break
     if len(faults) == before:
         _complete(parser, file.name, faults)
     if len(faults) > before:
         return None
-    runs, numbers, deviations, lines = zip(*parser.rows, strict=True)
+    rows, notes = _measured(parser.rows)
+    runs, numbers, deviations, lines = zip(*rows, strict=True)
     columns = {
         "run": [str(run) for run in runs],
         "target number": [str(number) for number in numbers],
         "position": [parser.targets[number - 1] for number in numbers],
         "deviation": list(deviations),
     }
-    started = next((value for key, value in parser.facts if key.casefold() == _DATE), None)
-    return Export(columns, {}, lines, decoded[1], tuple(parser.facts), started)
+    started = next((fact.value for fact in parser.facts if fact.key.casefold() == _DATE), None)
+    return Export(columns, {}, lines, decoded[1], tuple(parser.facts), started, notes)
+
+
+def _measured(rows: Sequence[Row]) -> tuple[Sequence[Row], tuple[str, ...]]:
+    """Return the rows without runs whose every deviation is exactly zero, and a sentence on these.
+
+    Programs that number each way as a run of its own fill the way back of a one-way measurement with zeros.
+    """
+    zero = {
+        run for run in {row[0] for row in rows}
+        if sum(row[0] == run for row in rows) > 2 and not any(Decimal(row[2]) for row in rows if row[0] == run)
+    }  # fmt: skip
+    measured = [row for row in rows if row[0] not in zero]
+    if not zero or not measured:
+        return rows, ()
+    runs = ", ".join(map(str, sorted(zero)))
+    return measured, (
+        f"{len(rows) - len(measured)} rows are left out: every deviation of run {runs} is 0, which is the way back "
+        "that nobody measured",
+    )
 
 
 def _complete(parser: _Parser, name: str, faults: Faults) -> None:
@@ -160,6 +196,32 @@ def _visited(parser: _Parser, name: str, faults: Faults) -> None:
                 "Run Target Data",
                 f"run {run} lacks target {shown}; the file is cut: export it again",
             )
+    if not len(faults):
+        _as_often(parser, name, visits, faults)
+
+
+def _as_often(parser: _Parser, name: str, visits: Mapping[tuple[int, int], int], faults: Faults) -> None:
+    """Refuse a run that passes a target less often than another run does, and one that turns back in its midst.
+
+    The targets at the ends may be passed once where all others are passed twice: the axis turns there.
+    """
+    numbers = range(1, len(parser.targets) + 1)
+    passes = {run: tuple(visits[run, number] for number in numbers) for run, *_ in parser.rows}
+    usual = max(Counter(passes.values()).items(), key=lambda counted: (sum(counted[0]), counted[1]))[0]
+    inner = usual[1:-1] or usual
+    for run, counts in passes.items():
+        few = [number for number, count, often in zip(numbers, counts, usual, strict=True) if count < often]
+        if not few and len(set(inner)) > 1:
+            few = [number for number, count in enumerate(inner, start=2) if count < max(inner)]
+        if few:
+            line = max(line for of_run, _, _, line in parser.rows if of_run == run)
+            shown = ", ".join(map(str, few[:5])) + (", ..." if len(few) > 5 else "")
+            faults.add(
+                name, line, "Run Target Data",
+                f"run {run} ends here and has target {shown} once, where others are passed twice: the file is cut; "
+                "export it again, or leave this run out and write its Run-count",
+            )  # fmt: skip
+            return
 
 
 EXPORT = ExportFormat(

@@ -10,9 +10,10 @@ Source: the manuals of the TNC controls, "Recording the results of measurement",
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_text import decode_foreign
 
@@ -37,6 +38,7 @@ class _Record:
     ended: bool = False
     heading: str = ""
     waiting: str = ""
+    twice: str | None = None
 
     def read(self, text: str) -> None:
         """Read one line: a heading, a key with its value, or the value of the key above."""
@@ -57,8 +59,21 @@ class _Record:
             else:
                 self.texts[pair[1]] = pair[2]
 
+    def facts(self) -> tuple[Fact, ...]:
+        """Return its heading and its words."""
+        return (Fact("protocol", self.title, self.line), *(Fact(*text) for text in self.texts.items()))
+
     def _note(self, key: str, number: str) -> None:
-        self.cells[f"{self.heading}/{key}" if self.heading else key] = number
+        name = f"{self.heading}/{key}" if self.heading else key
+        if self.cells.setdefault(name, number) != number:
+            self.twice = name
+
+    def no_number(self, names: Iterable[str]) -> tuple[str, str] | None:
+        """Return the first of the names under which this protocol has a text instead, and that text."""
+        lacking = (name for name in names if name not in self.cells)
+        return next(
+            ((name, text) for name in lacking if (text := self.texts.get(name.rpartition("/")[2]))), None
+        )
 
 
 def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
@@ -85,7 +100,7 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
     date = " ".join(value for key, value in first.texts.items() if key.casefold() in _DATES)
     return Export(
         columns, {name: unit for name, unit in stated.items() if unit}, [record.line for record in records],
-        decoded[1], (("protocol", first.title), *first.texts.items()), date or None,
+        decoded[1], first.facts(), date or None,
     )  # fmt: skip
 
 
@@ -106,7 +121,21 @@ def _sound(name: str, records: list[_Record], faults: Faults) -> bool:
     """Refuse protocols that are cut, of other cycles than the first, or in another unit."""
     before = len(faults)
     first = records[0]
+    names = dict.fromkeys(name for record in records for name in record.cells)
     for record in records:
+        if record.twice is not None:
+            faults.add(
+                name, record.line, None,
+                f"{quoted(record.twice)} stands twice in this protocol with two values; write the log again",
+            )  # fmt: skip
+            return False
+        if (odd := record.no_number(names)) is not None:
+            faults.add(
+                name, record.line, None,
+                f"{quoted(odd[0])} of this protocol is {quoted(odd[1])} and no number; measure this point again, or "
+                "take its protocol out",
+            )  # fmt: skip
+            return False
         if not record.ended:
             faults.add(
                 name, record.line, None, 'this protocol has no end mark ("End of measuring log"): it is cut'

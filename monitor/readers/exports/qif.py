@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.foreign_units import ForeignUnit, decimal_of, foreign_unit
 
@@ -94,7 +94,7 @@ def _export(document: _Document, rows: list[dict[str, str]], lines: list[int]) -
     units = {} if document.unit is None else dict.fromkeys(set(keys) - {"target"}, document.unit)
     label, count = Counter(columns["target"]).most_common(1)[0]
     notes = (f"{quoted(label)} is measured {count} times",) if count > 1 else ()
-    facts = [(name, text) for name in _FACTS if (text := _first(document.root, name))]
+    facts = [Fact(name, text) for name in _FACTS if (text := _first(document.root, name))]
     layout = f"XML, QIF {document.root.get('versionQIF') or '3'}"
     return Export(columns, units, lines, layout, tuple(facts), _started(document.root), notes)
 

@@ -22,13 +22,19 @@ from monitor.readers.delimited import (
     separator_of,
     with_points,
 )
-from monitor.readers.export import Export, ExportFile, ExportFormat
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import foreign_unit
 from monitor.readers.toml_table import Table
 from monitor.readers.workbook import read_sheet
 
+#: Words that begin a line below a table and are a result over its rows.
+_RESULTS = frozenset((
+    "mean", "average", "avg", "max", "maximum", "min", "minimum", "range", "sum", "total", "totals", "median", "rms",
+    "std", "stdev", "std dev", "std.dev", "standard deviation", "sigma", "peak to peak", "mittel", "mittelwert",
+    "summe", "gesamt", "spannweite", "streuung", "standardabweichung", "durchschnitt", "mw",
+))  # fmt: skip
 _WORKBOOKS = (".xlsx", ".xlsm")
 #: What a date at the head of an export is called.
 _DATES = ("date", "datum", "date/time", "started", "start", "time", "measured", "messdatum")
@@ -105,19 +111,32 @@ def read_text(
     separator = style.separator or separator_of(lines)
     begin = None if separator is None else first_row(lines, separator)
     if separator is None or begin is None:
-        faults.add(
-            name, 1, None,
+        line, cell = _with_its_unit(lines)
+        what = (
             "there is no table of numbers in the first 400 lines; say in the mapping how it is written: separator = "
-            '"semicolon", header_line = 12',
-        )  # fmt: skip
+            '"semicolon", header_line = 12'
+        )
+        if cell is not None:
+            what = (
+                f"{quoted(cell)} has its unit behind the number; export numbers alone, with the unit in the header: "
+                "Position [mm]"
+            )
+        faults.add(name, line, None, what)
         return None
+    before = len(faults)
     head = _head(name, lines, separator, begin, header_line, faults)
+    if len(faults) > before:
+        return None
     rows, at = _rows(name, lines, separator, head, faults)
     if not rows:
         return None
     plain, decimal = with_points(name, rows, at, Style(separator, style.decimal), faults)
-    facts = tuple(fact for line in lines[: head.header] if (fact := fact_of(line)) is not None)
-    started = next((value for key, value in facts if key.casefold() in _DATES), None)
+    facts = tuple(
+        Fact(*fact, number)
+        for number, line in enumerate(lines[: head.header], start=1)
+        if (fact := fact_of(line)) is not None
+    )
+    started = next((fact.value for fact in facts if fact.key.casefold() in _DATES), None)
     columns = dict(zip(head.names, zip(*plain, strict=True), strict=True))
     layout = f"{encoding}, {Style(separator, decimal)}"
     return Export(columns, head.units, at, layout, facts, started, tuple(_repeated(plain, at)))
@@ -184,22 +203,64 @@ def _rows(
     name: str, lines: Sequence[str], separator: str, head: _Head, faults: Faults
 ) -> tuple[list[list[str]], list[int]]:
     width = len(head.names)
+    titles = _padded(cells_of(lines[head.header], separator), width) if head.header < head.begin else None
     rows: list[list[str]] = []
     at: list[int] = []
     for number, line in enumerate(lines[head.begin :], start=head.begin + 1):
         if not line.strip(" \t;,"):
             continue
         cells = _padded(cells_of(line, separator), width)
+        if titles is not None and _names(cells) == _names(titles):
+            faults.add(
+                name, number, None,
+                f"the header of line {head.header + 1} stands here again: two measurements are joined; split the file "
+                "here, and give each part its run",
+            )  # fmt: skip
+            return [], []
         if len(cells) == width:
             rows.append(cells)
             at.append(number)
         else:
             faults.add(
                 name, number, None,
-                f"{len(cells)} cells where the table has {width}; the file is cut here, or something else than a row "
-                "stands here: remove the line or export again",
+                f"{len(cells)} {'cell' if len(cells) == 1 else 'cells'} where the table has {width}; the file is cut "
+                "here, or something else than a row stands here: remove the line or export again",
             )  # fmt: skip
+    for row, number in zip(rows, at, strict=True):
+        if (word := _summing(row)) is not None:
+            faults.add(
+                name, number, None,
+                f"{quoted(word)} begins a line of results and no row; remove it and those like it, or export the rows "
+                "alone",
+            )  # fmt: skip
+            break
     return rows, at
+
+
+def _names(cells: Sequence[str]) -> list[str]:
+    """Return the names of a header without their units, in small letters."""
+    return [name_and_unit(cell)[0].casefold() for cell in cells]
+
+
+def _summing(row: Sequence[str]) -> str | None:
+    """Return the word that makes a row a result over the others, in its first cell that is not empty."""
+    first = next((cell for cell in row if cell), "")
+    return first if first.strip(" :=.").casefold() in _RESULTS else None
+
+
+def _with_its_unit(lines: Sequence[str]) -> tuple[int, str | None]:
+    """Return the first line with two numbers or more that have their unit behind them, and the first of these."""
+    for number, line in enumerate(lines[:400], start=1):
+        for separator in SEPARATORS.values():
+            cells = [cell for cell in cells_of(line, separator) if _is_with_unit(cell)]
+            if len(cells) > 1:
+                return number, cells[0]
+    return 1, None
+
+
+def _is_with_unit(cell: str) -> bool:
+    number, _, unit = cell.partition(" ")
+    return is_number(number) and foreign_unit(unit) is not None
 
 
 def _padded(cells: list[str], width: int) -> list[str]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from decimal import Decimal
 
 from monitor.readers.faults import quoted
 
@@ -17,8 +19,10 @@ _NAMED = re.compile(
     r"(?:[A-Za-z]{2,9},?\s+)?(?P<day>[0-9]{1,2})[. -]+(?P<month>[A-Za-zäÄ]{3,9})[. -]+(?P<year>[0-9]{4})(?P<rest>.*)"
 )
 _TIME = re.compile(
-    r"[\sT,/]*(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(:(?P<second>[0-9]{2})([.,][0-9]+)?)?\s*(?P<half>[AaPp][Mm])?\s*(?P<offset>Z|[+-][0-9]{2}:?[0-9]{2})?\s*"
+    r"[\sT,/]*(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(:(?P<second>[0-9]{2})(?P<part>[.,][0-9]+)?)?\s*(?P<half>[AaPp][Mm])?\s*(?P<offset>Z|[+-][0-9]{2}:?[0-9]{2})?\s*"
 )
+#: Seconds of a day.
+_DAY = 86_400
 #: English and German, by their first three letters.
 _MONTHS = {
     name: number
@@ -75,7 +79,15 @@ class Dates:
                 f"{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}{offset}"
             )
         except ValueError:
+            return self._no_date(text)
+
+    def _no_date(self, text: str) -> str:
+        if self.order is None:
             return f"{quoted(text)} is no date and time; write started_at of [[runs]]"
+        return (
+            f"{quoted(text)} is no date in the order {self.order} that [dates] of the mapping says; correct order, or "
+            "write started_at of [[runs]]"
+        )
 
     def _date(self, text: str) -> tuple[int, int, int, str] | str:
         """Return year, month, day and the rest of the text, or what is wrong."""
@@ -100,6 +112,43 @@ class Dates:
             f'{quoted(text)} may be day and month or month and day; write [dates] order = "day-month-year" or '
             '"month-day-year" in the mapping, or started_at of [[runs]]'
         )
+
+
+def clock_seconds(cells: Sequence[str]) -> list[str] | None:
+    """Return seconds from the first of times of day, or of dates with times as ISO 8601 has them; None for others.
+
+    Times of day that fall by more than half a day went past midnight.
+    """
+    days = 0
+    seconds: list[Decimal] = []
+    for cell in cells:
+        moment = _clock(cell.strip())
+        if moment is None:
+            return None
+        if seconds and moment + days * _DAY < seconds[-1] - _DAY // 2:
+            days += 1
+        seconds.append(moment + days * _DAY)
+    return [f"{second - seconds[0]:f}" for second in seconds] if seconds else None
+
+
+def _clock(cell: str) -> Decimal | None:
+    """Return the seconds of a time of day, or of a date with its time; None for any other cell."""
+    if time := _TIME.fullmatch(cell):
+        hour = int(time["hour"])
+        if time["half"]:
+            hour = hour % 12 + (12 if time["half"].lower() == "pm" else 0)
+        part = (time["part"] or "").replace(",", ".")
+        return Decimal(hour * 3600 + int(time["minute"]) * 60 + int(time["second"] or 0)) + Decimal(
+            f"0{part}"
+        )
+    try:
+        moment = datetime.fromisoformat(cell.replace(",", "."))
+    except ValueError:
+        return None
+    if ":" not in cell:
+        return None
+    passed = moment - datetime(2000, 1, 1, tzinfo=moment.tzinfo)
+    return Decimal(passed.days * _DAY + passed.seconds) + Decimal(passed.microseconds) / 1_000_000
 
 
 def _only_order(first: int, second: int, mark: str) -> str | None:

@@ -21,6 +21,8 @@ from monitor.readers.registry import export_formats
 from monitor.readers.toml_table import Table
 
 FILE = "mapping.toml"
+#: The key that says which statements of a file's head are wrong, and what it may name.
+OVERRULED, STATED = "overruled", ("axis", "kind", "plane", "radius")
 _OFFSET = re.compile(r"[+-][0-9]{2}:[0-9]{2}|Z")
 #: Columns that this reader numbers itself.
 _NUMBERED = ("run", "sequence")
@@ -32,7 +34,8 @@ class Entry:
 
     ``pointing`` has the columns of angles that say where a line of sight pointed, None where no angles are mapped;
     ``where`` keeps the rows whose cells are those texts; ``positions`` is a file that says where the axes stood;
-    ``interval`` (s) is the time from row to row where no column has it; an ``optional`` entry may have no file.
+    ``interval`` (s) is the time from row to row where no column has it; an ``optional`` entry may have no file;
+    ``overruled`` is what the head of the file says wrongly, such as axis.
     ``table`` is for faults.
     """
 
@@ -48,6 +51,7 @@ class Entry:
     positions: str | None
     interval: float
     optional: bool
+    overruled: tuple[str, ...] = ()
 
     @property
     def angles(self) -> Mapping[str, ColumnSource]:
@@ -85,6 +89,7 @@ def _entry(table: Table) -> Entry | None:
     optional = table.raw("optional", required=False, example="true")
     if optional is not None and not isinstance(optional, bool):
         table.fault("optional", f"{quoted(optional)} is neither; write true or false")
+    overruled = _overruled(table)
     columns = _columns(table.table("columns"))
     pointing = read_pointing(table.table("direction"))
     where = _where(table.table("where"))
@@ -95,8 +100,21 @@ def _entry(table: Table) -> Entry | None:
     defaults = {name: ColumnSource(column) for name, column in form.columns.items() if name not in columns}
     return Entry(
         table, pattern, form, settings, setup, 1 if run is None else run, {**defaults, **columns}, pointing, where,
-        positions, interval or 1.0, bool(optional),
+        positions, interval or 1.0, bool(optional), overruled,
     )  # fmt: skip
+
+
+def _overruled(table: Table) -> tuple[str, ...]:
+    """Return what the mapping says that the head of the file is wrong in."""
+    overruled = table.raw(OVERRULED, required=False, example='["axis"]')
+    if overruled is None:
+        return ()
+    if not isinstance(overruled, list) or any(word not in STATED for word in overruled):
+        table.fault(
+            OVERRULED, f'{quoted(overruled)} is no list of {one_of(STATED)}; write for example ["axis"]'
+        )
+        return ()
+    return tuple(overruled)
 
 
 def _format(table: Table, pattern: str | None) -> ExportFormat | None:

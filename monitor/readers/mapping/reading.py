@@ -20,7 +20,9 @@ from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.mapping.mapping_file import FILE, Entry, ExportMapping, read_mapping
 from monitor.readers.mapping.pointing import DIRECTION
-from monitor.readers.mapping.rows import TARGET, TIME, Rows, Wanted, joined, rows_of
+from monitor.readers.mapping.positions import joined
+from monitor.readers.mapping.rows import TARGET, TIME, Rows, Wanted, rows_of
+from monitor.readers.mapping.stated import compare
 from monitor.readers.mapping.understood import UnderstoodFile, columns_of
 from monitor.readers.setups.file import FORMATS
 from monitor.readers.toml_table import parse_toml
@@ -36,6 +38,15 @@ class Exports:
     campaign: Campaign
     files: tuple[UnderstoodFile, ...]
     notes: tuple[str, ...]
+    parts: tuple[_Part, ...] = ()
+
+    def place(self, run: int, sequence: int) -> tuple[str, int] | None:
+        """Return the file and the line that a row came from; None where there is no such row."""
+        for part in self.parts:
+            if part.entry.run == run and sequence <= len(part.rows):
+                return part.file.name, int(part.rows.lines[sequence - 1])
+            sequence -= len(part.rows) if part.entry.run == run else 0
+        return None
 
 
 @dataclass(frozen=True)
@@ -78,7 +89,10 @@ def read_exports(mapping: Path, paths: Sequence[Path], name: str | None = None) 
     sources += [SourceFile(file.name, file.content) for file in files.values() if file.name in used]
     campaign = campaign_of(head, understood, tuple(sources))
     return Exports(
-        campaign, tuple(map(_understood, parts)), _notes(parts, [file for file in files if file not in used])
+        campaign,
+        tuple(map(_understood, parts)),
+        _notes(parts, [file for file in files if file not in used]),
+        tuple(parts),
     )
 
 
@@ -121,12 +135,22 @@ def _parts(read: ExportMapping, head: Head, files: Mapping[str, ExportFile], fau
             export = exports[key]
             if export is not None and entry.positions is not None:
                 export = _with_positions(entry, name, export, files, wanted, faults)
-            rows = None if export is None or wanted is None else rows_of(entry, name, export, wanted, faults)
-            if export is not None and rows is not None:
-                parts.append(_Part(entry, files[name], export, rows))
+            part = None if export is None else _part(entry, files[name], export, wanted, faults)
+            parts += [] if part is None else [part]
     if sum(len(part.rows) for part in parts) > MOST_LINES:
         faults.add(FILE, None, None, f"the files have more than {MOST_LINES} rows; split the campaign")
     return parts
+
+
+def _part(
+    entry: Entry, file: ExportFile, export: Export, wanted: Wanted | None, faults: Faults
+) -> _Part | None:
+    """Return the rows of a file with what is to be said of them; None with the faults noted."""
+    rows = None if wanted is None else rows_of(entry, file.name, export, wanted, faults)
+    if rows is None or wanted is None:
+        return None
+    notes = (*export.notes, *rows.notes, *compare(entry, file.name, export, rows, wanted))
+    return _Part(entry, file, replace(export, notes=notes), rows)
 
 
 def _without_unread(head: Head, read: ExportMapping, parts: Sequence[_Part]) -> Head:
@@ -232,7 +256,9 @@ def _started(read: ExportMapping, parts: Sequence[_Part], run: int, faults: Faul
             continue
         moment = read.dates.moment(part.export.started)
         if isinstance(moment, str):
-            faults.add(part.file.name, None, "date", moment)
+            started = part.export.started
+            line = next((fact.line for fact in part.export.facts if fact.value == started), None)
+            faults.add(part.file.name, line, "date", moment)
             return None
         moments.append(moment)
     if not moments:
@@ -302,7 +328,7 @@ def _at_home(
 ) -> list[Fault]:
     """Return faults of the two tables as faults of the files, lines and columns that their cells came from."""
     translated = []
-    for fault in faults:
+    for fault in _without_consequences(faults):
         if fault.file == probings_file.FILE and fault.line is not None and fault.line >= 2:
             translated.append(_of_row(fault, parts, places))
         elif fault.file in (probings_file.FILE, runs_file.FILE):
@@ -320,6 +346,13 @@ def _at_home(
         else:
             translated.append(fault)
     return translated
+
+
+def _without_consequences(faults: Sequence[Fault]) -> list[Fault]:
+    """Return the faults without setups that have no row because none of their rows could be read."""
+    if not any(fault.file == probings_file.FILE and fault.line is not None for fault in faults):
+        return list(faults)
+    return [fault for fault in faults if not (fault.column == "setups" and "has no row" in fault.message)]
 
 
 def _of_row(fault: Fault, parts: Sequence[_Part], places: Sequence[tuple[int, int]]) -> Fault:
@@ -349,7 +382,7 @@ def _under(faults: Sequence[Fault], mapping: str) -> list[Fault]:
 
 
 def _understood(part: _Part) -> UnderstoodFile:
-    facts = tuple(f"{key}: {value}" for key, value in part.export.facts[:12])
+    facts = tuple(f"{fact.key}: {fact.value}" for fact in part.export.facts[:12])
     axes = [name for name in part.rows.cells if probings_file.READING.fullmatch(name)]
     sources = {name: origin.how for name, origin in part.rows.origins.items()}
     return UnderstoodFile(

@@ -8,9 +8,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from monitor.exceptions import did_you_mean
 from monitor.readers.axes import Axis
-from monitor.readers.delimited import name_and_unit
 from monitor.readers.export import Export
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import (
@@ -25,9 +23,11 @@ from monitor.readers.foreign_units import (
     unit_of_column,
 )
 from monitor.readers.mapping.column_source import ColumnSource
+from monitor.readers.mapping.dates import clock_seconds
 from monitor.readers.mapping.mapping_file import Entry
 from monitor.readers.mapping.pointing import DIRECTION, Pointing, beyond, in_words, too_low, vectors
-from monitor.readers.mapping.travel import travel
+from monitor.readers.mapping.selection import matching, no_column, selected, valid
+from monitor.readers.mapping.travel import exchanged, travel
 from monitor.readers.toml_table import Table
 from monitor.records import Machine, Setup
 
@@ -64,13 +64,14 @@ class Origin:
 class Rows:
     """The rows (n) of one file: cells by campaign's column, the line of each, where each column came from.
 
-    ``angles`` are what directions were computed from: shown to people, in no campaign.
+    ``angles`` are what directions were computed from: shown to people, in no campaign. ``notes`` say what was left out.
     """
 
     cells: Mapping[str, Sequence[str]]
     lines: Sequence[int]
     origins: Mapping[str, Origin]
     angles: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -79,10 +80,13 @@ class Rows:
 def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Faults) -> Rows | None:
     """Return the rows of a file; None where a column is missing, its unit unknown, or nothing is left."""
     before = len(faults)
-    export = _selected(entry, file, export)
+    export = selected(entry, file, export)
     if not export.lines:
         return None
     sources = _sources(entry, file, export, wanted)
+    export, notes = valid(entry, file, export, [*sources.values(), *entry.angles.values()])
+    if not export.lines:
+        return None
     cells: dict[str, Sequence[str]] = {}
     origins: dict[str, Origin] = {}
     first = [axis.column for axis in wanted.axes] + list(wanted.columns)
@@ -99,14 +103,17 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
         if source.deviation:
             summed = _with_travel(entry, name, cells, wanted)
             if summed is not None:
+                notes += _exchanged(cells[name], summed)
                 cells[name] = summed
                 how = f"{origins[name].how}, added to the travel of the axes"
                 origins[name] = replace(origins[name], how=how)
     if len(faults) > before:
         return None
     if pointed is None:
-        return Rows(cells, export.lines, origins)
-    return Rows({**cells, **pointed.cells}, export.lines, {**origins, **pointed.origins}, pointed.angles)
+        return Rows(cells, export.lines, origins, notes=notes)
+    return Rows(
+        {**cells, **pointed.cells}, export.lines, {**origins, **pointed.origins}, pointed.angles, notes
+    )
 
 
 def _pointed(entry: Entry, pointing: Pointing, file: str, export: Export, wanted: Wanted) -> Rows | None:
@@ -177,41 +184,6 @@ def _what_is_wrong(cell: str) -> str:
     return "has minutes or seconds that are not below 60" if has_full_parts(cell) else "is no finite number"
 
 
-def matching(export: Export, name: str) -> str | None:
-    """Return the column of a file that goes by a name, capitals aside; None where there is none.
-
-    A name may be the whole header with the unit that it states: ``Position [mm]`` is the column Position in mm.
-    """
-    folded = {column.casefold(): column for column in export.columns}
-    column = name if name in export.columns else folded.get(name.casefold())
-    if column is not None:
-        return column
-    stem, unit = name_and_unit(name)
-    column = folded.get(stem.casefold())
-    return column if column is not None and unit is not None and export.units.get(column) == unit else None
-
-
-def _selected(entry: Entry, file: str, export: Export) -> Export:
-    """Return the export with the rows that ``where`` asks for."""
-    keep = np.ones(len(export.lines), dtype=np.bool_)
-    table = entry.table.section("where")
-    for name, text in entry.where.items():
-        column = matching(export, name)
-        if column is None:
-            table.fault(name, _no_column(file, name, export))
-            return export
-        keep &= np.array([cell.casefold() == text.casefold() for cell in export.columns[column]])
-        if not keep.any():
-            others = one_of(list(dict.fromkeys(export.columns[column]))[:8])
-            table.fault(name, f"no row of {file} has {quoted(text)} there; it has {others}")
-            return replace(export, lines=())
-    if keep.all():
-        return export
-    rows = np.flatnonzero(keep).tolist()
-    columns = {name: [cells[row] for row in rows] for name, cells in export.columns.items()}
-    return replace(export, columns=columns, lines=[export.lines[row] for row in rows])
-
-
 def _sources(entry: Entry, file: str, export: Export, wanted: Wanted) -> dict[str, ColumnSource]:
     """Return the source of every column: as mapped, or the column of the file that goes by the same name."""
     sources = dict(entry.columns)
@@ -246,7 +218,7 @@ def _filled(
         return [source.constant] * len(export.lines), Origin(None, None, "the same in every row")
     column = matching(export, source.column or "")
     if column is None:
-        table.fault(name, _no_column(file, source.column or "", export))
+        table.fault(name, no_column(file, source.column or "", export))
         return None
     cells = export.columns[column]
     target = unit_of_column(name)
@@ -255,6 +227,8 @@ def _filled(
             table.fault(name, f"{name} has no unit; leave unit out")
             return None
         return cells, Origin(column, None, f"column {column}")
+    if name == TIME and column not in export.units and (seconds := clock_seconds(cells)) is not None:
+        return seconds, Origin(column, None, f"column {column}, seconds from the first")
     unit = _unit_in_file(table, file, export, name, replace(source, column=column), target)
     if unit is None:
         return None
@@ -349,6 +323,13 @@ def _with_travel(
     ]  # fmt: skip
 
 
+def _exchanged(deviations: Sequence[str], whole: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence where deviations in µm are too large for the travel in µm with which they were summed."""
+    errors, ways = _numbers(deviations), _numbers(whole)
+    note = None if errors is None or ways is None else exchanged(errors, 1e-3 * (ways - errors))
+    return () if note is None else (note,)
+
+
 def _numbers(cells: Sequence[str]) -> np.ndarray | None:
     numbers = [decimal_of(cell) for cell in cells]
     return (
@@ -356,64 +337,3 @@ def _numbers(cells: Sequence[str]) -> np.ndarray | None:
         if None not in numbers and cells
         else None
     )
-
-
-def _no_column(file: str, name: str, export: Export) -> str:
-    return f"{file} has no column {quoted(name)}; {did_you_mean(name, export.columns)}it has {one_of(export.columns)}"
-
-
-def joined(
-    entry: Entry, file: str, export: Export, positions_file: str, positions: Export, axes: Sequence[Axis]
-) -> Export | None:
-    """Return an export with the columns of a file that says where the axes stood; None with the fault noted.
-
-    Rows are matched by ``target`` where both have it, else by their order. Its columns of axes go by the names that a
-    campaign has for them (``x_mm``), beside columns of the export that may be called X too.
-    """
-    rows = _row_of_each(entry, file, export, positions_file, positions)
-    if rows is None:
-        return None
-    further: dict[str, Sequence[str]] = {}
-    units: dict[str, str] = {}
-    for axis in axes:
-        column = matching(positions, axis.column) or matching(positions, axis.name)
-        if column is not None:
-            further[axis.column] = [positions.columns[column][row] for row in rows]
-            if column in positions.units:
-                units[axis.column] = positions.units[column]
-    if not further:
-        expected = one_of(axis.column for axis in axes)
-        entry.table.fault(
-            "positions", f"{positions_file} has no column of an axis; name its columns {expected}"
-        )
-        return None
-    return replace(export, columns={**export.columns, **further}, units={**export.units, **units})
-
-
-def _row_of_each(
-    entry: Entry, file: str, export: Export, positions_file: str, positions: Export
-) -> list[int] | None:
-    """Return the row of the positions that belongs to each row of an export; None with the fault noted."""
-    ours = entry.columns.get(TARGET, ColumnSource(TARGET))
-    name = matching(export, ours.column or "")
-    key = matching(positions, TARGET)
-    if name is not None and key is not None:
-        index = {cell: row for row, cell in enumerate(positions.columns[key])}
-        if len(index) < len(positions.lines):
-            entry.table.fault("positions", f"{positions_file} names a target twice; list each once")
-            return None
-        lacking = [cell for cell in dict.fromkeys(export.columns[name]) if cell not in index]
-        if lacking:
-            entry.table.fault(
-                "positions", f"{positions_file} has no row of {one_of(map(quoted, lacking[:5]))} of {file}"
-            )
-            return None
-        return [index[cell] for cell in export.columns[name]]
-    if len(positions.lines) == len(export.lines):
-        return list(range(len(export.lines)))
-    entry.table.fault(
-        "positions",
-        f"{positions_file} has {len(positions.lines)} rows and {file} {len(export.lines)}; give one row for "
-        "each, or a column target in both",
-    )
-    return None

@@ -8,6 +8,8 @@ import numpy as np
 
 from monitor.records import Array, Machine, Vector
 
+#: No machine is wrong by more than this part of its travel.
+_LARGEST = 0.01
 #: ISO 841: U, V, W are parallel to X, Y, Z.
 _DIRECTIONS: Mapping[str, Vector] = {
     **dict.fromkeys("XU", (1.0, 0.0, 0.0)),
@@ -39,6 +41,14 @@ def gains(machine: Machine, direction: Vector) -> dict[str, float]:
         side = -1 if name in on_work else 1
         gain[name] = side * signs.get(name, side) * float(np.dot(axis, direction))
     return gain
+
+
+def exchanged(deviations: Array, along: Array) -> str | None:
+    """Return a sentence where deviations (n) in µm range over a hundredth of the travel (n) in mm."""
+    errors, way = float(np.ptp(deviations)), float(np.ptp(along))
+    if errors <= 1e3 * way * _LARGEST:
+        return None
+    return f"deviations range over {errors:.4g} µm on {way:.4g} mm of travel: are columns or units exchanged?"
 
 
 def travel(machine: Machine, direction: Vector, readings: Mapping[str, Array]) -> tuple[Array, float]:

@@ -80,7 +80,7 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
                 refusal, measured, lambda changed: machine_problem(changed, model)
             ) from refusal
         judged = None if stored.lack_of_fit is None else stored.lack_of_fit.p_value
-        answer = machine_answer(measured.machine, identification, judged)
+        answer = machine_answer(measured, identification, judged)
         mistakes = mistaken_setups(measured, model, *solved[-1])
         return Identified(replace(answer, likely_mistakes=mistakes or None), stored)
 

@@ -11,6 +11,7 @@ from monitor.methods.chain.identification import Identification, RunIdentificati
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.model import chain_of
+from monitor.readers.row_places import RowPlaces
 from monitor.records import Array, Campaign, Machine
 from monitor.refusal import Reason, ReasonKind, Refusal
 from monitor.reporting.refused import refusal_sentence, refused_parameters
@@ -42,9 +43,10 @@ def identified(
 
 
 def machine_answer(
-    machine: Machine, identification: Identification, lack_of_fit_p: float | None = None
+    campaign: Campaign, identification: Identification, lack_of_fit_p: float | None = None
 ) -> IdentifyAnswer:
-    """The identification of a machine in display units, with notes."""
+    """The identification of a campaign of a machine in display units, with notes."""
+    machine, places = campaign.machine, RowPlaces(campaign)
     added = _estimates(
         identification.added,
         identification.added_units,
@@ -59,7 +61,7 @@ def machine_answer(
         model=identification.model,
         machine=machine.id,
         method=identification.method,
-        runs=tuple(_run(machine, identification, run) for run in identification.runs),
+        runs=tuple(_run(machine, identification, run, places) for run in identification.runs),
         added=added,
         added_refused=tuple(map(refused_parameters, identification.added_refused)),
         frames=frames_of((*identification.parameters, *identification.added), chain_of(machine)),
@@ -81,7 +83,9 @@ def _estimates(
     }
 
 
-def _run(machine: Machine, identification: Identification, run: RunIdentification) -> MachineRun:
+def _run(
+    machine: Machine, identification: Identification, run: RunIdentification, places: RowPlaces
+) -> MachineRun:
     return MachineRun(
         run=run.run,
         parameters=_estimates(identification.parameters, identification.units, run.estimate, run.covariance),
@@ -91,7 +95,7 @@ def _run(machine: Machine, identification: Identification, run: RunIdentificatio
         chi_square=run.chi_square,
         degrees_of_freedom=run.degrees_of_freedom,
         iterations=identification.iterations,
-        note=note(machine, identification, run),
+        note=note(machine, identification, run, places),
     )
 
 

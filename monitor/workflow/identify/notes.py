@@ -12,6 +12,7 @@ from monitor.methods import method_named
 from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.model import chain_of
+from monitor.readers.row_places import RowPlaces
 from monitor.records import Machine
 from monitor.reporting.run_notes import (
     AngleNoted,
@@ -34,10 +35,10 @@ LARGEST_ANGLE = np.deg2rad(5.0)
 LARGEST_PART, LARGEST_OFFSET = 0.05, 5.0
 
 
-def note(machine: Machine, identification: Identification, run: RunIdentification) -> str:
+def note(machine: Machine, identification: Identification, run: RunIdentification, places: RowPlaces) -> str:
     """The notes of one run, empty where there is nothing to note."""
     gross = (
-        gross_noted(reading, method_named(identification.method).nouns.target)
+        gross_noted(reading, method_named(identification.method).nouns.target, places)
         for reading in identification.gross
         if reading.run == run.run
     )
@@ -51,7 +52,7 @@ def note(machine: Machine, identification: Identification, run: RunIdentificatio
     )
 
 
-def gross_noted(reading: GrossReading, target_word: str) -> GrossReadingNoted:
+def gross_noted(reading: GrossReading, target_word: str, places: RowPlaces) -> GrossReadingNoted:
     """Which reading is wrong beyond doubt, and where it stands in the file."""
     pose = tuple(
         AxisAt(at.joint, DEGREE.to_display(at.reading) if at.turns else at.reading, at.turns)
@@ -59,7 +60,7 @@ def gross_noted(reading: GrossReading, target_word: str) -> GrossReadingNoted:
     )
     return GrossReadingNoted(
         reading.run, reading.sequence, target_word, reading.target, pose, reading.size, reading.axis,
-        tuple(reading.others), reading.is_along_surface,
+        tuple(reading.others), reading.is_along_surface, places.row(reading.run, reading.sequence),
     )  # fmt: skip
 
 

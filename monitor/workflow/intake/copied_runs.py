@@ -16,6 +16,7 @@ from monitor.methods import campaign_method
 from monitor.records import Campaign
 from monitor.reporting.messages import joined_by_and
 from monitor.reporting.run_notes import CopiedRunsNoted
+from monitor.row_files import rows_in, runs_in
 from monitor.store import Database, run_fingerprints
 from monitor.units import MICROMETRE
 from monitor.workflow.campaign_parts import only_run
@@ -43,12 +44,12 @@ def check_copies(db: Database, campaign: Campaign) -> tuple[str, ...]:
         campaign.name,
         [
             Fault(
-                "probings.csv",
+                rows_in(campaign),
                 None,
                 "run",
                 f"runs {joined_by_and(runs)} are equal in every reading of their "
                 f"{np.sum(campaign.probings.run == runs[0])} probings, which two measurements never are: give each run "
-                "its own readings, or remove the copies here and from runs.csv",
+                f"its own readings, or remove the copies here and from {runs_in(campaign)}",
             )
             for runs in copies
         ],

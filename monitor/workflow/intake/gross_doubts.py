@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from monitor.exceptions import MonitorError
+from monitor.readers.row_places import RowPlaces
 from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign
 
@@ -35,8 +36,9 @@ def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
         # Where the places do not fit, no single row is to blame; ``doubts`` says what is.
         return ()
     in_other_units = {odd.run for odd in runs_in_units(campaign)}
+    places = RowPlaces(campaign)
     return tuple(
-        str(gross_noted(reading, method.nouns.target))
+        str(gross_noted(reading, method.nouns.target, places))
         for reading in search.readings
         if reading.run not in in_other_units
     )
