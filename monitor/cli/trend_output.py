@@ -248,11 +248,15 @@ def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
 
 
 def _condition(name: str, effect: ConditionEffect) -> str:
+    if effect.not_decided is not None:
+        return f"{name}: whether it goes with {effect.channel}: {effect.not_decided}"
     inseparable = f"; not told from {', '.join(effect.moves_with)}" if effect.moves_with else ""
     return f"{name}: {_with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}{inseparable}"
 
 
 def _cycle(name: str, wave: Cycle) -> str:
+    if wave.not_decided is not None:
+        return f"{name}: whether it goes up and down over the {wave.cycle}: {wave.not_decided}"
     return f"{name}: goes up and down by {_with_u(wave.amplitude, wave.u, wave.unit)} over the {wave.cycle}"
 
 
@@ -302,7 +306,7 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     period, vector = control.period, control.vector
     yield (
         f"charts: reference period {(period.reference_from or '')[:10]} to {(period.reference_to or '')[:10]}, "
-        f"{period.reference_points} {period.points}; a false alarm once in "
+        f"{period.reference_points} {period.points}{_of_one(period.measured_by)}; a false alarm once in "
         f"{period.average_run_length:g} {period.points}"
     )
     if len(answer.parameters) == 1:
@@ -313,6 +317,10 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     for name, state in (("T²", vector.t_squared), ("MEWMA", vector.mewma)):
         if state is not None:
             yield _vector(name, state, len(vector.parameters or ()))
+
+
+def _of_one(instruments: str | None) -> str:
+    return "" if instruments is None else f", those by {instruments} alone"
 
 
 def _vector(name: str, state: VectorState, count: int) -> str:

@@ -17,8 +17,9 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.groups import independent_columns
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.sums import label_groups
 from monitor.units import DEGREE_CELSIUS, KELVIN, Unit
@@ -185,9 +186,10 @@ def _cut(block: npt.NDArray[np.intp], weight: Array, along: Array, value: Array,
 
 
 def _design(
-    t: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
+    t: Array, beside: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
 ) -> tuple[tuple[str, ...], Array]:
-    """Return the names of the q terms and their columns (n, q): level, drift, channels, cosine and sine of cycles."""
+    """Return the names of the q terms and their columns (n, q): level, drift, those beside, channels, cosine and sine
+    of cycles."""
     origin = float(t.mean())
     terms, columns = ["level"], [np.ones_like(t)]
     if drift:
@@ -195,6 +197,10 @@ def _design(
             raise DataError(f"all times are {t[0]}; leave out the drift or give times that differ.")
         terms.append("drift")
         columns.append(t - origin)
+    explained = independent_columns(np.column_stack([*columns, beside]))[len(columns) :]
+    for index in explained:
+        terms.append(f"beside {index - len(columns) + 1}")
+        columns.append(beside[:, index - len(columns)])
     for name, recorded in channels.items():
         channel = as_vector(recorded, f"channel {name}", length=len(t))
         if np.ptp(channel) == 0.0:
@@ -224,11 +230,13 @@ def dependence(
     units: DependenceUnits | None = None,
     level: float = 0.95,
     independent: bool = False,
+    beside: npt.ArrayLike | None = None,
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
     A drift that is only fitted ``"beside"`` them is not reported, and its own uncertainty, half of the work beside one
-    channel, not computed. ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's
+    channel, not computed; nor are those of the columns ``beside`` (n, e), of groups of runs that are off together.
+    ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's
     unit is that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
@@ -243,16 +251,17 @@ def dependence(
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
     cycles = cycles or {}
-    terms, design = _design(t, channels, cycles, bool(drift))
+    columns = np.empty((len(y), 0)) if beside is None else as_matrix(beside, "beside")
+    terms, design = _design(t, columns, channels, cycles, bool(drift))
+    start = design.shape[1] - len(channels) - 2 * len(cycles)
     fit = fit_with_days(y, design, run_u, index)
     if not independent:
         waves = [period for period in cycles.values() for _ in range(2)]
         periods = [None] * (design.shape[1] - len(waves)) + waves
-        fit = _widened(fit, design, index, t, periods, 2 if drift == "beside" else 1)
+        fit = _widened(fit, design, index, t, periods, 1 if drift is True else start)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
-    start = 2 if drift else 1
     scale = np.outer(fit.u, fit.u)
     return Dependence(
         coefficients=tuple(
