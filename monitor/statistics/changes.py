@@ -182,21 +182,21 @@ def _of_days(column: Array, day: npt.NDArray[np.intp]) -> bool:
     return bool(np.var(mean[day]) > 0.5 * np.var(column))
 
 
-def _at_exchange(best: Scan, series: _Series) -> Scan:
-    """The step from which on other groups of runs follow for good, where it explains a series nearly as well as the
-    transient that was found: what the first instrument is off by does not pass again."""
+def _beside_groups(best: Scan, series: _Series) -> Scan:
+    """The drift, or the step from which on other groups of runs follow for good, where one explains a series nearly as
+    well as the transient that was found: what the first instrument is off by does not pass again, and beside what all
+    are off by few runs do not tell a curve from a line."""
     if best.kind != "transient" or series.group is None:
         return best
     exchanges = np.flatnonzero(np.diff(eras(series.group))) + 1
-    is_step = np.array([kind == "step" for kind in best.kinds])
-    rivals = np.flatnonzero(is_step & np.isin(best.positions, exchanges))
-    if not len(rivals):
-        return best
+    kinds = np.array(best.kinds)
+    rivals = np.flatnonzero((kinds == "trend") | (kinds == "step") & np.isin(best.positions, exchanges))
     rival = int(rivals[best.deviance[rivals].argmin()])
     if best.deviance[rival] - best.deviance.min() > 2.0 * REFUTED:
         return best
-    at = int(best.positions[rival])
-    return replace(best, kind="step", at=at, column=(np.arange(len(series.y)) >= at).astype(np.float64))
+    at, kind = int(best.positions[rival]), best.kinds[rival]
+    n = np.arange(len(series.y))
+    return replace(best, kind=kind, at=at, column=(n >= at).astype(np.float64))
 
 
 class _Search:
@@ -271,7 +271,7 @@ class _Search:
             return [], []
         base: Base = "constant"
         trends: list[Change] = []
-        best = _at_exchange(best, series)
+        best = _beside_groups(best, series)
         if best.kind == "transient":
             bent = self.scan(series, "line", level)
             # Two coefficients and a place more must earn their keep (Schwarz's criterion).

@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from monitor.cli.trend_output import STATED_Q
+from monitor.cli.dependence_output import STATED_Q
 from monitor.sources import CommonQuantity
 from monitor.store import Database, MachineEvent, MachineHistory
 from monitor.store.past.instruments import Calibrations

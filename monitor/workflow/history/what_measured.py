@@ -7,7 +7,7 @@ of what a parameter has of that instrument.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -41,11 +41,7 @@ def what_measured(
             key = (str(history.measured_by[run]), calibrated)
             of_campaign[campaign] = described.setdefault(key, len(described))
         by[run] = of_campaign[campaign]
-    names = [name for name, _ in described]
-    return tuple(
-        name if names.count(name) == 1 else _with_certificates(name, dict(calibrated))
-        for name, calibrated in described
-    ), by
+    return tuple(_named(name, dict(calibrated), described) for name, calibrated in described), by
 
 
 def _certificates(
@@ -64,6 +60,11 @@ def _certificates(
     return certificates
 
 
-def _with_certificates(name: str, calibrated: Mapping[str, str]) -> str:
-    named = ", ".join(f"{of} {certificate}" for of, certificate in calibrated.items() if certificate)
-    return f"{name} with {named}" if named else f"{name} without a certificate"
+def _named(
+    name: str, certificates: Mapping[str, str], every: Iterable[tuple[str, tuple[tuple[str, str], ...]]]
+) -> str:
+    """The instruments, with those of their certificates that others of the same instruments have not."""
+    others = [dict(calibrated) for other, calibrated in every if other == name]
+    apart = [of for of in certificates if len({each.get(of) for each in others}) > 1]
+    words = ", ".join(f"{of} {certificates[of] or 'without a certificate'}" for of in apart)
+    return f"{name} with {words}" if words else name
