@@ -21,7 +21,7 @@ from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.days.day_steps import day_step_p_value
 from monitor.statistics.groups import eras, interleaved_columns
-from monitor.statistics.scan import REFUTED, Scan, Scanner
+from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
 
@@ -192,11 +192,13 @@ def _beside_groups(best: Scan, series: _Series) -> Scan:
     kinds = np.array(best.kinds)
     rivals = np.flatnonzero((kinds == "trend") | (kinds == "step") & np.isin(best.positions, exchanges))
     rival = int(rivals[best.deviance[rivals].argmin()])
-    if best.deviance[rival] - best.deviance.min() > 2.0 * REFUTED:
+    # As of a bend: a time constant more must earn its keep (Schwarz's criterion).
+    if best.deviance[rival] - best.deviance.min() > 3.0 * np.log(len(series.y)):
         return best
-    at, kind = int(best.positions[rival]), best.kinds[rival]
-    n = np.arange(len(series.y))
-    return replace(best, kind=kind, at=at, column=(n >= at).astype(np.float64))
+    at = int(best.positions[rival])
+    return replace(
+        best, kind=best.kinds[rival], at=at, column=(np.arange(len(series.y)) >= at).astype(np.float64)
+    )
 
 
 class _Search:

@@ -17,12 +17,15 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_matrix, as_positive, as_vector
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.groups import independent_columns
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.sums import label_groups
 from monitor.units import DEGREE_CELSIUS, KELVIN, Unit
+
+#: Confidence of the intervals of coefficients.
+LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -228,7 +231,6 @@ def dependence(
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
     units: DependenceUnits | None = None,
-    level: float = 0.95,
     independent: bool = False,
     beside: npt.ArrayLike | None = None,
 ) -> Dependence:
@@ -246,7 +248,6 @@ def dependence(
     """
     y = as_vector(values, "values", least=4)
     t = as_vector(times, "times", length=len(y))
-    as_probability(level, "level")
     run_u = None if u is None else as_positive(u, "u", length=len(y))
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
@@ -265,18 +266,18 @@ def dependence(
     scale = np.outer(fit.u, fit.u)
     return Dependence(
         coefficients=tuple(
-            _coefficient(fit, start + i, name, _unit_of(units, name), level)
+            _coefficient(fit, start + i, name, _unit_of(units, name), LEVEL)
             for i, name in enumerate(channels)
         ),
         cycles=tuple(
             _cycle(fit, start + len(channels) + 2 * i, name, period, origin)
             for i, (name, period) in enumerate(cycles.items())
         ),
-        drift=_coefficient(fit, 1, "drift", None, level) if drift is True else None,
+        drift=_coefficient(fit, 1, "drift", None, LEVEL) if drift is True else None,
         terms=terms,
         correlation=fit.covariance / np.where(scale > 0.0, scale, 1.0),
         explained=1.0 - float((weight * fit.residual**2).sum()) / total if total > 0.0 else 0.0,
         within=fit.within,
         between=fit.between,
-        level=level,
+        level=LEVEL,
     )

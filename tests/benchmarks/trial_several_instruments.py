@@ -99,7 +99,7 @@ LAWS = {
 
 def history(plan: Plan, law: Law, rng: np.random.Generator) -> tuple[MachineHistory, list[MachineEvent]]:
     """Return a drawn history of all parameters alike, and its event."""
-    errors = {letter: rng.normal(size=2) for letter in "LBRlb"}
+    errors = {letter: float(rng.normal()) for letter in "LBRlb"}
     rows: list[tuple[float, ...]] = []
     values, campaign, measured, at, parts = [], [], [], [], []
     keys = [("laser", "L-1"), ("laser", "L-2"), ("ball bar", "B-1"), ("ball bar", "B-2")]

@@ -219,10 +219,10 @@ def _across_event(
     except DataError:
         return None
     # What the machine drifts by runs through the campaigns of all instruments, each off by its own amount.
-    told = _as_sure(history, column, by, before | after)
+    sure = _as_sure(history, column, by, before | after)
     campaigns = campaigns_of(
-        values[told], days[told], history.seconds[told] / SECONDS_PER_DAY, stretch[told], history.campaign[told],
-        group=by[told],
+        values[sure], days[sure], history.seconds[sure] / SECONDS_PER_DAY, stretch[sure], history.campaign[sure],
+        group=by[sure],
     )  # fmt: skip
     # Campaigns may overlap: by name, not by the order of their means in time.
     last, first = (
@@ -232,10 +232,13 @@ def _across_event(
     judged = beside_drift(result, campaigns, last, first, levels=False)
     agree, lack = _AGREE[judged.verdict(LEVEL)]
     line = judged.line
-    if agree is False and by[before][-1] != by[after][0]:
-        apart = _apart(history, column, before, after)
-        if calibrations_may_do(result.difference, result.u, apart):
-            agree, lack = None, Undecided.INSTRUMENTS_MAY_DO
+    is_renewed = by[before][-1] != by[after][0]
+    if (
+        agree is False
+        and is_renewed
+        and calibrations_may_do(result.difference, result.u, _apart(history, column, before, after))
+    ):
+        agree, lack = None, Undecided.INSTRUMENTS_MAY_DO
     if line is None:
         return ParameterAgreement(
             unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
@@ -258,8 +261,10 @@ def _as_sure(
     u = history.u[:, column]
     limit = UNSURE * float(np.nanmedian(u[pair]))
     finite = np.isfinite(history.values[:, column])
-    sure = [group for group in np.unique(by[finite]) if float(np.median(u[finite & (by == group)])) <= limit]
-    return np.asarray(finite & (np.isin(by, sure) | np.isin(by, by[pair])))
+    groups = [
+        group for group in np.unique(by[finite]) if float(np.median(u[finite & (by == group)])) <= limit
+    ]
+    return np.asarray(finite & (np.isin(by, groups) | np.isin(by, by[pair])))
 
 
 def _apart(

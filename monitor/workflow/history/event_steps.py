@@ -131,10 +131,12 @@ def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
     days = pair.judged.days
     if verdict is Verdict.DRIFT and days is not None:
         step = replace(step, size=days.difference, u=days.u, p_value=days.p_value())
+    if pair.by_others and (verdict is Verdict.STEPPED or verdict in _UNDECIDED):
+        return replace(step, undecided=Undecided.INSTRUMENTS_MAY_DO)
     if verdict in _UNDECIDED:
         return replace(step, undecided=_UNDECIDED[verdict])
     if verdict is Verdict.STEPPED:
-        return replace(step, undecided=Undecided.INSTRUMENTS_MAY_DO) if pair.by_others else step
+        return step
     if pair.by_runs is None or pair.by_runs[1] >= level or pair.judged.line is not None:
         return None
     if verdict is Verdict.NOT_SEEN:

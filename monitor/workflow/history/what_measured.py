@@ -66,5 +66,5 @@ def _named(
     """The instruments, with those of their certificates that others of the same instruments have not."""
     others = [dict(calibrated) for other, calibrated in every if other == name]
     apart = [of for of in certificates if len({each.get(of) for each in others}) > 1]
-    words = ", ".join(f"{of} {certificates[of] or 'without a certificate'}" for of in apart)
-    return f"{name} with {words}" if words else name
+    calibrated = ", ".join(f"{of} {certificates[of] or 'without a certificate'}" for of in apart)
+    return f"{name} with {calibrated}" if calibrated else name

@@ -166,10 +166,8 @@ class ConditionEffect:
 
 @dataclass(frozen=True)
 class Cycle:
-    """A wave of a day or a year; ``q_value`` is the false discovery rate over the cycles of all parameters.
-
-    ``not_decided`` as of a condition: instruments may make the wave.
-    """
+    """A wave of a day or a year; ``q_value`` is the false discovery rate over the cycles of all parameters, and
+    ``not_decided`` as of a condition."""
 
     cycle: str
     period_days: float

@@ -102,8 +102,8 @@ def by_one_instrument(history: MachineHistory, *, by_days: bool) -> tuple[Machin
     steady = steady_runs(history)
     labels = day_numbers(history) if by_days else np.arange(len(history.run))
     enough = [group for group in range(len(names)) if len(np.unique(labels[steady & (by == group)])) > FEWEST]
-    chosen = by[np.isin(by, enough)][-1] if enough else by[-1]
-    return history.part(by == chosen), names[chosen]
+    charted = by[np.isin(by, enough)][-1] if enough else by[-1]
+    return history.part(by == charted), names[charted]
 
 
 def reference_points(points: Points, reference: tuple[float, float] | None) -> npt.NDArray[np.bool_]:
