@@ -261,3 +261,8 @@ def stepping(
                 progress.update(task, description=description.format(escape(name)), completed=count)
 
         yield tell
+
+
+def with_u(value: float, u: float, unit: str) -> str:
+    """A value with its standard uncertainty, both in their unit."""
+    return f"{rounded(value, u)} {unit} (u = {two_digits(u)} {unit})"

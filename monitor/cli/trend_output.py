@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.day_output import resemblance
+from monitor.cli.dependence_output import dependences
 from monitor.cli.forecast_output import forecast_start
 from monitor.cli.rests_on_output import levels, steps_at_once
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
@@ -14,21 +15,16 @@ from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
-    ConditionEffect,
-    Cycle,
     DatedChange,
     ParameterTrend,
     StepAtEvent,
     TrendAnswer,
     VectorState,
     VolumetricForecast,
-    WarmUp,
 )
 
 #: From so many runs on it is said why there are no charts.
 FEWEST_RUNS = 10
-#: Below this false discovery rate over all parameters a dependence, a cycle or a warm-up is stated.
-STATED_Q = 0.05
 
 
 def say(answer: TrendAnswer) -> None:
@@ -68,8 +64,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
             f"{min(few)} days cannot tell a change from days that differ by much more than runs scatter: none of these "
             "is allowed for where the other parameters do not show such days"
         )
-    for name, parameter in parameters:
-        yield from _dependences(name, parameter)
+    yield from dependences(answer)
     for name, parameter in parameters:
         yield from forecast_start(name, parameter)
     yield from _charts(answer)
@@ -191,10 +186,6 @@ def _table(answer: TrendAnswer) -> None:
     )
 
 
-def _with_u(value: float, u: float, unit: str) -> str:
-    return f"{output.rounded(value, u)} {unit} (u = {output.two_digits(u)} {unit})"
-
-
 def _p_value(change: DatedChange) -> str:
     """The p-value of a change; where no simulated history was like it, that of one in all of them, as a bound."""
     stated = output.stated("p", change.p_value)
@@ -206,7 +197,7 @@ def _change(name: str, change: DatedChange) -> str:
     # Of several steps at once one sentence says it.
     exchanged = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
     return (
-        f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
+        f"{name}: {change.kind} of {output.with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
         f"({_interval(change.interval)}, {_p_value(change)}){exchanged}"
     )
 
@@ -234,51 +225,6 @@ def _event_step(name: str, step: StepAtEvent) -> str:
     return f"{_minute(step.at)} UTC, {step.kind}: {what}{p_value}"
 
 
-def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
-    """What the parameter goes with: conditions, cycles, the warm-up of a campaign."""
-    for effect in parameter.conditions:
-        if effect.q_value is not None and effect.q_value < STATED_Q:
-            yield _condition(name, effect)
-    for wave in parameter.cycles:
-        if wave.q_value is not None and wave.q_value < STATED_Q:
-            yield _cycle(name, wave)
-    warmth = parameter.warm_up
-    if warmth is not None and warmth.q_value is not None and warmth.q_value < STATED_Q:
-        yield _warm_up(name, warmth)
-
-
-def _condition(name: str, effect: ConditionEffect) -> str:
-    inseparable = f"; not told from {', '.join(effect.moves_with)}" if effect.moves_with else ""
-    return f"{name}: {_with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}{inseparable}"
-
-
-def _cycle(name: str, wave: Cycle) -> str:
-    return f"{name}: goes up and down by {_with_u(wave.amplitude, wave.u, wave.unit)} over the {wave.cycle}"
-
-
-def _warm_up(name: str, warmth: WarmUp) -> str:
-    moves, stable = "falls" if warmth.amplitude > 0.0 else "rises", warmth.stable_after_h
-    # A server of version 0.2.0 does not say how many hours were recorded.
-    recorded = "" if warmth.recorded_h is None else f"{_hours(warmth.recorded_h)} h"
-    ends = (
-        f"not yet stable after the {recorded or 'hours'} recorded"
-        if stable is None or (warmth.recorded_h is not None and stable > warmth.recorded_h)
-        else f"stable after {_hours(stable)} h"
-    )
-    what, constant = (
-        ("warms up or drifts", "not determined")
-        if warmth.tau_h is None
-        else ("warms up", f"{_hours(warmth.tau_h)} h")
-    )
-    change = f"{moves} by {abs(warmth.amplitude):.3g} {warmth.unit}{recorded and f' within {recorded}'}"
-    return f"{name}: {what}: {change}, time constant {constant}; {ends}"
-
-
-def _hours(hours: float) -> str:
-    """Two digits, never in powers of ten."""
-    return f"{float(f'{hours:.2g}'):.10g}"
-
-
 def _minute(at: str | None) -> str:
     return (at or "")[:16].replace("T", " ")
 
@@ -302,7 +248,7 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     period, vector = control.period, control.vector
     yield (
         f"charts: reference period {(period.reference_from or '')[:10]} to {(period.reference_to or '')[:10]}, "
-        f"{period.reference_points} {period.points}; a false alarm once in "
+        f"{period.reference_points} {period.points}{_of_one(period.measured_by)}; a false alarm once in "
         f"{period.average_run_length:g} {period.points}"
     )
     if len(answer.parameters) == 1:
@@ -313,6 +259,10 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     for name, state in (("T²", vector.t_squared), ("MEWMA", vector.mewma)):
         if state is not None:
             yield _vector(name, state, len(vector.parameters or ()))
+
+
+def _of_one(instruments: str | None) -> str:
+    return "" if instruments is None else f", those by {instruments} alone"
 
 
 def _vector(name: str, state: VectorState, count: int) -> str:

@@ -152,6 +152,7 @@ class Undecided(StrEnum):
     DAYS_MAY_DO = "days_may_do"
     FEW_DAYS = "few_days"
     DRIFT_MAY_DO = "drift_may_do"
+    INSTRUMENTS_MAY_DO = "instruments_may_do"
 
     def __str__(self) -> str:
         """The words behind the name of the parameter."""
@@ -174,5 +175,9 @@ _UNDECIDED = {
     Undecided.DRIFT_MAY_DO: (
         "not decided: a drift that goes on through the event, or a machine that moves as much between campaigns "
         "without one, may do as much; further campaigns on each side decide it"
+    ),
+    Undecided.INSTRUMENTS_MAY_DO: (
+        "not decided: other instruments measured after it than before, or the same with other certificates, and may be "
+        "off by as much; one campaign by those of before decides it"
     ),
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.days.day_steps import day_step_p_value
+from monitor.statistics.groups import eras, interleaved_columns
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
@@ -70,16 +72,27 @@ class _Series:
     u: Array | None
     day: npt.NDArray[np.intp] | None
     cycle: float | None = None
+    group: npt.NDArray[np.intp] | None = None
+
+    @cached_property
+    def beside(self) -> Array | None:
+        """What groups of runs that take turns may be off by (n, k); None without such."""
+        columns = None if self.group is None else interleaved_columns(self.group)
+        return columns if columns is not None and columns.size else None
 
     @property
     def searched(self) -> bool:
         """Whether there are runs enough, and any scatter, for a search."""
-        return len(self.y) >= FEWEST_RUNS and bool(np.ptp(self.y) > 0.0)
+        fitted = 0 if self.beside is None else self.beside.shape[1]
+        return len(self.y) - fitted >= FEWEST_RUNS and bool(np.ptp(self.y) > 0.0)
 
     def part(self, start: int, stop: int) -> _Series:
         part_u = None if self.u is None else self.u[start:stop]
         day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
-        return _Series(self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day), self.cycle)
+        group = None if self.group is None else self.group[start:stop]
+        return _Series(
+            self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day), self.cycle, group
+        )
 
 
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
@@ -106,7 +119,9 @@ def _size(series: _Series, best: Scan, base: Base) -> tuple[float, float]:
     """Generalised least squares: size of the change and its standard uncertainty, place and correlation as known."""
     t = series.t
     columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
-    columns += list(wave_columns(t, series.cycle).T)
+    columns += list(wave_columns(t, series.cycle).T) + (
+        [] if series.beside is None else list(series.beside.T)
+    )
     after = (np.arange(len(t)) >= best.at).astype(np.float64)
     if best.kind == "step":
         columns.append(after)
@@ -167,6 +182,25 @@ def _of_days(column: Array, day: npt.NDArray[np.intp]) -> bool:
     return bool(np.var(mean[day]) > 0.5 * np.var(column))
 
 
+def _beside_groups(best: Scan, series: _Series) -> Scan:
+    """The drift, or the step from which on other groups of runs follow for good, where one explains a series nearly as
+    well as the transient that was found: what the first instrument is off by does not pass again, and beside what all
+    are off by few runs do not tell a curve from a line."""
+    if best.kind != "transient" or series.group is None:
+        return best
+    exchanges = np.flatnonzero(np.diff(eras(series.group))) + 1
+    kinds = np.array(best.kinds)
+    rivals = np.flatnonzero((kinds == "trend") | (kinds == "step") & np.isin(best.positions, exchanges))
+    rival = int(rivals[best.deviance[rivals].argmin()])
+    # As of a bend: a time constant more must earn its keep (Schwarz's criterion).
+    if best.deviance[rival] - best.deviance.min() > 3.0 * np.log(len(series.y)):
+        return best
+    at = int(best.positions[rival])
+    return replace(
+        best, kind=best.kinds[rival], at=at, column=(np.arange(len(series.y)) >= at).astype(np.float64)
+    )
+
+
 class _Search:
     """One search that reuses its scanners: parameters with the same plan share the preparation."""
 
@@ -177,10 +211,10 @@ class _Search:
         self._kept: dict[tuple[object, ...], Scanner] = {}
 
     def scanner(self, series: _Series, base: Base) -> Scanner:
-        plan = (series.t, series.u, series.day)
+        plan = (series.t, series.u, series.day, series.beside)
         key = (base, *(None if column is None else column.tobytes() for column in plan))
         if key not in self._kept:
-            self._kept[key] = Scanner(series.t, series.u, base, series.day, series.cycle)
+            self._kept[key] = Scanner(series.t, series.u, base, series.day, series.cycle, series.beside)
         return self._kept[key]
 
     def look(self, every: Sequence[_Series]) -> None:
@@ -239,6 +273,7 @@ class _Search:
             return [], []
         base: Base = "constant"
         trends: list[Change] = []
+        best = _beside_groups(best, series)
         if best.kind == "transient":
             bent = self.scan(series, "line", level)
             # Two coefficients and a place more must earn their keep (Schwarz's criterion).
@@ -272,6 +307,7 @@ def find_changes(
     days: npt.ArrayLike | None = None,
     events: Sequence[float] = (),
     cycle: float | None = None,
+    groups: Mapping[str, npt.NDArray[np.intp]] | None = None,
     false_alarm: float = 0.05,
     trials: int = 1999,
 ) -> History:
@@ -280,6 +316,8 @@ def find_changes(
     ``events`` are times of recorded changes (crash, repair, compensation): the history is split there, and the
     change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
     may share a component; ``cycle`` is the period of a wave (the year) that is no change where a piece covers it.
+    ``groups`` (name to (n,)) number what measured a run: those that take turns may be off by any amount each
+    (``interleaved_columns``); where others follow for good a step is preferred to a transient that explains as much.
     ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.8 and for day components up to four
@@ -309,7 +347,7 @@ def find_changes(
     for name, recorded in values.items():
         y = as_vector(recorded, name, length=len(t))
         run_u = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
-        series = _Series(name, y, t, run_u, _repeated(day), cycle)
+        series = _Series(name, y, t, run_u, _repeated(day), cycle, (groups or {}).get(name))
         parts += [(series.part(start, stop), start) for start, stop in pieces]
     changes, trends = _Search(rng, trials).pieces(parts, level)
     order = {name: i for i, name in enumerate(values)}

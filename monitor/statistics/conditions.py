@@ -17,11 +17,15 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_matrix, as_positive, as_vector
 from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.groups import independent_columns
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.sums import label_groups
 from monitor.units import DEGREE_CELSIUS, KELVIN, Unit
+
+#: Confidence of the intervals of coefficients.
+LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -185,9 +189,10 @@ def _cut(block: npt.NDArray[np.intp], weight: Array, along: Array, value: Array,
 
 
 def _design(
-    t: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
+    t: Array, beside: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
 ) -> tuple[tuple[str, ...], Array]:
-    """Return the names of the q terms and their columns (n, q): level, drift, channels, cosine and sine of cycles."""
+    """Return the names of the q terms and their columns (n, q): level, drift, those beside, channels, cosine and sine
+    of cycles."""
     origin = float(t.mean())
     terms, columns = ["level"], [np.ones_like(t)]
     if drift:
@@ -195,6 +200,10 @@ def _design(
             raise DataError(f"all times are {t[0]}; leave out the drift or give times that differ.")
         terms.append("drift")
         columns.append(t - origin)
+    explained = independent_columns(np.column_stack([*columns, beside]))[len(columns) :]
+    for index in explained:
+        terms.append(f"beside {index - len(columns) + 1}")
+        columns.append(beside[:, index - len(columns)])
     for name, recorded in channels.items():
         channel = as_vector(recorded, f"channel {name}", length=len(t))
         if np.ptp(channel) == 0.0:
@@ -222,13 +231,14 @@ def dependence(
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
     units: DependenceUnits | None = None,
-    level: float = 0.95,
     independent: bool = False,
+    beside: npt.ArrayLike | None = None,
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
     A drift that is only fitted ``"beside"`` them is not reported, and its own uncertainty, half of the work beside one
-    channel, not computed. ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's
+    channel, not computed; nor are those of the columns ``beside`` (n, e), of groups of runs that are off together.
+    ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's
     unit is that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
@@ -238,36 +248,36 @@ def dependence(
     """
     y = as_vector(values, "values", least=4)
     t = as_vector(times, "times", length=len(y))
-    as_probability(level, "level")
     run_u = None if u is None else as_positive(u, "u", length=len(y))
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
     cycles = cycles or {}
-    terms, design = _design(t, channels, cycles, bool(drift))
+    columns = np.empty((len(y), 0)) if beside is None else as_matrix(beside, "beside")
+    terms, design = _design(t, columns, channels, cycles, bool(drift))
+    start = design.shape[1] - len(channels) - 2 * len(cycles)
     fit = fit_with_days(y, design, run_u, index)
     if not independent:
         waves = [period for period in cycles.values() for _ in range(2)]
         periods = [None] * (design.shape[1] - len(waves)) + waves
-        fit = _widened(fit, design, index, t, periods, 2 if drift == "beside" else 1)
+        fit = _widened(fit, design, index, t, periods, 1 if drift is True else start)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
-    start = 2 if drift else 1
     scale = np.outer(fit.u, fit.u)
     return Dependence(
         coefficients=tuple(
-            _coefficient(fit, start + i, name, _unit_of(units, name), level)
+            _coefficient(fit, start + i, name, _unit_of(units, name), LEVEL)
             for i, name in enumerate(channels)
         ),
         cycles=tuple(
             _cycle(fit, start + len(channels) + 2 * i, name, period, origin)
             for i, (name, period) in enumerate(cycles.items())
         ),
-        drift=_coefficient(fit, 1, "drift", None, level) if drift is True else None,
+        drift=_coefficient(fit, 1, "drift", None, LEVEL) if drift is True else None,
         terms=terms,
         correlation=fit.covariance / np.where(scale > 0.0, scale, 1.0),
         explained=1.0 - float((weight * fit.residual**2).sum()) / total if total > 0.0 else 0.0,
         within=fit.within,
         between=fit.between,
-        level=level,
+        level=LEVEL,
     )

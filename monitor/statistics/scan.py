@@ -18,6 +18,7 @@ import numpy.typing as npt
 import scipy
 
 from monitor.records import Array
+from monitor.statistics.groups import independent_columns
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates, wave_columns
 from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 
@@ -114,6 +115,7 @@ class Scanner:
 
     ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that
     is no change: fitted where the history covers it (``wave_columns``), else one of ``SEASON`` is allowed for.
+    ``beside`` (n, k) are columns of which every series may have any amount: what groups of runs are off by.
     """
 
     def __init__(
@@ -123,6 +125,7 @@ class Scanner:
         base: Base,
         days: npt.NDArray[np.intp] | None = None,
         cycle: float | None = None,
+        beside: Array | None = None,
     ) -> None:
         self.columns, self.kinds, self.positions = candidates(times, base)
         n = len(times)
@@ -130,7 +133,10 @@ class Scanner:
         self.root = root / np.sqrt(np.mean(root**2))
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
         columns = [np.ones(n), line] if base == "line" else [np.ones(n)]
+        columns += [] if beside is None else list(beside.T)
         basis = np.column_stack([*columns, wave_columns(times, cycle)])
+        if beside is not None:
+            basis = basis[:, independent_columns(self.root[:, np.newaxis] * basis)]
         self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]
         self.free = n - basis.shape[1]
         is_covered = basis.shape[1] > len(columns)

@@ -16,7 +16,7 @@ from scipy import stats
 
 from monitor.statistics import control_false_discoveries
 from monitor.workflow.history.series import Series
-from monitor.workflow.trend.parameter import conditions
+from monitor.workflow.trend.causes import conditions
 
 PARAMETERS, CONDITIONS, CALLED = 13, 2, 0.05
 #: How days differ and how each resembles the one before, in standard deviations of a run.

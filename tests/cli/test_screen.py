@@ -25,6 +25,9 @@ OTHER = frozenset(
             "neighbours",
             "further",
             "time_constant_days",
+            # Of a condition, in its unit.
+            "least",
+            "greatest",
             "axes",
             "bartlett",
             "by_chance",

@@ -25,7 +25,7 @@ def of_means(mean, t, piece):
     days = tuple(np.array([value]) for value in mean)
     return Campaigns(
         np.asarray(mean, float), np.asarray(t, float), np.asarray(piece), np.asarray(piece),
-        np.arange(len(mean)), days,
+        np.arange(len(mean)), days, np.zeros(len(mean), dtype=np.intp),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy
 
-from monitor.cli.trend_output import _warm_up
+from monitor.cli.dependence_output import _warm_up
 from monitor.documents import from_document, to_document
 from monitor.reporting.lacks import Cause
 from monitor.statistics import control_false_discoveries

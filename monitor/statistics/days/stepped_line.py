@@ -21,6 +21,7 @@ import scipy
 
 from monitor.records import Array
 from monitor.statistics.days.rival_scatter import factor
+from monitor.statistics.groups import group_columns, independent_columns
 from monitor.statistics.sums import label_groups
 
 #: Variance of what a machine wanders by between neighbouring campaigns, in that of their independent scatter.
@@ -41,7 +42,8 @@ class Campaigns:
     between two events or changes that they lie in, with their ``label``; ``days`` (c,) are the means of their days.
 
     ``era`` (c,) numbers the stretches between events alone: what the machine does in one, it does without an event.
-    A campaign that an event cuts in two is two.
+    A campaign that an event cuts in two is two. Campaigns of one ``group`` (c,) are off together, as those that one
+    instrument measured; 0 where nobody says them.
     """
 
     mean: Array
@@ -50,6 +52,7 @@ class Campaigns:
     era: npt.NDArray[np.intp]
     label: npt.NDArray[Any]
     days: tuple[Array, ...]
+    group: npt.NDArray[np.intp]
 
     @property
     def of_day(self) -> tuple[float, int]:
@@ -66,6 +69,7 @@ def campaigns_of(
     piece: npt.NDArray[np.intp],
     campaign: npt.ArrayLike,
     era: npt.NDArray[np.intp] | None = None,
+    group: npt.NDArray[np.intp] | None = None,
 ) -> Campaigns:
     """Return the means of the means of days of each campaign, from runs (n,) with the labels of theirs; without ``era``
     the pieces are between events alone."""
@@ -83,11 +87,12 @@ def campaigns_of(
     )
     first = np.unique(part.ravel(), return_index=True)[1]
     era = parts[:, 0] if era is None else era[first]
+    group = np.zeros(len(first), dtype=np.intp) if group is None else group[first]
     order = np.lexsort((at, parts[:, 0]))
     of_days = np.split(mean_of_day, np.cumsum(count)[:-1])
     return Campaigns(
         mean[order], at[order], parts[order, 0], era[order], labels[first][order],
-        tuple(of_days[index] for index in order),
+        tuple(of_days[index] for index in order), group[order],
     )  # fmt: skip
 
 
@@ -128,21 +133,23 @@ class SteppedLine:
 def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> SteppedLine | None:
     """Return the step between the campaigns ``before`` and ``after`` (indices), the last and the first of two pieces.
 
-    With ``levels`` it is that of the two lines, otherwise that of these two campaigns alone. None where the campaigns
-    leave fewer than ``ENOUGH`` degrees of freedom beside the lines, do not differ, or show no rate: those of each
-    piece are of one time.
+    With ``levels`` it is that of the two lines, otherwise that of these two campaigns alone. Groups may be off by any
+    amount each. None where the campaigns leave fewer than ``ENOUGH`` degrees of freedom beside these, do not differ, or
+    show no rate: those of each piece and group are of one time. None as well where no group says how far the two lines
+    lie apart, since none was measured on both sides.
     """
     inside = _near(campaigns, before, after)
     before, after = int(inside[:before].sum()), int(inside[:after].sum())
-    y, t, piece = campaigns.mean[inside], campaigns.t[inside], campaigns.piece[inside]
-    dof = len(y) - len(np.unique(piece)) - 1
-    of = np.unique(piece, return_inverse=True)[1]
-    about = t - t[0] - (np.bincount(of, t - t[0]) / np.bincount(of))[of]
-    if dof < ENOUGH or np.ptp(y) == 0.0 or np.ptp(about) < SAME_TIME:
+    y, t = campaigns.mean[inside], campaigns.t[inside]
+    piece, group = campaigns.piece[inside], campaigns.group[inside]
+    levels_of, _ = _levels(piece, group)
+    dof = len(y) - levels_of.shape[1] - 1
+    if dof < ENOUGH or np.ptp(y) == 0.0 or not _is_told(t, piece, group, before, after, levels):
         return None
     y = y - y[before]
     results, likelihoods = [], []
-    for form in _forms(tuple(t.tolist()), tuple(piece.tolist()), before, after, levels):
+    plan = tuple(t.tolist()), tuple(piece.tolist()), tuple(group.tolist())
+    for form in _forms(*plan, before, after, levels):
         white = form.whiten @ y
         squares = float(white @ white - np.sum((form.basis.T @ white) ** 2))
         # Points on a line to the last digit have no scatter at all.
@@ -161,6 +168,34 @@ def stepped_line(campaigns: Campaigns, before: int, after: int, *, levels: bool)
     return min(open_, key=lambda line: abs(line.step) / line.u)
 
 
+def _levels(piece: npt.NDArray[np.intp], group: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.intp]]:
+    """Columns (c, k) of the levels of pieces and of what groups are off by, as many as say different things, and the
+    number (c,) of the column of each piece."""
+    of = np.unique(piece, return_inverse=True)[1]
+    columns = np.column_stack([np.eye(int(of.max()) + 1)[of], group_columns(group)])
+    return columns[:, independent_columns(columns)], of
+
+
+def _is_told(
+    t: Array, piece: npt.NDArray[np.intp], group: npt.NDArray[np.intp], before: int, after: int, levels: bool
+) -> bool:
+    """Whether the times show a rate beside the levels, and a group how far the pieces of two campaigns lie apart."""
+    columns, of = _levels(piece, group)
+    away = t - t.mean()
+    rest = away - columns @ np.linalg.lstsq(columns, away, rcond=None)[0]
+    if np.ptp(rest) < SAME_TIME:
+        return False
+    if not levels:
+        return bool(group[before] == group[after])
+    # Pieces are of one part where a chain of groups leads from one to the other.
+    reached = np.zeros(len(t), dtype=np.bool_)
+    grown = of == of[before]
+    while (grown & ~reached).any():
+        reached |= grown
+        grown = np.isin(group, group[reached]) | np.isin(of, of[reached])
+    return bool(reached[after])
+
+
 def moves(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> tuple[float, int]:
     """Return the largest difference of two campaigns that follow each other in one era, and how many there are.
 
@@ -173,13 +208,16 @@ def moves(campaigns: Campaigns, before: int, after: int, *, levels: bool) -> tup
         ends = [np.flatnonzero(inside & (campaigns.piece == campaigns.piece[end])) for end in (before, after)]
     first, second = (float(campaigns.t[side].mean()) for side in ends)
     gap = second - first
-    together = (
-        inside[1:] & inside[:-1] & (np.diff(campaigns.era) == 0) & (np.diff(campaigns.t) > 0.0)
-    ).nonzero()[0]
-    if not len(together):
-        return 0.0, 0
-    longer = np.maximum(1.0, gap / np.diff(campaigns.t)[together])
-    return float(np.max(np.abs(np.diff(campaigns.mean)[together]) * longer)), len(together)
+    largest, pairs = 0.0, 0
+    for group in np.unique(campaigns.group[inside]):
+        # Of each group by itself: what two of them are apart is no move.
+        those = np.flatnonzero(inside & (campaigns.group == group))
+        era, t, mean = (np.diff(column[those]) for column in (campaigns.era, campaigns.t, campaigns.mean))
+        together = (era == 0) & (t > 0.0)
+        longer = np.maximum(1.0, gap / t[together])
+        largest = max(largest, float(np.max(np.abs(mean[together]) * longer, initial=0.0)))
+        pairs += int(together.sum())
+    return largest, pairs
 
 
 def _near(campaigns: Campaigns, before: int, after: int) -> npt.NDArray[np.bool_]:
@@ -209,14 +247,20 @@ class _Form:
 
 @lru_cache(maxsize=128)
 def _forms(
-    t: tuple[float, ...], piece: tuple[int, ...], before: int, after: int, levels: bool
+    t: tuple[float, ...],
+    piece: tuple[int, ...],
+    group: tuple[int, ...],
+    before: int,
+    after: int,
+    levels: bool,
 ) -> tuple[_Form, ...]:
-    """The forms of all mixtures for campaigns at times in pieces; the parameters of a machine share them."""
-    at, of = np.array(t), np.unique(piece, return_inverse=True)[1]
+    """The forms of all mixtures for campaigns at times in pieces and groups; the parameters of a machine share them."""
+    at = np.array(t)
+    columns, of = _levels(np.array(piece, dtype=np.intp), np.array(group, dtype=np.intp))
     gaps = np.diff(at)[np.diff(at) > 0.0]
     unit = float(np.median(gaps)) if len(gaps) else 1.0
     gap = float(at[after] - at[before])
-    design = np.column_stack([np.eye(int(of.max()) + 1)[of], (at - at[before]) / unit])
+    design = np.column_stack([columns, (at - at[before]) / unit])
     walked = (np.minimum.outer(at, at) - at.min()) / unit
     forms = []
     for wander in MIXTURES:

@@ -26,7 +26,9 @@ from monitor.statistics.normalised_error import K, normalised_error, result_of_r
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.in_common import RestsOn, calibrated_alike, rests_on
-from monitor.workflow.history.series import day_numbers
+from monitor.workflow.history.other_instruments import calibrations_may_do
+from monitor.workflow.history.series import UNSURE, day_numbers
+from monitor.workflow.history.what_measured import what_measured
 
 #: Level of false calls of one parameter at one event.
 LEVEL = 0.05
@@ -109,7 +111,7 @@ class AgreementPair:
 class _Comparison:
     """A pair without its numbers; ``before`` and ``after`` (n,) select the runs of its campaigns.
 
-    ``stretch`` (n,) numbers the runs of the method by the events before them, -1 for other methods.
+    ``stretch`` (n,) numbers the runs by the events before them.
     """
 
     pair: AgreementPair
@@ -127,7 +129,8 @@ def agreement(
     evaluated for its campaign (the latest `monitor uncertainty`), and the scatter of its runs. Before and after an
     event
     one method measured with the same artefact and probe: what they share drops out, and the scatter of runs and days is
-    left (``before_after``), with the machine's other days where both sides have few.
+    left (``before_after``), with the machine's other days where both sides have few. What the machine drifts by between
+    them is taken out (``beside_drift``), as the campaigns of all instruments show it that know the parameter as well.
     """
     comparisons = list(_comparisons(history, events))
     # Of years of campaigns few are compared: only their results are read.
@@ -158,7 +161,7 @@ def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Ite
             before = of_method & (seconds < event.at.timestamp())
             after = of_method & (seconds >= event.at.timestamp())
             if before.any() and after.any():
-                stretch = np.where(of_method, np.searchsorted(moments, seconds, side="right"), -1)
+                stretch = np.searchsorted(moments, seconds, side="right")
                 # A campaign that the event cuts in two is compared with itself: its runs before, its runs after; of
                 # one that several events cut those next to this one.
                 before &= stretch == stretch[before][-1]
@@ -207,16 +210,19 @@ def _across_event(
         return None
     values, stretch = history.values[:, column], comparison.stretch
     assert stretch is not None
-    finite = np.isfinite(values) & (stretch >= 0)
-    rest = finite & ~np.isin(days, days[before | after])
+    by = what_measured(history, column, history.common_parts)[1]
+    of_method = np.isfinite(values) & (history.measured_by == comparison.pair.method)
+    rest = of_method & (by == by[before][-1]) & ~np.isin(days, days[before | after])
     others = OtherDays(values[rest], days[rest], stretch[rest], history.campaign[rest])
     try:
         result = before_after(values[before], values[after], days[before], days[after], others)
     except DataError:
         return None
+    # What the machine drifts by runs through the campaigns of all instruments, each off by its own amount.
+    sure = _as_sure(history, column, by, before | after)
     campaigns = campaigns_of(
-        values[finite], days[finite], history.seconds[finite] / SECONDS_PER_DAY, stretch[finite],
-        history.campaign[finite],
+        values[sure], days[sure], history.seconds[sure] / SECONDS_PER_DAY, stretch[sure], history.campaign[sure],
+        group=by[sure],
     )  # fmt: skip
     # Campaigns may overlap: by name, not by the order of their means in time.
     last, first = (
@@ -226,6 +232,13 @@ def _across_event(
     judged = beside_drift(result, campaigns, last, first, levels=False)
     agree, lack = _AGREE[judged.verdict(LEVEL)]
     line = judged.line
+    is_renewed = by[before][-1] != by[after][0]
+    if (
+        agree is False
+        and is_renewed
+        and calibrations_may_do(result.difference, result.u, _apart(history, column, before, after))
+    ):
+        agree, lack = None, Undecided.INSTRUMENTS_MAY_DO
     if line is None:
         return ParameterAgreement(
             unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
@@ -239,6 +252,27 @@ def _across_event(
         line.k * float(np.hypot(line.u, np.sqrt(judged.widest))), line.expected,
         line.rate * DAYS_OF_DRIFT if line.drifts else None,
     )  # fmt: skip
+
+
+def _as_sure(
+    history: MachineHistory, column: int, by: npt.NDArray[np.intp], pair: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """The runs (n,) of a parameter by the instruments that know it about as well as those of a ``pair`` (n,)."""
+    u = history.u[:, column]
+    limit = UNSURE * float(np.nanmedian(u[pair]))
+    finite = np.isfinite(history.values[:, column])
+    groups = [
+        group for group in np.unique(by[finite]) if float(np.median(u[finite & (by == group)])) <= limit
+    ]
+    return np.asarray(finite & (np.isin(by, groups) | np.isin(by, by[pair])))
+
+
+def _apart(
+    history: MachineHistory, column: int, before: npt.NDArray[np.bool_], after: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.float64]:
+    """What two sides are apart by for one standard uncertainty of each calibrated quantity (q,)."""
+    parts = history.common_parts.values()
+    return np.array([part[after, column].mean() - part[before, column].mean() for part in parts])
 
 
 def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair:

@@ -79,7 +79,7 @@ def _relative(u: Array) -> Array:
 class _Plan(NamedTuple):
     """What is searched at once; ``days`` are None where the values are means of days.
 
-    ``u`` are of the parameters whose runs weigh differently.
+    ``u`` are of the parameters whose runs weigh differently, ``groups`` of those that not one instrument measured.
     """
 
     t: Array
@@ -87,6 +87,7 @@ class _Plan(NamedTuple):
     days: npt.NDArray[Any] | None
     values: dict[str, Array]
     u: dict[str, Array]
+    groups: dict[str, npt.NDArray[np.intp]]
 
 
 def _too_few(runs: int) -> Lack:
@@ -110,7 +111,7 @@ def search_changes(
         try:
             history = find_changes(
                 plan.values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
-                u=plan.u, days=plan.days, cycle=DAYS_PER_YEAR,
+                u=plan.u, days=plan.days, cycle=DAYS_PER_YEAR, groups=plan.groups,
                 false_alarm=false_alarm * len(plan.values) / len(series),
                 # Five times as many trials as the level of one parameter in one piece needs at least.
                 trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),
@@ -136,10 +137,14 @@ def _plans(series: Sequence[Series]) -> list[_Plan]:
             u = _relative(u) if u is not None and u.max() > ALIKE * u.min() else None
             days = parameter.days
         key = (t.tobytes(), b"" if days is None else days.tobytes())
-        plan = plans.setdefault(key, _Plan(t, begins, days, {}, {}))
+        plan = plans.setdefault(key, _Plan(t, begins, days, {}, {}, {}))
         plan.values[parameter.name] = y
         if u is not None:
             plan.u[parameter.name] = u
+        if parameter.has_several_instruments:
+            # A day is one of a campaign, and so of what measured in it.
+            first = np.sort(np.unique(parameter.days, return_index=True)[1])
+            plan.groups[parameter.name] = parameter.measured[first] if days is None else parameter.measured
     return list(plans.values())
 
 

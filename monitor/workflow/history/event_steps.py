@@ -22,8 +22,10 @@ from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_
 from monitor.statistics.days.beside_drift import BesideDrift, Verdict, beside_drift
 from monitor.statistics.days.rival_scatter import Allowance
 from monitor.statistics.days.stepped_line import Campaigns, campaigns_of
+from monitor.statistics.groups import most_common
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
+from monitor.workflow.history.other_instruments import calibrations_may_do
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 
@@ -56,8 +58,9 @@ class EventStep:
     is not ``decided``, for one day a side may differ as much where nothing happened. Nor is it where independent days
     do not explain it and days that follow each other, or that scatter more on one side (``rival_scatter``), do; nor
     where one or two days of a side say too little of how days differ for a step among many parameters (``few_days``).
-    Where campaigns say what the machine does between events, ``size`` is beyond its drift (``beside_drift``), which is
-    ``drift`` in 30 days where one is seen.
+    Where other instruments measured on each side it is not, if their calibrations may be all of it; where some measured
+    on both, these are compared. Where campaigns say what the machine does between events, ``size`` is beyond its drift
+    (``beside_drift``), which is ``drift`` in 30 days where one is seen.
     """
 
     parameter: str
@@ -90,12 +93,13 @@ class EventStep:
 @dataclass(frozen=True)
 class _Compared:
     """Both sides of an event compared by their days and campaigns, and by their runs (None: too few); ``days``: of the
-    side with fewer."""
+    side with fewer; ``by_others``: other instruments measured on each side, and may be all of it."""
 
     step: EventStep
     by_runs: tuple[float, float] | None
     judged: BesideDrift
     days: int
+    by_others: bool = False
 
 
 def event_steps(
@@ -127,6 +131,8 @@ def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
     days = pair.judged.days
     if verdict is Verdict.DRIFT and days is not None:
         step = replace(step, size=days.difference, u=days.u, p_value=days.p_value())
+    if pair.by_others and (verdict is Verdict.STEPPED or verdict in _UNDECIDED):
+        return replace(step, undecided=Undecided.INSTRUMENTS_MAY_DO)
     if verdict in _UNDECIDED:
         return replace(step, undecided=_UNDECIDED[verdict])
     if verdict is Verdict.STEPPED:
@@ -141,7 +147,7 @@ def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
 
 
 def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) -> list[_Compared]:
-    steady = past.series.steady
+    steady = past.series.steady.sure
     ends = np.array([-np.inf, *sorted({*moments, *(change.at for change in past.search.changes)}), np.inf])
     # Which days scatter about which mean: the pieces between all ends.
     pieces = np.searchsorted(ends, steady.t, side="right")
@@ -155,6 +161,10 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         before = steady.part((steady.t >= earlier) & (steady.t < at))
         after = steady.part((steady.t >= at) & (steady.t < later))
         others = (steady.t < earlier) | (steady.t >= later)
+        both = most_common([before.measured, after.measured])
+        if both is not None:
+            before, after = (side.part(side.measured == both) for side in (before, after))
+            others &= steady.measured == both
         days = _by_days(before, after, steady.part(others), pieces[others])
         runs = _student(before.values, after.values)
         judged = _beside_drift(days, campaigns, int(pieces[first - 1]) if first else None)
@@ -164,8 +174,15 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         line = judged.line
         drift = line.rate * DAYS_OF_DRIFT if line is not None and line.drifts else None
         step = EventStep(steady.name, steady.unit, event, at, *numbers, drift=drift)
-        pairs[first] = _Compared(step, runs, judged, min(before.day_count, after.day_count))
+        by_others = both is None and judged.line is None and _may_be_calibrations(step, before, after)
+        pairs[first] = _Compared(step, runs, judged, min(before.day_count, after.day_count), by_others)
     return list(pairs.values())
+
+
+def _may_be_calibrations(step: EventStep, before: Series, after: Series) -> bool:
+    if min(len(before.values), len(after.values)) == 0:
+        return False
+    return calibrations_may_do(step.size, step.u, after.common_of_mean - before.common_of_mean)
 
 
 def _campaigns(steady: Series, pieces: npt.NDArray[np.intp], moments: Collection[float]) -> Campaigns | None:
@@ -173,7 +190,7 @@ def _campaigns(steady: Series, pieces: npt.NDArray[np.intp], moments: Collection
     if steady.campaign is None:
         return None
     eras = np.searchsorted(np.sort(list(moments)), steady.t, side="right")
-    return campaigns_of(steady.values, steady.days, steady.t, pieces, steady.campaign, eras)
+    return campaigns_of(steady.values, steady.days, steady.t, pieces, steady.campaign, eras, steady.measured)
 
 
 def _beside_drift(days: BeforeAfter | None, campaigns: Campaigns | None, before: int | None) -> BesideDrift:

@@ -33,6 +33,12 @@ K = 2.0
 LEVEL = 0.05
 
 
+def calibrations_may_do(size: float, u: float, apart: Array) -> bool:
+    """Return whether what two calibrations are ``apart`` by, (q,) for one standard uncertainty of each quantity, may be
+    all of a difference of ``size`` with ``u`` besides; True where nothing is known of them (all 0)."""
+    return not apart.any() or abs(size) <= K * float(np.hypot(u, np.linalg.norm(apart)))
+
+
 @dataclass(frozen=True)
 class OtherInstruments:
     """A step lies between runs that were measured ``before`` by other methods or instruments, or by other certificates

@@ -16,9 +16,12 @@ from monitor.store import FEWEST_STEADY, MachineHistory
 from monitor.units import DEGREE_CELSIUS, column_unit
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.in_common import with_unstored
+from monitor.workflow.history.what_measured import what_measured
 
 #: A run differs from others by this part of its u at least; less is rounding of what it has in common with them.
 LEAST_OF_RUN = 1e-3
+#: Instruments whose runs have so many times the u of the surest tell nothing beside it: their runs weigh a ninth.
+UNSURE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +32,10 @@ class Series:
     days, ``hour`` (n,) of the shop's clock, ``warm_up`` (n,) whether the machine was warming up; ``offset`` of the
     shop's clock from UTC, that of the machine's last run. ``temperature`` (n,) is that of the machine or its shop in °C
     as far as recorded (NaN: not), under the name ``thermometer``. ``campaign`` (n,) numbers the campaigns of the runs;
-    None where nobody says them. ``common_parts`` (n,) are what values change by for one standard uncertainty of each
-    calibrated quantity that outlasts a campaign; of the runs of the mask ``bounded`` (n,) only at most (None: none).
+    None where nobody says them. ``by`` (n,) numbers what measured them among ``instruments``: methods with instruments
+    and the certificates that the parameter rests on (None: nobody says). ``common_parts`` (n,) are what values change
+    by for one standard uncertainty of each calibrated quantity that outlasts a campaign; of the runs of the mask
+    ``bounded`` (n,) only at most (None: none).
     """
 
     name: str
@@ -47,6 +52,8 @@ class Series:
     campaign: npt.NDArray[np.intp] | None = None
     common_parts: Mapping[CommonQuantity, Array] = field(default_factory=dict)
     bounded: npt.NDArray[np.bool_] | None = None
+    instruments: tuple[str, ...] = ()
+    by: npt.NDArray[np.intp] | None = None
 
     def part(self, mask: npt.NDArray[np.bool_]) -> Series:
         """The runs of a mask (n,)."""
@@ -58,7 +65,29 @@ class Series:
             self.thermometer, None if self.campaign is None else self.campaign[mask],
             {quantity: part[mask] for quantity, part in self.common_parts.items()},
             None if self.bounded is None else self.bounded[mask],
+            self.instruments, None if self.by is None else self.by[mask],
         )  # fmt: skip
+
+    @cached_property
+    def measured(self) -> npt.NDArray[np.intp]:
+        """The numbers (n,) of what measured the runs."""
+        return np.zeros(len(self.t), dtype=np.intp) if self.by is None else self.by
+
+    @property
+    def sure(self) -> Series:
+        """The runs of the instruments that tell the parameter: of others, whose runs know it many times worse, a step
+        or a drift would have the scatter."""
+        weights = self.weights()
+        if weights is None or not self.has_several_instruments:
+            return self
+        of_each = {by: float(np.median(weights[self.measured == by])) for by in set(self.measured.tolist())}
+        surest = min(of_each.values())
+        return self.part(np.isin(self.measured, [by for by, u in of_each.items() if u <= UNSURE * surest]))
+
+    @property
+    def has_several_instruments(self) -> bool:
+        """Whether not all runs were measured by the same."""
+        return bool((self.measured != self.measured[:1]).any())
 
     @cached_property
     def day_count(self) -> int:
@@ -160,7 +189,7 @@ def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDA
             name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset,
             temperature, thermometer, campaign,
             {quantity: part[:, j] for quantity, part in common.items() if part[:, j].any()},
-            bounded if bounded.any() else None,
+            bounded if bounded.any() else None, *what_measured(history, j, common),
         )  # fmt: skip
         if mask.any():
             series[name] = (whole.part(mask), mask)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED, WORDED, named
+from monitor.reporting.confounding import Confounding
 from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.statistics.changes import DAYS_THAT_SHOW
@@ -145,7 +146,8 @@ class ConditionEffect:
     """How a parameter goes with a recorded condition, which ran ``from_`` a value ``to`` another.
 
     ``moves_with`` names conditions (or ``time``) that cannot be told apart from it; ``q_value`` is the false discovery
-    rate over the conditions of all parameters.
+    rate over the conditions of all parameters. Beside several instruments it is what goes with the condition within
+    each; where that cannot be told, ``not_decided`` says why, and the numbers are without the instruments.
     """
 
     channel: str
@@ -159,11 +161,13 @@ class ConditionEffect:
     to: float
     moves_with: tuple[str, ...]
     q_value: float | None
+    not_decided: Confounding | None = field(default=None, metadata={**WORDED, **OMITTED})
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A wave of a day or a year; ``q_value`` is the false discovery rate over the cycles of all parameters."""
+    """A wave of a day or a year; ``q_value`` is the false discovery rate over the cycles of all parameters, and
+    ``not_decided`` as of a condition."""
 
     cycle: str
     period_days: float
@@ -173,6 +177,7 @@ class Cycle:
     peak_at: str | None
     p_value: float | None
     q_value: float | None
+    not_decided: Confounding | None = field(default=None, metadata={**WORDED, **OMITTED})
 
 
 @dataclass(frozen=True)
@@ -326,13 +331,15 @@ class VectorCharts:
 
 @dataclass(frozen=True)
 class ReferencePeriod:
-    """What the charts compare with: ``points`` are runs or days; a false alarm comes once in so many of them."""
+    """What the charts compare with: ``points`` are runs or days; a false alarm comes once in so many of them. Where
+    several instruments measured, the charts are of the points ``measured_by`` one of them alone."""
 
     points: str
     reference_points: int
     reference_from: str | None
     reference_to: str | None
     average_run_length: float
+    measured_by: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 Points are the runs, or the means of the days where there are enough of them: runs of one day resemble each other,
 and a chart that takes them for independent raises false alarms. A recorded event begins the charts anew, as it splits
-the history: the step that it explains is stated at the event, and no alarm. Part of `monitor trend`.
+the history: the step that it explains is stated at the event, and no alarm. Of several instruments, each off by its own
+amount, the charts are of one alone, that which measured last of those with points enough. Part of `monitor trend`.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from monitor.store import MachineHistory
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date
 from monitor.workflow.history.changes import DAYS_FOR_MEANS
 from monitor.workflow.history.series import day_numbers, steady_runs
+from monitor.workflow.history.what_measured import what_measured
 from monitor.workflow.trend.answer import (
     CusumState,
     EwmaState,
@@ -91,6 +93,19 @@ def since_last_event(history: MachineHistory, events: Sequence[float]) -> Machin
     return history.part(t >= max((at for at in events if at <= last), default=-np.inf))
 
 
+def by_one_instrument(history: MachineHistory, *, by_days: bool) -> tuple[MachineHistory, str | None]:
+    """The runs by the instruments, with their certificates, that measured last of those with more points than the
+    shortest reference period; of the last ones where none has. With what they are called, None where all are by one."""
+    names, by = what_measured(history)
+    if len(names) == 1:
+        return history, None
+    steady = steady_runs(history)
+    labels = day_numbers(history) if by_days else np.arange(len(history.run))
+    enough = [group for group in range(len(names)) if len(np.unique(labels[steady & (by == group)])) > FEWEST]
+    charted = by[np.isin(by, enough)][-1] if enough else by[-1]
+    return history.part(by == charted), names[charted]
+
+
 def reference_points(points: Points, reference: tuple[float, float] | None) -> npt.NDArray[np.bool_]:
     """Mask (m,) of the reference period: the points between two times, or the first ones."""
     if reference is not None:
@@ -100,8 +115,8 @@ def reference_points(points: Points, reference: tuple[float, float] | None) -> n
 
 
 class Charts:
-    """All charts of a machine about one reference period: a named one (days since 1970), whatever happened, or the
-    first points since the last of ``events``."""
+    """All charts of a machine about one reference period: a named one (days since 1970), whatever happened and whoever
+    measured, or the first points since the last of ``events`` by one instrument."""
 
     def __init__(
         self, history: MachineHistory, offset: timedelta, events: Sequence[float],
@@ -109,15 +124,19 @@ class Charts:
     ) -> None:  # fmt: skip
         charted = history if reference is not None else since_last_event(history, events)
         # By the whole history: of the few days since an event the runs resemble each other, too.
-        self.points = points_of(charted, offset, by_days=are_days(history))
+        by_days = are_days(history)
         self.is_since_event = len(charted.run) < len(history.run)
+        self.instruments = None
+        if reference is None:
+            charted, self.instruments = by_one_instrument(charted, by_days=by_days)
+        self.points = points_of(charted, offset, by_days=by_days)
         self.inside = reference_points(self.points, reference)
 
     def period(self) -> ReferencePeriod:
         """The reference period in words and dates."""
         times = self.points.t[self.inside]
         first, last = (self._date(times[index]) if len(times) else None for index in (0, -1))
-        return ReferencePeriod(self.points.kind, len(times), first, last, RUN_LENGTH)
+        return ReferencePeriod(self.points.kind, len(times), first, last, RUN_LENGTH, self.instruments)
 
     def of(self, column: int) -> ParameterCharts:
         """Shewhart, EWMA and CUSUM of one parameter: state, limits, and the alarms after the reference period."""
@@ -153,7 +172,8 @@ class Charts:
 
     def _all_in_reference(self, count: int) -> Lack:
         cause = Cause.ALL_SINCE_EVENT_IN_REFERENCE if self.is_since_event else Cause.ALL_IN_REFERENCE
-        return Lack(Part.CHART, cause, count=count, name=self.points.kind)
+        by = "" if self.instruments is None else f" by {self.instruments}"
+        return Lack(Part.CHART, cause, count=count, name=f"{self.points.kind}{by}")
 
     def of_vector(self, names: tuple[str, ...], rng: np.random.Generator) -> VectorCharts:
         """T² and MEWMA of all parameters together; the shares say which of them raise the latest point."""

@@ -1,47 +1,24 @@
-"""What the history of one parameter says: drift, latest mean, changes, dependence, cycles.
-
-Parts of `monitor trend`. Where the runs do not suffice for a part, a ``Lack`` says why.
-"""
+"""What the history of one parameter says: drift, latest mean, calibrations, changes. Parts of `monitor trend`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from monitor.exceptions import DataError
-from monitor.records import Array
-from monitor.reporting.lacks import Cause, Lack, Part, refused
-from monitor.statistics import (
-    Change,
-    DependenceUnits,
-    dependence,
-)
-from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
+from monitor.statistics import Change
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.in_common import RestsOn, rests_on
 from monitor.workflow.history.series import Series
+from monitor.workflow.history.what_measured import COUNTS
 from monitor.workflow.trend.answer import (
-    ConditionEffect,
-    Cycle,
     DatedChange,
     DayResemblance,
     DriftStatement,
     LatestMean,
 )
-
-#: A cycle is fitted where its phases are seen: runs over half a day, and over the better part of a year.
-DAY_COVERAGE_H, YEAR_COVERAGE_D = 12.0, 300.0
-#: A dependence needs so many runs with the condition; a cycle so many, by its name.
-FEWEST_RUNS, FEWEST_OF_CYCLE = 6, {"day": 8, "year": 12}
-#: What runs rest on is named from this part of the u of a run on.
-COUNTS = 0.1
-#: Channels that go together more closely than this cannot be told apart (their variances inflate tenfold).
-COLLINEAR = 0.95
 
 
 def number(value: float | None) -> float | None:
@@ -148,87 +125,3 @@ def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedC
         time_constant_days=change.time_constant,
         p_at_most=True if np.isclose(change.p_value, least_p, rtol=1e-9, atol=0.0) else None,
     )
-
-
-def conditions(
-    series: Series, channels: Mapping[str, Array], since: float
-) -> tuple[tuple[ConditionEffect, ...], Lack | None]:
-    """Coefficients of the conditions, one at a time beside the drift; or why there are none.
-
-    One at a time because the channels of one campaign move together: a joint fit of four thermometers would
-    tell nothing of any of them.
-    """
-    piece = series.t >= since
-    effects = [
-        effect
-        for name in channels
-        if (effect := _condition(series, name, channels, piece & np.isfinite(channels[name]))) is not None
-    ]
-    if not effects:
-        return (), Lack(Part.CONDITIONS, Cause.NOTHING_VARIES)
-    return tuple(sorted(effects, key=lambda effect: 2.0 if effect.p_value is None else effect.p_value)), None
-
-
-def _condition(
-    series: Series, name: str, channels: Mapping[str, Array], mask: npt.NDArray[np.bool_]
-) -> ConditionEffect | None:
-    """The coefficient of one condition over the runs of a mask; None where it does not vary enough."""
-    values = channels[name][mask]
-    if len(values) < FEWEST_RUNS or np.ptp(values) == 0.0:
-        return None
-    part = series.part(mask)
-    channel = column_unit(name) or ONE
-    with_drift = part.day_count >= 3
-    drift: Literal["beside", False] = "beside" if with_drift else False
-    try:
-        fit = dependence(
-            part.values, part.t, {name: values}, drift=drift, u=part.weights(), days=part.days,
-            units=DependenceUnits(Unit(series.unit, 1.0), {name: channel}),
-        )  # fmt: skip
-    except DataError:
-        return None
-    coefficient = fit.coefficients[0]
-    inseparable = [
-        other for other, recorded in channels.items() if other != name and _together(values, recorded[mask])
-    ]
-    if with_drift and _together(values, part.t):
-        inseparable.append("time")
-    low, high = coefficient.interval
-    per = "K" if channel == DEGREE_CELSIUS else channel.name
-    unit = series.unit if channel == ONE else f"{series.unit}/{per}"
-    return ConditionEffect(
-        name, coefficient.value, coefficient.u, (low, high), unit, number(coefficient.p_value),
-        len(values), float(values.min()), float(values.max()), tuple(inseparable), None,
-    )  # fmt: skip
-
-
-def _together(a: Array, b: Array) -> bool:
-    if not np.isfinite(b).all() or np.ptp(b) == 0.0:
-        return False
-    return bool(abs(np.corrcoef(a, b)[0, 1]) > COLLINEAR)
-
-
-def cycles(piece: Series) -> tuple[tuple[Cycle, ...], Lack | None]:
-    """The cycles of day and year, where the record is long enough to see them beside the drift."""
-    n = len(piece.t)
-    periods = {}
-    if n >= FEWEST_OF_CYCLE["day"] and np.ptp(piece.hour) >= DAY_COVERAGE_H:
-        periods["day"] = 1.0
-    if n >= FEWEST_OF_CYCLE["year"] and np.ptp(piece.t) >= YEAR_COVERAGE_D:
-        periods["year"] = DAYS_PER_YEAR
-    if not periods:
-        return (), Lack(Part.CYCLES, Cause.NO_CYCLE_SEEN, needed=(DAY_COVERAGE_H, YEAR_COVERAGE_D))
-    try:
-        fit = dependence(
-            piece.values, piece.t, {}, cycles=periods, drift="beside" if piece.day_count >= 3 else False,
-            u=piece.weights(), days=piece.days,
-        )  # fmt: skip
-    except DataError as error:
-        return (), refused(Part.CYCLES, error)
-    return tuple(
-        Cycle(
-            wave.name, wave.period, wave.amplitude, wave.u, piece.unit, date(wave.peak_at, piece.offset),
-            number(wave.p_value), None,
-        )
-        for wave in fit.cycles
-    ), None  # fmt: skip

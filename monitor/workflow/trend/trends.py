@@ -47,23 +47,17 @@ from monitor.workflow.trend.answer import (
     StepAtEvent,
     TrendAnswer,
 )
+from monitor.workflow.trend.causes import METHOD, conditions, cycles
 from monitor.workflow.trend.control import Charts
 from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast
-from monitor.workflow.trend.parameter import (
-    calibrations,
-    conditions,
-    cycles,
-    dated_change,
-    drift_statement,
-    latest_mean,
-)
+from monitor.workflow.trend.parameter import calibrations, dated_change, drift_statement, latest_mean
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.volumetric import LimitQuestion, volumetric_forecast
 from monitor.workflow.trend.warming import warming
 
 #: What the stored answer about a whole machine is called.
-METHOD = "all parameters"
+WHOLE = "all parameters"
 
 
 def trend(db: Database, request: TrendRequest) -> TrendAnswer:
@@ -79,12 +73,12 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     is_stored = len(history.run) > 0 and request.is_plain and not db.read_only
     latest = None
     if is_stored and not db.is_lake:
-        latest = latest_text(db, "trend", method=METHOD, machine=request.machine)
+        latest = latest_text(db, "trend", method=WHOLE, machine=request.machine)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
     answer = _answer(db, request, history, events, past, refers_to)
     if past and is_stored:
         save_analysis(
-            db, "trend", to_document(answer), method=METHOD, machine=request.machine, seed=SEED, repeated=False,
+            db, "trend", to_document(answer), method=WHOLE, machine=request.machine, seed=SEED, repeated=False,
             latest=latest,
         )  # fmt: skip
     if request.weekly_looks:
@@ -352,7 +346,7 @@ class _Page:
         if len(set(self.history.measured_by.tolist())) > 1:
             method = self.history.measured_by[mask]
             for name in list(dict.fromkeys(method.tolist()))[1:]:
-                channels[f"method {name}"] = (method == name).astype(np.float64)
+                channels[f"{METHOD}{name}"] = (method == name).astype(np.float64)
         return channels
 
 

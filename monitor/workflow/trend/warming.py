@@ -19,7 +19,8 @@ from monitor.statistics import Change, warm_up
 from monitor.statistics.mixed import fit_with_days
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import WarmUp
-from monitor.workflow.trend.parameter import FEWEST_RUNS, number
+from monitor.workflow.trend.causes import FEWEST_RUNS
+from monitor.workflow.trend.parameter import number
 
 
 def warming(
