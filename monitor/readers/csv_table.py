@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.delimited import is_number
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.packed_cells import CELLS_AT_ONCE, PackedCells
 from monitor.readers.spreadsheet import plain_csv
 
 #: Lines at the top of a file among which the head may stand under a title.
@@ -21,8 +23,6 @@ _NAME = re.compile(r"[A-Za-z]\w*")
 LONGEST_LINE = 65_536
 #: Most lines of one file: two years of touching without a pause, at one touch a minute.
 MOST_LINES = 1_000_000
-#: How many rows are held before their cells go into the columns.
-_ROWS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -161,9 +161,10 @@ def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
 
 
 def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_workbook: bool) -> CsvTable:
-    columns: list[list[str]] = [[] for _ in header]
+    columns = [PackedCells() for _ in header]
     rows: list[list[str]] = []
-    at: list[int] = []
+    # A list of a million numbers takes 40 MB.
+    at = array("q")
     damaged: list[tuple[str, ...]] = []
     width = len(header)
     for number, row in _rows(lines):
@@ -179,7 +180,7 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_
         elif is_whole:
             rows.append(row)
             at.append(number)
-            if len(rows) == _ROWS_AT_ONCE:
+            if len(rows) == CELLS_AT_ONCE:
                 _move(rows, columns)
         else:
             hint = "; is a comma used as decimal point?" if len(row) > width and not of_workbook else ""
@@ -191,7 +192,7 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults, *, of_
     return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged), of_workbook)
 
 
-def _move(rows: list[list[str]], columns: list[list[str]]) -> None:
+def _move(rows: list[list[str]], columns: list[PackedCells]) -> None:
     """Put rows at the end of the columns and empty their list: all at once they would be twice in memory."""
     for column, cells in zip(columns, zip(*rows, strict=True), strict=False):
         column.extend(cells)

@@ -6,12 +6,14 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.readers.csv_table import CsvTable
 from monitor.readers.faults import Faults, quoted
+from monitor.readers.packed_cells import CELLS_AT_ONCE
 
 Mask = npt.NDArray[np.bool_]
 
@@ -19,8 +21,8 @@ Mask = npt.NDArray[np.bool_]
 LARGEST_WHOLE = 2**31 - 1
 # What a decimal number is written with. The rest of Python's float syntax (nan, 1_000, other scripts' digits)
 # needs other characters, so a column that keeps to these can be handed to float() as it is.
-NUMBER_CHARACTERS = frozenset("0123456789+-.eE\n")
-DIGITS = frozenset("0123456789\n")
+NUMBER_CHARACTERS = frozenset("0123456789+-.eE")
+DIGITS = frozenset("0123456789")
 # Dashes that word processors put in row of a minus.
 TYPOGRAPHIC_MINUS = "\u2212\u2013\u2014\u2010\u2011\ufe63\uff0d"
 
@@ -44,14 +46,10 @@ class Wholes:
 def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool = False) -> Numbers:
     """Read the column as finite numbers; empty cells are NaN where they are allowed."""
     cells = table.columns[column]
-    if set("\n".join(cells)) <= NUMBER_CHARACTERS:
+    if _characters(cells) <= NUMBER_CHARACTERS:
+        read = (float(cell) if cell else math.nan for cell in cells) if may_be_empty else map(float, cells)
         try:
-            values = np.array(
-                [float(cell) if cell else math.nan for cell in cells]
-                if may_be_empty
-                else list(map(float, cells)),
-                dtype=np.float64,
-            )
+            values = np.fromiter(read, dtype=np.float64, count=len(cells))
         except ValueError:
             pass
         else:
@@ -63,8 +61,9 @@ def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool 
 def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
     """Read the column as whole numbers from 0."""
     cells = table.columns[column]
-    if cells and all(cells) and max(map(len, cells)) < 10 and set("\n".join(cells)) <= DIGITS:
-        return Wholes(np.array(list(map(int, cells)), dtype=np.int64), np.ones(len(cells), dtype=np.bool_))
+    if cells and all(cells) and max(map(len, cells)) < 10 and _characters(cells) <= DIGITS:
+        whole = np.fromiter(map(int, cells), dtype=np.int64, count=len(cells))
+        return Wholes(whole, np.ones(len(cells), dtype=np.bool_))
     values = np.full(len(cells), -1, dtype=np.int64)
     for row, cell in enumerate(cells):
         if re.fullmatch(r"[0-9]{1,20}", cell) and int(cell) <= LARGEST_WHOLE:
@@ -76,6 +75,15 @@ def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
                 fault, right = f"{quoted(cell)} is a date", "number them: 1 for the first, 2 for the next"
             faults.add(table.file, table.lines[row], column, f"{fault}; {right}")
     return Wholes(values, values >= 0)
+
+
+def _characters(cells: Sequence[str]) -> set[str]:
+    """Return what the cells are written with; the text of a part of them is put together at a time."""
+    characters: set[str] = set()
+    rest = iter(cells)
+    for _ in range(0, len(cells), CELLS_AT_ONCE):
+        characters.update("".join(islice(rest, CELLS_AT_ONCE)))
+    return characters
 
 
 def _numbers_one_by_one(
@@ -101,7 +109,7 @@ def what_is_wrong(cell: str) -> str | None:
     if not cell:
         return "the cell is empty; a number is needed"
     shown = quoted(cell)
-    if set(cell) <= NUMBER_CHARACTERS and "\n" not in cell:
+    if set(cell) <= NUMBER_CHARACTERS:
         try:
             value = float(cell)
         except ValueError:

@@ -107,7 +107,7 @@ class _Columns:
             self.run.values,
             self.sequence.values,
             self.time.values,
-            np.array(self.target, dtype=np.str_),
+            np.array(list(self.target), dtype=np.str_),
             {
                 axis.name: self.readings[name].values * axis.unit.factor
                 for name, axis in expected.columns.items()

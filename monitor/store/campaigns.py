@@ -128,14 +128,17 @@ def _record(db: Database, name: str, campaign_id: int, content: str) -> None:
     audit.record(db, "import", "campaign", name, with_bookkeeping(db, "campaign", campaign_id, content))
 
 
-def load_campaign(db: Database, name: str) -> Campaign:
-    """The campaign as it was imported. Raises NotFoundError listing what is there, DataError for a curve."""
+def load_campaign(db: Database, name: str, *, with_files: bool = True) -> Campaign:
+    """The campaign as it was imported, with the bytes of its files or without.
+
+    Raises NotFoundError listing what is there, DataError for a curve.
+    """
     if is_curve(db, name):
         raise DataError(
             f"campaign {name} is a curve, not a machine: it can be identified, compared and explained "
             "(monitor identify, compare, explain, model)"
         )
-    campaign, _ = _load(db, campaign_number(db, name))
+    campaign, _ = _load(db, campaign_number(db, name), with_files=with_files)
     return campaign
 
 
@@ -262,7 +265,9 @@ def _insert_runs(db: Database, campaign_id: int, added: tuple[Run, ...]) -> None
         )
 
 
-def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedProbings]:
+def _load(
+    db: Database, campaign_id: int, *, with_files: bool = True
+) -> tuple[Campaign, probings.PrintedProbings]:
     ((name, method, machine, probe, artefact),) = db.rows(
         "SELECT campaign, method, machine_description, probe, artefact FROM imported_campaign WHERE campaign_id = ?",
         [campaign_id],
@@ -288,7 +293,7 @@ def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedPro
             for run, at, offset, day, warm_up, names, values in stored_runs
         ),
         probings=probings.as_record(rows, described),
-        files=source_files(db, campaign_id),
+        files=source_files(db, campaign_id) if with_files else (),
         sources=sources,
     )
     return campaign, rows

@@ -156,8 +156,13 @@ class Whitening:
         readings = numbers[..., : rows.count].reshape(*numbers.shape[:-1], touches, rows.numbers)
         if rows.turned is not None:
             readings = (rows.turned @ readings[..., None])[..., 0]
+        # All columns of a run in one product: one by one each would read the whole triangle.
+        columns = np.moveaxis(readings.reshape(-1, *readings.shape[-3:]), 0, 2)
+        innovations = self.factors[0] @ columns.reshape(*columns.shape[:2], -1)
         white = np.array(numbers)
-        white[..., : rows.count] = (self.factors[0] @ readings).reshape(*numbers.shape[:-1], rows.count)
+        white[..., : rows.count] = np.moveaxis(innovations.reshape(columns.shape), 2, 0).reshape(
+            *numbers.shape[:-1], rows.count
+        )
         return white
 
     def undone(self, white: Array) -> Array:
