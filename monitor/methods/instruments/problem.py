@@ -308,6 +308,11 @@ class InstrumentProblem(ChainProblem):
         taken if it is one."""
         return {} if self.masks is None else self.masks
 
+    def with_base(self, effects: tuple[ChainEffect, ...]) -> Self:
+        """Return the problem with further base effects, and nothing of what the setups cannot separate taken out."""
+        whole = replace(self, is_whole=True, separated=None, from_others=None)
+        return replace(whole, base=(*self.base, *effects))
+
     def with_products(self) -> Self:
         """The problem with all derivatives of its numbers, also those that are products of errors."""
         return replace(self, separated=self._separated, has_products=True)
