@@ -28,6 +28,7 @@ class AdviceKind(Enum):
     MORE_MODULES = "more_modules"
     MORE_REFLECTORS = "more_reflectors"
     MORE_POSES = "more_poses"
+    OTHER_MEASUREMENT = "other_measurement"
     OWN_WORDS = "own_words"
 
     @property
@@ -81,8 +82,8 @@ class Reason:
 
     Of NOT_SEPARATED, ``others`` are the unknowns that they cannot be told from, beside each other; of HELD_AT_ZERO
     those that do the same. Of BARELY_SEEN, ``u`` is the standard uncertainty, in ``unit``, that exceeds what a machine
-    may have; of NOT_SHOWN, OUTSIDE_MODEL and TURNS_WORKPIECE the largest error of the tool, in ``unit``, that an error of
-    ``size`` makes beside all numbers.
+    may have; of NOT_SHOWN, OUTSIDE_MODEL and TURNS_WORKPIECE the largest error of the tool, in ``unit``, that an error
+    of ``size`` makes beside all numbers.
     """
 
     kind: ReasonKind

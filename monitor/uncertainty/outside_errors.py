@@ -1,9 +1,9 @@
 """The position and orientation errors that are in no number of a run, and in no uncertainty: what the tool would miss.
 
 A machine has more errors than a campaign tells: the zero of a head that no reading shows, a table's tilt while the
-table stood still. Each is taken as 100 µrad or 10 µm. What it would do to the readings is fitted by the numbers that the
-run has, by what it leaves open and by the unknowns of the setups; what the tool misses beside these numbers is outside.
-All to first order, on a machine without errors.
+table stood still. Each is taken as 100 µrad or 10 µm. What it would do to the readings is fitted by the numbers that
+the run has, by what it leaves open and by the unknowns of the setups; what the tool misses beside these numbers is
+outside. All to first order, on a machine without errors.
 """
 
 from __future__ import annotations

@@ -28,8 +28,7 @@ HALF_STROKE = 200.0
 def iso_errors(word: str) -> dict[str, str]:
     """The position and orientation errors that ISO 230-1 gives every axis of a machine, each with the axis.
 
-    A linear axis has two tilts and its zero, a rotary axis two shifts, two tilts and its zero. Those of the first axis of
-    the work branch (of the tool branch where there is none) define the frame.
+    A linear axis has two tilts and its zero, a rotary axis two shifts, two tilts and its zero.
     """
     work, _, tool = word.removeprefix("w ").removesuffix(" t").partition("b")
     names = {}
