@@ -83,9 +83,9 @@ def outside_errors(
     besides: Iterable[str] = (),
 ) -> tuple[OutsideError, ...]:
     """The errors that are in no number of ``geometric``, of which the tool misses more than 0.1 µm at ``positions``
-    (n, J), the workpiece set to zero at ``datum`` (J,); ``besides`` are told already."""
-    told = {*besides, *geometric.names, *problem.base_names}
-    symbols = [symbol for symbol in axis_errors(geometric.chain) if symbol not in told]
+    (n, J), the workpiece set to zero at ``datum`` (J,); ``besides`` are named already."""
+    known = {*besides, *geometric.names, *problem.base_names}
+    symbols = [symbol for symbol in axis_errors(geometric.chain) if symbol not in known]
     effects = tuple(parse_effect(symbol, geometric.chain) for symbol in symbols)
     extra = tuple(effect for effect in effects if isinstance(effect, ChainEffect))
     if not extra:

@@ -310,8 +310,7 @@ class InstrumentProblem(ChainProblem):
 
     def with_base(self, effects: tuple[ChainEffect, ...]) -> Self:
         """Return the problem with further base effects, and nothing of what the setups cannot separate taken out."""
-        whole = replace(self, is_whole=True, separated=None, from_others=None)
-        return replace(whole, base=(*self.base, *effects))
+        return replace(super().with_base(effects), is_whole=True, separated=None, from_others=None)
 
     def with_products(self) -> Self:
         """The problem with all derivatives of its numbers, also those that are products of errors."""

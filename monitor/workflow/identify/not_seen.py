@@ -36,10 +36,10 @@ def not_seen(
     if len(ranges) < 3 or len(problem.context) > ROWS_AT_ONCE:
         return ()
     geometric = _numbers(problem, solution, identification, run)
-    told = [name for refusal in run.refused for name in refusal.parameters]
-    told += [taken.parameter for taken in identification.taken_up if not taken.by]
+    refused = [name for refusal in run.refused for name in refusal.parameters]
+    refused += [taken.parameter for taken in identification.taken_up if not taken.by]
     poses = grid(chain, ranges, 2, _turned(chain))
-    return outside_errors(problem, geometric, poses, middle(chain, ranges), told)
+    return outside_errors(problem, geometric, poses, middle(chain, ranges), refused)
 
 
 def seen_by(
