@@ -84,8 +84,8 @@ def outside_errors(
 ) -> tuple[OutsideError, ...]:
     """The errors that are in no number of ``geometric``, of which the tool misses more than 0.1 µm at ``positions``
     (n, J), the workpiece set to zero at ``datum`` (J,); ``besides`` are named already."""
-    known = {*besides, *geometric.names, *problem.base_names}
-    symbols = [symbol for symbol in axis_errors(geometric.chain) if symbol not in known]
+    excluded = {*besides, *geometric.names, *problem.base_names}
+    symbols = [symbol for symbol in axis_errors(geometric.chain) if symbol not in excluded]
     effects = tuple(parse_effect(symbol, geometric.chain) for symbol in symbols)
     extra = tuple(effect for effect in effects if isinstance(effect, ChainEffect))
     if not extra:
@@ -136,8 +136,8 @@ def _taken_for(
     scale[scale == 0.0] = 1.0
     errors = local[:, first:last]
     unknowns = np.linalg.pinv(columns / scale, rcond=RANK_TOLERANCE) @ errors
-    left = np.linalg.norm(errors - (columns / scale) @ unknowns, axis=0)
-    return (unknowns / scale[:, None])[[names.index(name) for name in geometric.names]], left
+    unexplained = np.linalg.norm(errors - (columns / scale) @ unknowns, axis=0)
+    return (unknowns / scale[:, None])[[names.index(name) for name in geometric.names]], unexplained
 
 
 def _workpiece_turned(geometric: GeometricErrors, positions: Array, datum: Array | None) -> Array:
