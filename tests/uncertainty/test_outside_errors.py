@@ -18,9 +18,15 @@ from monitor.methods.chain.identification import Identification
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
+from monitor.store import Database, import_campaign
 from monitor.uncertainty.geometric_errors import GeometricErrors
 from monitor.uncertainty.outside_errors import OutsideError, axis_errors, outside_errors
 from monitor.uncertainty.volumetric import VolumetricError, grid, middle, volumetric_error
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.plan.answer import InstrumentPlanAnswer
+from monitor.workflow.plan.plan import plan
+from monitor.workflow.plan.request import PlanRequest
 from tests.simulator.serial_machines import HALF_STROKE, TOOL, SerialMachine, campaign, iso_errors
 
 #: The machines, and the rotary axes around which the R-test goes.
@@ -163,3 +169,19 @@ def test_a_zero_that_the_readings_show_gets_a_number_in_the_model(tmp_path: Path
     assert within.geometric.estimate[index] == pytest.approx(1e-4, rel=0.01)
     assert "EB0B" not in {each.symbol for each in within.outside}
     assert within.beyond[0] < 1e-4
+
+
+@pytest.mark.slow
+def test_identify_and_plan_name_the_measurement(tmp_path: Path) -> None:
+    """The zero of a head has an R-test that would show it; a plan asked for it gives the test's u."""
+    with Database(tmp_path / "shop.duckdb") as db:
+        machine = SerialMachine("w C b X Y Z B t", {})
+        import_campaign(db, read_campaign(campaign(tmp_path / "head", machine, 1, 1.0, ["C"])))
+        answer = identify(db, IdentifyRequest("head"))
+        named = [refused.parameters for refused in answer.not_seen or ()]
+        assert ("EB0B",) in named
+        assert (answer.seen_by or {})["EB0B"].reading == "vector"
+        planned = plan(db, PlanRequest("head", parameters=("EB0B",)))
+        assert isinstance(planned, InstrumentPlanAnswer)
+        assert planned.present["EB0B"] is None
+        assert planned.tests[0].u["EB0B"] is not None
