@@ -120,7 +120,7 @@ def with_points(
                     else "say in the mapping which is the decimal mark: decimal = \"comma\" or decimal = \"point\""
                 ),
             )  # fmt: skip
-        elif grouped is not None:
+        elif grouped is not None and not _has_decimals(rows, "." if comma is None else ","):
             faults.add(
                 file, grouped[0], None,
                 f"{quoted(grouped[1])} may have a decimal mark or a thousands separator, as others of its column are "
@@ -144,6 +144,12 @@ def _grouped(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[int, 
         if groups and whole and len(groups) + len(whole) == len(numbers) and max(map(_size, whole)) < 1000:
             return lines[column.index(groups[0])], groups[0]
     return None
+
+
+def _has_decimals(rows: Sequence[Sequence[str]], mark: str) -> bool:
+    """Whether a number of any column shows that the mark is a decimal one: it has other than groups of three digits."""
+    cells = (cell for row in rows for cell in row if mark in cell)
+    return any(is_number(cell) and not _GROUPED.fullmatch(cell) for cell in cells)
 
 
 def _size(cell: str) -> int:

@@ -55,6 +55,12 @@ def source_files(db: Database, campaign_id: int) -> tuple[SourceFile, ...]:
     )
 
 
+def source_hashes(db: Database, campaign_id: int) -> tuple[SourceFile, ...]:
+    """Return the files of a campaign with their hashes as stored, without what is in them."""
+    rows = db.rows("SELECT file, sha256 FROM source_file WHERE campaign_id = ? ORDER BY rowid", [campaign_id])
+    return tuple(SourceFile(name, b"", sha256) for name, sha256 in rows)
+
+
 def archive_files(
     db: Database,
     folder: str | Path,

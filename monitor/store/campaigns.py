@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Literal
 
@@ -13,8 +13,9 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
 from monitor.records import Campaign, CurveCampaign, Run
+from monitor.row_files import is_of_mapping
 from monitor.store import audit, probings, record_json
-from monitor.store.archiving import source_files
+from monitor.store.archiving import source_files, source_hashes
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -129,7 +130,7 @@ def _record(db: Database, name: str, campaign_id: int, content: str) -> None:
 
 
 def load_campaign(db: Database, name: str, *, with_files: bool = True) -> Campaign:
-    """The campaign as it was imported, with the bytes of its files or without.
+    """The campaign as it was imported, with its files or, of a campaign folder, their names and hashes alone.
 
     Raises NotFoundError listing what is there, DataError for a curve.
     """
@@ -293,9 +294,12 @@ def _load(
             for run, at, offset, day, warm_up, names, values in stored_runs
         ),
         probings=probings.as_record(rows, described),
-        files=source_files(db, campaign_id) if with_files else (),
+        files=source_files(db, campaign_id) if with_files else source_hashes(db, campaign_id),
         sources=sources,
     )
+    if not with_files and is_of_mapping(campaign):
+        # What is said of a row says where it stands in the files of its owner.
+        campaign = replace(campaign, files=source_files(db, campaign_id))
     return campaign, rows
 
 

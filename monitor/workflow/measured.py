@@ -10,7 +10,10 @@ from monitor.store import Database, is_curve, load_campaign, load_curve
 
 
 def load_measured(db: Database, name: str) -> Campaign | CurveCampaign:
-    """The campaign of that name, of a machine (without its files) or a curve. Raises NotFoundError."""
+    """The campaign of that name, of a machine (of a folder without what is in its files) or a curve.
+
+    Raises NotFoundError.
+    """
     return load_curve(db, name) if is_curve(db, name) else load_campaign(db, name, with_files=False)
 
 

@@ -391,3 +391,34 @@ def test_a_circle_that_ends_within_an_angle_is_refused(tmp_path):
     text = (EXAMPLES / LASERS / "bar-xy.bar").read_text()
     with pytest.raises(CampaignError, match="'36' is the beginning of a row: the file is cut here"):
         changed(tmp_path, LASERS, "bar-xy.bar", (text, text.replace(".", ",") + "36"))
+
+
+@pytest.mark.parametrize("head", ["Samples: 100\n", "Points: 5\nRuns: 5\n"])
+def test_numbers_of_something_else_than_rows_are_overruled(tmp_path, head):
+    with pytest.raises(CampaignError, match=re.escape('overruled = ["points"]')):
+        laser(tmp_path, head + COLUMNS + passes(1))
+    read = laser(tmp_path, head + COLUMNS + passes(1), 'overruled = ["points"]\n')
+    assert len(read.campaign.probings) == 10
+    assert any("is overruled by the mapping" in note for note in read.notes)
+
+
+def test_runs_that_pass_the_targets_at_which_they_turn_once_are_whole(tmp_path):
+    places = [0, *[100, 200, 300, 400, 300, 200, 100, 0] * 2]
+    rows = "".join(f"{place}.0;{0.1 * row:.2f}\n" for row, place in enumerate(places))
+    assert len(laser(tmp_path, f"Points: 5\nRuns: 4\n{COLUMNS}{rows}").campaign.probings) == 17
+
+
+@pytest.mark.parametrize(("mark", "other"), [(",", "1,25"), (".", "0.5")])
+def test_three_decimals_beside_whole_numbers_are_decimals_where_another_cell_shows_the_mark(
+    tmp_path, mark, other
+):
+    rows = f"0;{other}\n100{mark}125;2\n200;3\n"
+    assert laser(tmp_path, COLUMNS + rows).campaign.probings.readings["X"].tolist() == [0.0, 100.125, 200.0]
+
+
+@pytest.mark.parametrize(
+    "line", ["Z D", "AXIS Z (1 OF 3)", "RUN D (25 MM)", "TOOL T5, D 10,5", "(#101=5: IF [Z] IS MEASURED)"]
+)
+def test_words_between_the_rows_of_a_log_are_no_damaged_rows(tmp_path, line):
+    read = changed(tmp_path, LASERS, "square.prn", ("SQUARE ON TABLE", f"{line}\nSQUARE ON TABLE"))
+    assert len(read.campaign.probings) == 806

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import math
@@ -27,7 +28,7 @@ from monitor.reporting.certificate.record import CertificateRecord, ConformitySt
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
-from monitor.store import Database, import_campaign, load_certificate
+from monitor.store import Database, import_campaign, load_campaign, load_certificate
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.certificate.issue import issue
@@ -136,9 +137,12 @@ def test_the_inputs_are_stored_with_it_and_travel_inside_it(
     whole = json.loads(files["certificate.json"])
     stored = load_certificate(db, "G-1").record
     assert whole["inputs"] == stored["inputs"]
-    assert {one["name"]: one["sha256"] for one in whole["inputs"]["files"]} == {
-        file.name: file.sha256 for file in found.campaign.files
+    imported = {
+        file.name: hashlib.sha256(file.content).hexdigest()
+        for file in load_campaign(db, found.campaign.name).files
     }
+    assert len(imported) == 3
+    assert {one["name"]: one["sha256"] for one in whole["inputs"]["files"]} == imported
     assert whole["certificate"]["number"] == "G-1"
 
 

@@ -18,9 +18,10 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
-from monitor.store import Database, campaign_notes
+from monitor.store import Database, campaign_notes, load_campaign
 from monitor.workflow.identify.identify import IdentifyRequest, identify
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.measured import load_measured
 from tests.simulator import exports, four_instruments as shop
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -175,3 +176,20 @@ def test_a_refusal_of_files_is_recorded_under_their_mapping(db, tmp_path, end, t
     with pytest.raises(CampaignError, match=told):
         import_folders(db, ImportRequest([folder]))
     assert db.rows("SELECT campaign FROM v_refused_imports") == [(NAMES[0],)]
+
+
+def test_a_stored_campaign_names_the_row_of_its_own_file_and_keeps_the_hashes_of_a_folder(tmp_path, db):
+    """The files are not loaded to identify a folder; what is said of rows, and certificates, rest on them."""
+    folder = tmp_path / "lasers"
+    shutil.copytree(EXAMPLES / NAMES[0], folder)
+    lines = (folder / "laser-X.rtl").read_text().splitlines()
+    lines[59] = " ".join([*lines[59].split()[:2], "999.00"])
+    (folder / "laser-X.rtl").write_text("\n".join(lines) + "\n")
+    import_folders(db, ImportRequest((str(folder), str(EXAMPLES / "r-test"))))
+    answer = identify(db, IdentifyRequest(NAMES[0]))
+    assert "correct or remove line 60 of laser-X.rtl" in answer.runs[0].note
+    light, whole = load_measured(db, "r-test"), load_campaign(db, "r-test")
+    assert [file.content for file in light.files] == [b""] * 3
+    assert [(file.name, file.sha256) for file in light.files] == [
+        (file.name, file.sha256) for file in whole.files
+    ]

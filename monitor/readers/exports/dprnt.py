@@ -130,7 +130,7 @@ def _export(log: _Log, how: WordSettings, layout: str, faults: Faults) -> Export
         _note_without_rows(log, faults)
         return None
     letters = how.letters or Counter(tuple(row) for _, row in log.rows).most_common(1)[0][0]
-    if _has_damaged_row(log.name, letters, log.facts, faults):
+    if _has_damaged_row(log, letters, faults):
         return None
     taken = [(number, row) for number, row in log.rows if set(letters) <= set(row)]
     others = [(number, row) for number, row in log.rows if not set(letters) <= set(row)]
@@ -190,14 +190,22 @@ def _instead_of_numbers(text: str) -> str | None:
     return None
 
 
-def _has_damaged_row(name: str, letters: Sequence[str], facts: Sequence[Fact], faults: Faults) -> bool:
-    """Whether a line that is no row names all letters of one and nothing else: the first is noted by its line."""
+def _has_damaged_row(log: _Log, letters: Sequence[str], faults: Faults) -> bool:
+    """Whether a line that is no row names all letters of one and nothing else: the first is noted by its line.
+
+    A comment in parentheses, a line that begins otherwise than a row, and letters above the first row are no rows.
+    """
     row = re.compile("".join(rf"{letter}[^A-Z]*" for letter in letters))
-    for fact in facts:
-        bracket = _instead_of_numbers(fact.value)
-        if bracket is not None or row.fullmatch(fact.value.upper()):
+    begin = re.compile(rf"(?:{'|'.join(letters)})(?![A-Z])")
+    for fact in log.facts:
+        text = fact.value.upper()
+        if text.startswith("("):
+            continue
+        bracket = _instead_of_numbers(fact.value) if begin.match(text) or _PROGRAM.search(text) else None
+        is_title = (fact.line or 0) < log.rows[0][0] and not any(map(str.isdigit, text))
+        if bracket is not None or (row.fullmatch(text) and not is_title):
             wrong = f"{quoted(fact.value)} is damaged: a row has a number behind every letter"
-            faults.add(name, fact.line, None, bracket or f"{wrong}, an empty variable prints none")
+            faults.add(log.name, fact.line, None, bracket or f"{wrong}, an empty variable prints none")
             return True
     return False
 

@@ -22,7 +22,7 @@ from monitor.readers.toml_table import Table
 
 FILE = "mapping.toml"
 #: The key that says which statements of a file's head are wrong, and what it may name.
-OVERRULED, STATED = "overruled", ("axis", "kind", "plane", "radius")
+OVERRULED, STATED = "overruled", ("axis", "kind", "plane", "radius", "points")
 _OFFSET = re.compile(r"[+-][0-9]{2}:[0-9]{2}|Z")
 #: Columns that this reader numbers itself.
 _NUMBERED = ("run", "sequence")

@@ -16,7 +16,7 @@ from monitor.readers.export import Export, Fact
 from monitor.readers.exports.ball_bar import RADIUS_KEYS
 from monitor.readers.faults import one_of
 from monitor.readers.foreign_units import decimal_of
-from monitor.readers.mapping.mapping_file import OVERRULED, STATED, Entry
+from monitor.readers.mapping.mapping_file import OVERRULED, Entry
 from monitor.readers.mapping.rows import Rows, Wanted
 
 #: Axes that move less have the same reading in all rows, in mm or degrees.
@@ -138,9 +138,9 @@ def _radius(fact: Fact, rows: Rows, wanted: Wanted) -> str | None:
     )
 
 
-_RULES: Mapping[str, Callable[[Fact, Rows, Wanted], str | None]] = dict(
-    zip(STATED, (_axis, _kind, _plane, _radius), strict=True)
-)
+_RULES: Mapping[str, Callable[[Fact, Rows, Wanted], str | None]] = {
+    "axis": _axis, "kind": _kind, "plane": _plane, "radius": _radius,
+}  # fmt: skip
 
 
 def _moving(rows: Rows, wanted: Wanted) -> list[str]:
@@ -161,11 +161,16 @@ def _announced(entry: Entry, file: str, export: Export) -> Iterator[str]:
     if points is None:
         return
     rows, asked, passes = len(export.lines), int(points.value), 1 if runs is None else int(runs.value)
-    if rows < asked * passes:
-        times = "" if runs is None else f" in {passes} runs"
+    times = "" if runs is None else f" in {passes} runs"
+    # Where the axis turns a target may be measured once for both ways.
+    if rows < asked * passes and rows != (asked - 1) * passes + 1:
+        if "points" in entry.overruled:
+            yield f"the file announces {asked} {points.key}{times} and is overruled by the mapping"
+            return
         entry.table.faults.add(
             file, points.line, points.key,
-            f"{asked} are announced{times} and the table has {rows} rows: the file is cut; export it again",
+            f"{asked} are announced{times} and the table has {rows} rows: the file is cut; export it again, or write "
+            f'{OVERRULED} = ["points"] in [[exports]] where it is whole (a run a file, readings averaged)',
         )  # fmt: skip
     elif asked > 1 and rows % asked and (rows - 1) % (asked - 1):
         yield f"{asked} {points.key} are announced, and {rows} rows are no whole number of passes: is it cut?"
