@@ -2,7 +2,9 @@
 
 Counted as independent they make u too small. Readings of one pose agree where they are rounded, in most of the rows
 where a display is coarse and the machine stable. So a block of rows, each equal to the one so many rows before it, is
-judged by how often the rows around it equal theirs.
+judged by how often its rows equal earlier ones of it whose pose was reached in the same way, which shows what the
+readings scatter. Where too few come back so, the rows around it say how often rows are equal; these may be of a machine
+that was warming up, and where the display is coarse, both things that it may be are said.
 """
 
 from __future__ import annotations
@@ -27,9 +29,8 @@ AROUND = 50
 FEW_AROUND, FEW = 30, 10
 #: How often rows are equal is taken at the upper end of what the rows around allow with this probability.
 UPPER = 0.95
-#: The same rows so many times behind themselves are passes of a machine that scatters far less than a digit of its
-#: display (0.05 of one: 31 of 200 files of ten passes), where that shows no digit below what is stated.
-MOST_PASSES = 1.5
+#: A display whose digit is finer than this part of what is stated of a reading hides no scatter.
+COARSE = 0.1
 #: Columns of readings by the ending of their names, in mm and rad.
 READINGS = {"_um": 1e-3, "_urad": 1e-6, "_mm": 1.0}
 #: Decimals that are looked for.
@@ -43,7 +44,7 @@ MIXING = 0x9E3779B97F4A7C15
 @dataclass(frozen=True)
 class _Block:
     """``length`` rows from ``begin`` on that equal those ``distance`` rows before them, as do ``equal`` of ``others``;
-    ``chance`` is the natural logarithm of its probability."""
+    ``chance`` is the natural logarithm of its probability; ``is_compared`` where its own rows show the scatter."""
 
     begin: int
     length: int
@@ -51,6 +52,7 @@ class _Block:
     equal: int
     others: int
     chance: float
+    is_compared: bool
 
 
 def repeated_rows(campaign: Campaign) -> Iterator[str]:
@@ -62,6 +64,9 @@ def repeated_rows(campaign: Campaign) -> Iterator[str]:
     numbers = _mixed(probings.run, columns)
     setup = [probings.channels["setup"]] if "setup" in probings.channels else []
     poses = _mixed(probings.run, [*probings.readings.values(), *setup])
+    # The same pose is the same only where it was reached from the same one: a reversal is no scatter.
+    before = np.concatenate([[np.uint64(0)], poses[:-1]])
+    poses = (poses ^ (before >> np.uint64(7))) * np.uint64(MIXING)
     first, previous = _equal_before(numbers)
     rows = _Rows(numbers, _mixed(probings.run, setup), poses, first >= 0)
     distances = {distance for earlier in (first, previous) for distance in _distances(earlier)}
@@ -73,18 +78,24 @@ def repeated_rows(campaign: Campaign) -> Iterator[str]:
     different = max(len(np.unique(column[begin : begin + block.length])) for column in columns)
     if different < LEAST_DIFFERENT:
         return
-    if block.length >= MOST_PASSES * block.distance and _is_coarse(campaign, begin):
+    equal = (
+        f"{block.length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those "
+        f"from sequence {probings.sequence[begin - block.distance]} on in every number"
+    )
+    if not block.is_compared and _is_coarse(campaign, begin):
+        yield (
+            f"{equal}: either they were exported twice, or files joined, and counted so often they make u too small; "
+            "or the display hides the scatter, and passes that agree so say nothing of repeatability"
+        )
         return
     yield (
-        f"{block.length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those "
-        f"from sequence {probings.sequence[begin - block.distance]} on in every number; of "
-        f"{block.others} other rows {block.equal} repeat one so: were they exported twice, or two files joined? "
-        "Counted twice they make u too small"
+        f"{equal}; of {block.others} other rows {block.equal} repeat one so: were they exported twice, or two files "
+        "joined? Counted twice they make u too small"
     )
 
 
 def _is_coarse(campaign: Campaign, row: int) -> bool:
-    """Whether no reading of the series of a row has a digit below the stated standard uncertainty."""
+    """Whether no reading of the series of a row has a digit far below the stated standard uncertainty."""
     probings, stated = campaign.probings, campaign.probe.standard_uncertainty
     series = probings.run == probings.run[row]
     if "setup" in probings.channels:
@@ -97,7 +108,7 @@ def _is_coarse(campaign: Campaign, row: int) -> bool:
         for ending, factor in READINGS.items()
         if name.endswith(ending) and np.isfinite(values[row])
     ]
-    return min(digits, default=0.0) >= stated
+    return min(digits, default=0.0) >= COARSE * stated
 
 
 def _digit(values: npt.NDArray[np.float64]) -> float:
@@ -135,8 +146,8 @@ def _blocks(holds: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.int64], npt.ND
 
 @dataclass(frozen=True)
 class _Rows:
-    """What is the same in rows (n,): all their ``numbers``, their ``series`` (run and setup), their ``poses``; and
-    which of them ``repeat`` any row before."""
+    """What is the same in rows (n,): all their ``numbers``, their ``series`` (run and setup), their ``poses`` with the
+    way there; and which of them ``repeat`` any row before."""
 
     numbers: npt.NDArray[np.uint64]
     series: npt.NDArray[np.uint64]
@@ -144,8 +155,8 @@ class _Rows:
     repeat: npt.NDArray[np.bool_]
 
     def block(self, distance: int) -> _Block | None:
-        """The longest block at a distance, by the rows around it, or as many others as can speak; None where it is too
-        short."""
+        """The longest block at a distance, by its own rows that came back, those around it, or as many others as can
+        speak; None where it is too short."""
         is_equal = self.numbers[distance:] == self.numbers[:-distance]
         begins, lengths = _blocks(is_equal)
         length = int(lengths.max(initial=0))
@@ -158,8 +169,14 @@ class _Rows:
         others = self.series == self.series[begin]
         same = is_equal[around[others[around] & others[around + distance]]]
         others[distance + begin : distance + begin + length] = False
-        if len(same) < FEW_AROUND:
-            last_time = _equal_before(self.poses)[1]
+        last_time = _equal_before(self.poses)[1]
+        once = np.arange(begin, begin + min(length, distance))
+        back = once[last_time[once] >= begin]
+        within = self.numbers[back] == self.numbers[last_time[back]]
+        is_compared = len(within) >= FEW
+        if is_compared:
+            same = within
+        elif len(same) < FEW_AROUND:
             came_back = others & (last_time >= 0)
             same = np.concatenate([same, self.numbers[came_back] == self.numbers[last_time[came_back]]])
             if len(same) < FEW:
@@ -173,6 +190,7 @@ class _Rows:
             _log_chance(
                 int(np.count_nonzero(self.series[distance:] == self.series[:-distance])), length, same
             ),
+            is_compared,
         )
 
 

@@ -242,6 +242,14 @@ def not_reproduced(identification: int, difference: str) -> str:
     return f"identification {identification} cannot be reproduced from the stored readings: {difference}"
 
 
+def made_by_another_version(identification: int, version: str, day: str, difference: str) -> str:
+    """Return what is said of an identification that another version of this software computed otherwise."""
+    return (
+        f"identification {identification} was computed by another version of this software ({version}, on {day}); "
+        f"computed anew by this one, {difference}. That is no fault; `monitor identify` stores it anew"
+    )
+
+
 OTHER_RUNS_OR_PARAMETERS = "its runs or parameters are others"
 
 

@@ -126,8 +126,9 @@ if TYPE_CHECKING:
     )
     from monitor.store.held_sizes import held_bytes as held_bytes
     from monitor.store.identifications import (
+        MadeBy as MadeBy,
         identification_by_number as identification_by_number,
-        identification_numbers as identification_numbers,
+        identifications_made as identifications_made,
         last_identification as last_identification,
         load_identification as load_identification,
         save_identification as save_identification,
@@ -244,7 +245,7 @@ else:
             "curves": "curve_names is_curve load_curve",
             "database_name": "check_database_name",
             "events": "NOTE MachineEvent StoredEvent list_events machine_events record_event",
-            "identifications": "identification_by_number identification_numbers last_identification "
+            "identifications": "MadeBy identification_by_number identifications_made last_identification "
             "load_identification save_identification",
             "import_notes": "campaign_notes run_fingerprints",
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "

@@ -26,6 +26,7 @@ from monitor.store.curves import (
     insert_curve,
     is_curve,
     is_curve_number,
+    stored_curve_content,
 )
 from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
 from monitor.store.past import campaign_runs
@@ -64,7 +65,8 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
     rows = probings.printed(campaign.probings, campaign.machine)
     for run in campaign.runs:
         _check_run(run)
-    content = _content(campaign, rows)
+    described = record_json.Described.of(campaign)
+    content = _content(campaign, rows, described)
     imported = Imported(campaign.name, "imported", len(campaign.runs), len(campaign.probings))
     with db.transaction():
         same_name = db.rows(
@@ -85,9 +87,9 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
                 campaign.name,
                 campaign.machine.id,
                 campaign.method,
-                record_json.machine_json(campaign.machine),
-                record_json.probe_json(campaign.probe),
-                record_json.artefact_json(campaign.artefact, campaign.sources),
+                described.machine,
+                described.probe,
+                described.artefact,
                 content,
                 __version__,
                 utc_now(),
@@ -139,7 +141,7 @@ def load_campaign(db: Database, name: str, *, with_files: bool = True) -> Campai
             f"campaign {name} is a curve, not a machine: it can be identified, compared and explained "
             "(monitor identify, compare, explain, model)"
         )
-    campaign, _ = _load(db, campaign_number(db, name), with_files=with_files)
+    campaign, _, _ = _load(db, campaign_number(db, name), with_files=with_files)
     return campaign
 
 
@@ -149,8 +151,16 @@ def stored_content(db: Database, campaign_id: int, *, signed_zeros: bool = False
     ``signed_zeros`` as in ``audit.bits``.
     """
     if is_curve_number(db, campaign_id):
-        return curve_content(curve_by_number(db, campaign_id), signed_zeros=signed_zeros)
+        return stored_curve_content(db, campaign_id, signed_zeros=signed_zeros)
     return _content(*_load(db, campaign_id), signed_zeros=signed_zeros)
+
+
+def _content_by_this_version(db: Database, campaign_id: int) -> str:
+    """The content hash that this version gives to what is stored, which earlier ones described with fewer keys."""
+    if is_curve_number(db, campaign_id):
+        return curve_content(curve_by_number(db, campaign_id))
+    campaign, rows, _ = _load(db, campaign_id)
+    return _content(campaign, rows, record_json.Described.of(campaign))
 
 
 def _check_run(run: Run) -> None:
@@ -161,14 +171,20 @@ def _check_run(run: Run) -> None:
             raise DataError(f"condition {name} of run {run.run} must be a finite number, not {value}")
 
 
-def _content(campaign: Campaign, rows: probings.PrintedProbings, *, signed_zeros: bool = False) -> str:
+def _content(
+    campaign: Campaign,
+    rows: probings.PrintedProbings,
+    described: record_json.Described,
+    *,
+    signed_zeros: bool = False,
+) -> str:
     zero = -0.0 if signed_zeros else 0.0  # the one of the two that leaves the sign of a zero when it is added
     return audit.digest(
         campaign.name,
         campaign.method,
-        record_json.machine_json(campaign.machine),
-        record_json.probe_json(campaign.probe),
-        record_json.artefact_json(campaign.artefact, campaign.sources),
+        described.machine,
+        described.probe,
+        described.artefact,
         [
             [
                 r.run,
@@ -199,7 +215,8 @@ def _differences(
     when = f"{imported_at:%Y-%m-%d %H:%M} UTC"
     before = dict(db.rows("SELECT file, sha256 FROM source_file WHERE campaign_id = ?", [campaign_id]))
     after = {file.name: file.sha256 for file in campaign.files}
-    if not before and not after and content != stored:
+    has_files = bool(before or after)
+    if not has_files and content != stored and content != _content_by_this_version(db, campaign_id):
         return [Fault("campaign", None, None, f"its content differs from that imported on {when}")]
     advice = (
         "give the new content another campaign name, or withdraw what was imported: "
@@ -268,7 +285,7 @@ def _insert_runs(db: Database, campaign_id: int, added: tuple[Run, ...]) -> None
 
 def _load(
     db: Database, campaign_id: int, *, with_files: bool = True
-) -> tuple[Campaign, probings.PrintedProbings]:
+) -> tuple[Campaign, probings.PrintedProbings, record_json.Described]:
     ((name, method, machine, probe, artefact),) = db.rows(
         "SELECT campaign, method, machine_description, probe, artefact FROM imported_campaign WHERE campaign_id = ?",
         [campaign_id],
@@ -300,7 +317,7 @@ def _load(
     if not with_files and is_of_mapping(campaign):
         # What is said of a row says where it stands in the files of its owner.
         campaign = replace(campaign, files=source_files(db, campaign_id))
-    return campaign, rows
+    return campaign, rows, record_json.Described(machine, probe, artefact)
 
 
 def _moment(at: datetime, offset_s: float) -> datetime:

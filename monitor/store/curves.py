@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -111,18 +112,34 @@ def curve_by_number(db: Database, campaign_id: int) -> CurveCampaign:
     )
 
 
-def curve_content(curve: CurveCampaign, *, signed_zeros: bool = False) -> str:
-    """The content hash of everything that is stored of a curve; ``signed_zeros`` as in ``audit.bits``.
+def curve_content(curve: CurveCampaign) -> str:
+    """The content hash of everything that is stored of a curve. Raises DataError for numbers that are not finite."""
+    return _content(curve, asdict(curve.instrument))
 
-    Raises DataError for numbers that are not finite.
+
+def stored_curve_content(db: Database, campaign_id: int, *, signed_zeros: bool = False) -> str:
+    """The same computed anew from what is stored, "" where no import wrote it; ``signed_zeros`` as in ``audit.bits``.
+
+    An earlier version described its instrument with the keys of then: those that are stored are hashed.
     """
+    ((text,),) = db.rows(
+        "SELECT machine_description FROM imported_campaign WHERE campaign_id = ?", [campaign_id]
+    )
+    instrument = json.loads(text)
+    # A key that stands there twice, or other white space, is not in the hash.
+    if json.dumps(instrument) != text:
+        return ""
+    return _content(curve_by_number(db, campaign_id), instrument, signed_zeros=signed_zeros)
+
+
+def _content(curve: CurveCampaign, instrument: dict[str, Any], *, signed_zeros: bool = False) -> str:
     for name, values in curve.columns.items():
         if not np.all(np.isfinite(values)):
             raise DataError(f"column {name} of campaign {curve.name} must hold finite numbers")
     return audit.digest(
         curve.name,
         curve.method,
-        asdict(curve.instrument),
+        instrument,
         [curve.response, curve.base, curve.time, curve.standard_uncertainty, dict(curve.units)],
         [[name, audit.bits(values, signed_zeros=signed_zeros)] for name, values in curve.columns.items()],
         [[name, [str(label) for label in labels]] for name, labels in curve.groups.items()],

@@ -6,6 +6,8 @@ Nothing is replaced: a later identification stands beside an earlier one, and th
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
+from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -147,16 +149,28 @@ def last_identification(db: Database) -> int:
     return int(number)
 
 
-def identification_numbers(db: Database, software_version: str | None = None) -> list[int]:
-    """Return the numbers of the identifications of campaigns that count; only those that a version made, if named."""
-    return [
-        int(number)
-        for (number,) in db.rows(
-            "SELECT identification_id FROM identification AS i JOIN campaign USING (campaign_id) "
-            "WHERE i.software_version = coalesce(?, i.software_version) ORDER BY ALL",
-            [software_version],
-        )
-    ]
+@dataclass(frozen=True)
+class MadeBy:
+    """Which version computed the identification of a number, and when (UTC); ``is_this`` software, or another."""
+
+    number: int
+    software_version: str
+    computed_at: datetime
+    is_this: bool
+
+
+def identifications_made(db: Database) -> tuple[MadeBy, ...]:
+    """Return who made the identifications of campaigns that count, by number.
+
+    Whatever computed one before the last migration was applied was another software, even under the same version.
+    """
+    return db.records(
+        MadeBy,
+        "SELECT identification_id AS number, i.software_version, computed_at, "
+        "i.software_version = ? AND computed_at >= (SELECT max(applied_at) FROM schema_migration) AS is_this "
+        "FROM identification AS i JOIN campaign USING (campaign_id) ORDER BY 1",
+        [__version__],
+    )
 
 
 def stored_identification_content(db: Database, number: int, *, signed_zeros: bool = False) -> str:

@@ -1,11 +1,15 @@
-"""Machine, probe and artefact as JSON and back, to the last bit (Python prints doubles so that they return)."""
+"""Machine, probe and artefact as JSON and back, to the last bit (Python prints doubles so that they return).
+
+Each version writes what it knows, with keys that earlier ones lacked. So a hash is of the text that was stored, never
+of one that is written again of what was read from it.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from monitor.documents import from_document, to_document
@@ -14,6 +18,7 @@ from monitor.records import (
     Artefact,
     AxisSettings,
     Ball,
+    Campaign,
     ChainAxis,
     KnownError,
     LShape,
@@ -42,10 +47,28 @@ def as_imported(campaign: str) -> Iterator[None]:
         ) from error
 
 
+@dataclass(frozen=True)
+class Described:
+    """The texts that describe the machine, probe and artefact of a campaign, as they are stored and hashed."""
+
+    machine: str
+    probe: str
+    artefact: str
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> Described:
+        """Write the texts of a campaign as this version writes them."""
+        return cls(
+            machine_json(campaign.machine),
+            probe_json(campaign.probe),
+            artefact_json(campaign.artefact, campaign.sources),
+        )
+
+
 def machine_json(machine: Machine) -> str:
     """A machine as text; strokes in mm or rad, pitches and offsets in mm, tolerances in display units.
 
-    What a machine of letters does not have is left out, so that its text and its hash stay what they were.
+    What a machine of letters does not have is left out.
     """
     axes = {name: asdict(settings) for name, settings in machine.axes.items()}
     for settings in axes.values():
@@ -86,7 +109,7 @@ def machine_record(text: str) -> Machine:
 
 
 def probe_json(probe: Probe) -> str:
-    """A probe as text; lengths in mm. What nobody states of a scale is left out: texts and hashes stay as they were."""
+    """A probe as text; lengths in mm. What nobody states of a scale is left out."""
     document = asdict(probe)
     if probe.scale_uncertainty is None:
         del document["scale_uncertainty"]
@@ -107,7 +130,6 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
     The stated ``sources`` of uncertainty stand beside it, where there are any.
     """
     document = asdict(artefact)
-    # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
         del document["self_calibration"]
     if not artefact.reflectors:
@@ -119,7 +141,6 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
     if not artefact.setups:
         del document["setups"]
     for setup in document.get("setups", ()):
-        # Absent as before there were such: what was stored stays byte for byte.
         for name in ("turn_uncertainty", "certificate"):
             if setup[name] is None:
                 del setup[name]

@@ -45,10 +45,10 @@ class VerifyAnswer:
     """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere.
 
     ``anchored_entry`` is the entry that the hash kept elsewhere is of. ``recomputed`` is how many identifications were
-    computed anew, of ``recomputable`` that this version made; ``of_other_versions`` made others, which are not computed
-    anew. ``seed`` drew them; None where there was nothing to draw. ``signed_certificates`` is how many of the stored
-    documents bear a signature, ``trusted_signatures`` how many of these are of a trusted signer; None where nobody
-    was named as such.
+    computed anew, of ``recomputable`` that this version made; ``recomputed_of_others`` the same ``of_other_versions``,
+    which may have estimated otherwise: ``notes`` say by how much. ``seed`` drew them; None where there was nothing to
+    draw. ``signed_certificates`` is how many of the stored documents bear a signature, ``trusted_signatures`` how many
+    of these are of a trusted signer; None where nobody was named as such.
     """
 
     ok: bool
@@ -62,6 +62,8 @@ class VerifyAnswer:
     seed: int | None = None
     signed_certificates: int | None = None
     trusted_signatures: int | None = None
+    recomputed_of_others: int = 0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
     recomputation = (
         recompute(db, np.random.default_rng(seed), request.recompute)
         if request.recompute
-        else Recomputation(0, 0, 0, ())
+        else Recomputation()
     )
     faults += recomputation.faults
     signed = trusted = None
@@ -134,9 +136,11 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
         recomputation.computed,
         recomputation.of,
         recomputation.of_others,
-        seed if request.recompute < recomputation.of else None,
+        seed if request.recompute < recomputation.of + recomputation.of_others else None,
         signed,
         trusted,
+        recomputation.computed_of_others,
+        recomputation.notes,
     )
 
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from monitor import __version__
 from monitor.exceptions import MonitorError
 from monitor.reporting import messages
 from monitor.store import (
     Database,
+    MadeBy,
     StoredIdentification,
     identification_by_number,
-    identification_numbers,
+    identifications_made,
     load_campaign,
     load_model,
 )
@@ -27,29 +28,49 @@ TOLERANCE_U = 1e-3
 class Recomputation:
     """How many identifications were computed anew, of how many that this version made, and what came out otherwise.
 
-    ``of_others`` is how many other versions made: these may have estimated otherwise, and none is drawn.
+    ``computed_of_others`` are computed anew ``of_others`` that other versions made, where fewer of this one were drawn
+    than asked for. These may have estimated otherwise: ``notes`` say by how much, and are no faults.
     """
 
-    computed: int
-    of: int
-    of_others: int
-    faults: tuple[str, ...]
+    computed: int = 0
+    of: int = 0
+    computed_of_others: int = 0
+    of_others: int = 0
+    faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def recompute(db: Database, generator: np.random.Generator, count: int) -> Recomputation:
     """Identify campaigns again, drawn at random: whoever alters one cannot know which will be looked at."""
-    numbers = identification_numbers(db, __version__)
-    drawn = generator.permutation(numbers)[:count].tolist()
-    faults, computed = [], 0
-    for number in sorted(drawn):
+    identifications = identifications_made(db)
+    by_this = [each for each in identifications if each.is_this]
+    by_others = [each for each in identifications if not each.is_this]
+    # Those of this version first: of these alone another number is a fault.
+    drawn = [by_this[k] for k in generator.permutation(len(by_this))[:count]]
+    rest = [by_others[k] for k in generator.permutation(len(by_others))[: count - len(drawn)]]
+    computed, faults = _differences(db, drawn)
+    computed_of_others, notes = _differences(db, rest)
+    return Recomputation(computed, len(by_this), computed_of_others, len(by_others), faults, notes)
+
+
+def _differences(db: Database, drawn: Sequence[MadeBy]) -> tuple[int, tuple[str, ...]]:
+    """Compute identifications anew: how many could be, and a sentence on each that comes out otherwise."""
+    sentences, computed = [], 0
+    for identification in sorted(drawn, key=lambda each: each.number):
         # What cannot be computed is no evidence: the hashes say whether readings or model were altered.
         with contextlib.suppress(MonitorError):
-            fault = _difference(db, number)
+            difference = _difference(db, identification.number)
             computed += 1
-            if fault is not None:
-                faults.append(messages.not_reproduced(number, fault))
-    others = len(identification_numbers(db)) - len(numbers)
-    return Recomputation(computed, len(numbers), others, tuple(faults))
+            if difference is not None:
+                sentences.append(_sentence(identification, difference))
+    return computed, tuple(sentences)
+
+
+def _sentence(made_by: MadeBy, difference: str) -> str:
+    if made_by.is_this:
+        return messages.not_reproduced(made_by.number, difference)
+    day = f"{made_by.computed_at:%Y-%m-%d}"
+    return messages.made_by_another_version(made_by.number, made_by.software_version, day, difference)
 
 
 def _difference(db: Database, number: int) -> str | None:

@@ -51,6 +51,8 @@ def run(options: Namespace) -> int:
     else:
         for fault in answer.faults:
             output.say(fault)
+        for note in answer.notes:
+            output.say(note)
         if answer.anchored_entry is not None:
             output.say(f"the hash kept elsewhere is that of entry {answer.anchored_entry}")
         if answer.recomputable or answer.of_other_versions:
@@ -66,12 +68,16 @@ def run(options: Namespace) -> int:
 
 
 def _recomputed(answer: keeping.VerifyAnswer) -> str:
-    """Say how large the sample was, and what it was not drawn from."""
+    """Say how large the sample was, of this version and of others."""
     drawn = "" if answer.seed is None else f", drawn by --seed {answer.seed}"
-    others = f"; {answer.of_other_versions} of other versions are not" if answer.of_other_versions else ""
+    others = (
+        f", and {answer.recomputed_of_others} of {answer.of_other_versions} of other versions"
+        if answer.of_other_versions
+        else ""
+    )
     return (
         f"identifications computed anew from the stored readings: {answer.recomputed} of {answer.recomputable}"
-        f"{drawn}{others}"
+        f"{others}{drawn}"
     )
 
 
