@@ -226,11 +226,12 @@ def solve(
 def _is_settled(size: float, last: Linearisation, rank: int) -> bool:
     """Whether a step of that ``size`` is next to nothing beside what a model leaves that lacks something: the relative
     offset (Bates and Watts, Technometrics 23 (1981) 179). Derivatives leave out products of errors, so that such a
-    search may end short of the last digits; of what no machine of the file leaves a step says nothing. Numbers that
-    nothing moves were not read, or pad the rows of a run."""
-    moved = np.any(last.local != 0.0, axis=-1) | np.any(last.common != 0.0, axis=-1)
-    freedom = max(int(moved.sum()) - rank, 1)
-    scatter = np.sqrt(np.sum(last.residual[moved] ** 2) / freedom)
+    search may end short of the last digits; of what no machine of the file leaves a step says nothing. Zeros that
+    nothing moves were not read: they pad the rows of a run."""
+    is_read = (
+        (last.residual != 0.0) | np.any(last.local != 0.0, axis=-1) | np.any(last.common != 0.0, axis=-1)
+    )
+    scatter = np.sqrt(np.sum(last.residual**2) / max(int(is_read.sum()) - rank, 1))
     offset = size / np.sqrt(max(rank, 1)) / max(scatter, 1.0)
     return bool(scatter < MOST_LEFT and offset < SETTLED)
 
