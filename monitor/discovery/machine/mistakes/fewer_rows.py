@@ -33,12 +33,12 @@ def fewer_rows(probings: Probings) -> npt.NDArray[np.int64]:
 
 def _share(counts: list[int]) -> int:
     """How many rows each of several has at most, so that all together have ``MOST_ROWS``."""
-    left = MOST_ROWS
+    rows_to_share = MOST_ROWS
     for done, count in enumerate(sorted(counts)):
-        share = left // (len(counts) - done)
+        share = rows_to_share // (len(counts) - done)
         if count > share:
             return max(share, FEWEST_OF_SETUP)
-        left -= count
+        rows_to_share -= count
     return max(counts)
 
 
