@@ -34,8 +34,8 @@ def fewer_rows(probings: Probings) -> npt.NDArray[np.int64]:
 def _share(counts: list[int]) -> int:
     """How many rows each of several has at most, so that all together have ``MOST_ROWS``."""
     rows_to_share = MOST_ROWS
-    for done, count in enumerate(sorted(counts)):
-        share = rows_to_share // (len(counts) - done)
+    for smaller, count in enumerate(sorted(counts)):
+        share = rows_to_share // (len(counts) - smaller)
         if count > share:
             return max(share, FEWEST_OF_SETUP)
         rows_to_share -= count
