@@ -179,8 +179,8 @@ def test_a_mistake_that_no_import_sees_is_searched_where_no_machine_fits(tmp_pat
 def test_a_pitch_that_a_grid_of_places_cannot_tell_is_no_candidate() -> None:
     """Nyquist: places on a grid of 5 mm take every pitch below 10 mm for a longer one; balls lie anyhow."""
     on_grid = maker(one_run("l-shape"))(one_run("l-shape")).context
-    kept = resolvable(cycles_of_unknown_pitch(on_grid.chain), on_grid)
+    kept = resolvable(cycles_of_unknown_pitch(on_grid), on_grid)
     assert all(one.effect.shape.pitch >= 10.0 for one in kept)
     anyhow = maker(one_run("five-days"))(one_run("five-days")).context
-    every = cycles_of_unknown_pitch(anyhow.chain)
+    every = cycles_of_unknown_pitch(anyhow)
     assert len(resolvable(every, anyhow)) == len(every)

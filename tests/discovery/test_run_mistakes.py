@@ -18,7 +18,7 @@ from monitor.records import Campaign
 from monitor.store import Database, StoredModel
 from monitor.workflow.explain.explain import explanation_of, first_fit
 from monitor.workflow.models import as_model, resolve
-from tests.simulator import four_instruments as shop
+from tests.simulator import four_instruments as shop, free_form as sim
 
 DEVIATIONS = ("dx_um", "dy_um", "dz_um")
 RUNS = 4
@@ -206,3 +206,17 @@ def test_nothing_is_said_of_files_that_are_right(
         first = fit(problem_of(found))
         assert not find_run_mistakes(found, problem_of, first)
         assert not find_reading_mistakes(found, problem_of, first)
+
+
+def test_an_axis_with_the_other_sign_in_one_run_is_said_where_nothing_but_positions_is_read(
+    tmp_path: Path,
+) -> None:
+    """Free form reads where the axes stand as they touch, and nothing in a unit of its own."""
+    rng = np.random.default_rng(3)
+    layout = sim.cross_pocket()
+    truth = sim.draw_truth(layout, sim.CASE_1_ANGLES, rng)
+    runs = [sim.probe(layout, sim.CASE_1_ANGLES, truth, rng) for _ in range(3)]
+    runs[1]["y"] = -runs[1]["y"]
+    found = read_campaign(sim.write_folder(tmp_path / "pocket", "pocket", layout, runs))
+    assert isinstance(found, Campaign)
+    assert "the sign of Y were the other way round in run 2" in told(found)

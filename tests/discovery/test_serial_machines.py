@@ -186,3 +186,22 @@ def test_link_weights_are_told_as_the_largest_angle(robots, tmp_path):
     assert size == pytest.approx(np.abs(angle - angle.mean()).max())
     worst = int(np.abs(angle - angle.mean()).argmax())
     assert u == pytest.approx(1e-8 * np.linalg.norm(columns[worst] - columns.mean(axis=0)))
+
+
+@pytest.mark.parametrize(
+    "length",
+    [1500.0, pytest.param(3000.0, marks=pytest.mark.slow), pytest.param(6000.0, marks=pytest.mark.slow)],
+)
+def test_a_cycle_of_a_long_axis_is_on_the_grid(machines, tmp_path, length):
+    """Steps of 1/800 per mm are of axes of 400 mm: over 3 m a wave between two of them is none of either."""
+    axes = (
+        machines.Axis("X", "linear", machines.X, (0.0, 0.0, 0.0), (0.0, length)),
+        machines.Axis("Z", "linear", machines.Z, (0.0, 0.0, 0.0), (-500.0, 0.0)),
+    )
+    scene = machines.Scene(along={"X": lambda x: 0.02 * np.cos(2.0 * np.pi * x / 41.03 + 1.0)})
+    (finding,) = explained(
+        machines.write(tmp_path / "m", axes, np.random.default_rng(4), scene, poses=150)
+    ).missing
+    assert finding.effect.startswith("EXX:cyclic")
+    assert abs(finding.searched.value - 41.03) < 4.0 * finding.searched.u
+    assert abs(finding.amplitude - 0.02) < 4.0 * finding.u

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit, robust_fit
+from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
@@ -129,3 +130,53 @@ def test_a_gross_reading_of_another_setup_hides_no_mistake(right: Campaign) -> N
     assert first.left_out.sum() == 1
     mistakes = [each.what for each in find_setup_mistakes(spoilt, _of_machine, first)]
     assert "the sign of reading_um were the other way round in setup bar-yz" in mistakes
+
+
+def _repeated(campaign: Campaign, times: int, rng: np.random.Generator) -> Campaign:
+    """The campaign with all rows so many times, each time with noise of its own on what was read."""
+    probings = campaign.probings
+    rows = np.tile(np.arange(len(probings)), times)
+    many = probings.rows(rows)
+    noise = {"reading_um": 0.3, "reading_urad": 0.3, "dx_um": 0.3, "dy_um": 0.3, "dz_um": 0.3}
+    channels = {
+        name: values + rng.normal(0.0, noise.get(name, 0.0), len(rows))
+        for name, values in many.channels.items()
+    }
+    sequence = np.arange(1, len(rows) + 1)
+    return replace(
+        campaign, probings=replace(many, sequence=sequence, time=6.0 * sequence, channels=channels)
+    )
+
+
+def test_of_very_many_rows_some_are_tried_and_all_say_what_is_left(right: Campaign) -> None:
+    many = _repeated(right, 2, np.random.default_rng(33))
+    tried: list[int] = []
+
+    def of_machine(campaign: Campaign) -> ChainProblem:
+        tried.append(len(campaign.probings))
+        return _of_machine(campaign)
+
+    spoilt = _spoilt(many, "r-test", {"dz_um": ("dz_um", -1.0)})
+    (mistake,) = find_setup_mistakes(spoilt, of_machine, fit(_of_machine(spoilt)))
+    assert mistake.what == "the sign of dz_um were the other way round in setup r-test"
+    assert mistake.rms_undone == pytest.approx(fit(_of_machine(many)).rms, rel=1e-6)
+    # All rows are fitted once, to say what is left with the mistake undone.
+    assert max(tried[:-1]) <= 500
+    assert tried[-1] == len(spoilt.probings)
+
+
+def test_setups_share_the_rows_that_are_tried_and_their_poses_do(right: Campaign) -> None:
+    probings = _repeated(right, 6, np.random.default_rng(33)).probings
+    rows = fewer_rows(probings)
+    assert np.all(np.diff(rows) > 0)
+    whole, some = (
+        {str(name): int(count) for name, count in zip(*np.unique(each, return_counts=True), strict=True)}
+        for each in (probings.target, probings.target[rows])
+    )
+    share = max(some.values())
+    assert some == {name: min(count, share) for name, count in whole.items()}
+    assert 490 < len(rows) <= 500
+    x = probings.readings["X"][rows][probings.target[rows] == "laser-X"]
+    assert len(np.unique(x)) == len(
+        np.unique(right.probings.readings["X"][right.probings.target == "laser-X"])
+    )

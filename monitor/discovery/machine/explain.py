@@ -96,7 +96,7 @@ def variants_of_campaign(
     variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
-    unknown = [*resolvable(cycles_of_unknown_pitch(chain), problem.context)]
+    unknown = [*resolvable(cycles_of_unknown_pitch(problem.context), problem.context)]
     return [*variants, *unknown, *reversals_of_unknown_width(problem.context)]
 
 

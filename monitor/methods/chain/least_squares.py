@@ -147,18 +147,20 @@ def project_out(basis: Array, columns: Array) -> Array:
 
 @dataclass(frozen=True)
 class _CommonStep:
-    """The step of the common unknowns (c,), their covariance (c, c), and which of them the data determine (c,)."""
+    """The step of the common unknowns (c,), their covariance (c, c), which of them the data determine (c,), and how
+    many directions."""
 
     step: Array
     covariance: Array
     free: npt.NDArray[np.bool_]
+    rank: int
 
 
 def _common_step(remainder: Array, whole: Array, residual: Array) -> _CommonStep:
     """The step of the common unknowns from what is left of their derivatives, ``whole`` before, and the residual."""
     count = remainder.shape[-1]
     if count == 0:
-        return _CommonStep(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool))
+        return _CommonStep(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool), 0)
     scale = np.linalg.norm(whole.reshape(-1, count), axis=0)
     scale[scale == 0] = 1.0
     matrix = remainder.reshape(-1, count) / scale
@@ -168,7 +170,7 @@ def _common_step(remainder: Array, whole: Array, residual: Array) -> _CommonStep
     inverse = vectors[:, keep] / np.sqrt(squares[keep]) / scale[:, None]
     free = np.abs(vectors[:, ~keep]).max(axis=1, initial=0.0) < MEMBER_SHARE
     gradient = (matrix.T @ residual.reshape(-1)) * scale
-    return _CommonStep(-inverse @ (inverse.T @ gradient), inverse @ inverse.T, free)
+    return _CommonStep(-inverse @ (inverse.T @ gradient), inverse @ inverse.T, free, int(keep.sum()))
 
 
 def solve(
@@ -213,7 +215,7 @@ def solve(
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
             return _solution(local, common, current, space, of_common, iteration)
         before = size
-    if _is_settled(size, cost, current.residual.size, int(np.sum(space.rank)) + common.size):
+    if _is_settled(size, current, int(np.sum(space.rank)) + of_common.rank):
         return _solution(local, common, current, space, of_common, iteration)
     raise NotConvergedError(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
@@ -221,12 +223,16 @@ def solve(
     )
 
 
-def _is_settled(size: float, cost: float, numbers: int, unknowns: int) -> bool:
+def _is_settled(size: float, last: Linearisation, rank: int) -> bool:
     """Whether a step of that ``size`` is next to nothing beside what a model leaves that lacks something: the relative
     offset (Bates and Watts, Technometrics 23 (1981) 179). Derivatives leave out products of errors, so that such a
-    search may end short of the last digits; of what no machine of the file leaves a step says nothing."""
-    scatter = np.sqrt(cost / max(numbers - unknowns, 1))
-    offset = size / np.sqrt(max(unknowns, 1)) / max(scatter, 1.0)
+    search may end short of the last digits; of what no machine of the file leaves a step says nothing. Zeros that
+    nothing moves were not read: they pad the rows of a run."""
+    is_read = (
+        (last.residual != 0.0) | np.any(last.local != 0.0, axis=-1) | np.any(last.common != 0.0, axis=-1)
+    )
+    scatter = np.sqrt(np.sum(last.residual**2) / max(int(is_read.sum()) - rank, 1))
+    offset = size / np.sqrt(max(rank, 1)) / max(scatter, 1.0)
     return bool(scatter < MOST_LEFT and offset < SETTLED)
 
 

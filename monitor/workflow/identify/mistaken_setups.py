@@ -17,8 +17,6 @@ from monitor.workflow.models import as_model
 
 #: Sums of squares that chance makes more often than this, larger or smaller, ask for no search.
 USUAL = 0.01
-#: Above so many rows the contrasts of all setups take longer than the fit.
-MOST_ROWS = 20_000
 
 
 def mistaken_setups(
@@ -26,7 +24,7 @@ def mistaken_setups(
 ) -> tuple[LikelyMistake, ...]:
     """The mistakes of a setup or an instrument that explain why it contradicts the others; ``solution`` is that of the
     campaign as recorded. Empty where the residuals are as stated."""
-    if not isinstance(campaign_method(campaign).instruments, Instruments) or len(problem.context) > MOST_ROWS:
+    if not isinstance(campaign_method(campaign).instruments, Instruments):
         return ()
     # Loaded here: only readings that contradict what is stated need the search.
     from monitor.discovery import Fit, find_setup_mistakes

@@ -137,9 +137,11 @@ def _cures(
 
 def _read(part: Campaign) -> float:
     """The root mean square of all that was measured in a run: in a larger unit all of it is smaller, not only what a
-    fit leaves of it."""
+    fit leaves of it. 1 where nothing but directions and positions was read, which have no unit to be mistaken."""
     channels = part.probings.channels
-    return float(np.sqrt(np.nanmean([channels[name] ** 2 for name in measured_columns(part)])))
+    measured = np.concatenate([np.zeros(0), *(channels[name] for name in measured_columns(part))])
+    measured = measured[np.isfinite(measured)]
+    return float(np.sqrt(np.mean(measured**2))) if measured.size else 1.0
 
 
 def _is_nearer(undone: float, recorded: float, others: float) -> bool:

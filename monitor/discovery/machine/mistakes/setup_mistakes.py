@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain, islice
 
 import numpy as np
@@ -22,6 +23,7 @@ import numpy.typing as npt
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.mistakes.column_mistakes import (
     Trial,
+    Undo,
     all_signs,
     exchanged_axes,
     measured_columns,
@@ -30,6 +32,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     unit_mistakes,
 )
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted, without_gross
+from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
@@ -76,33 +79,46 @@ class _Doubted:
 
 @dataclass(frozen=True)
 class _Cure:
-    """A mistake, and the sum of squares of the fit with it undone."""
+    """A mistake in words, what undoes it in a campaign, and the fit of the rows that were tried with it undone."""
 
-    mistake: Mistake
-    sum_of_squares: float
+    what: str
+    undone: Undo
+    fit: Fit
 
 
 def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistakes of a single setup or of all setups of one instrument; several where the readings cannot say which it
     was, the smallest remainder first.
 
-    ``first`` is the fit of the campaign as recorded, whose gross readings take no part. Empty where nobody contradicts
-    others or itself, or where no mistake explains it.
+    ``first`` is the fit of the campaign as recorded, whose gross readings take no part; of very many rows some are
+    tried. Empty where nobody contradicts others or itself, or where no mistake explains it.
     """
     ability = campaign_method(campaign).instruments
     if not isinstance(ability, Instruments):
         return ()
     campaign = without_gross(campaign, first)
-    for run in islice(reversed(first.problem.runs), MOST_RUNS):
+    tried, of_tried = campaign, first
+    if len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
+        tried = replace(campaign, probings=campaign.probings.rows(rows))
+        refitted = fitted(tried, problem_of)
+        if refitted is None:
+            return ()
+        of_tried = refitted
+    for run in islice(reversed(of_tried.problem.runs), MOST_RUNS):
         doubted = _doubted(
-            ability.contrasts(first.problem, first.solution, int(run)),
-            ability.scatters(first.problem, first.solution, int(run)),
+            ability.contrasts(of_tried.problem, of_tried.solution, int(run)),
+            ability.scatters(of_tried.problem, of_tried.solution, int(run)),
         )
         if doubted:
-            cures = [cure for each in doubted for cure in _cures(campaign, problem_of, first, int(run), each)]
-            least = min((cure.sum_of_squares for cure in cures), default=0.0)
-            alike = [cure for cure in cures if cure.sum_of_squares <= least + AS_WELL]
-            return tuple(cure.mistake for cure in sorted(alike, key=lambda cure: cure.sum_of_squares))
+            cures = [cure for each in doubted for cure in _cures(tried, problem_of, of_tried, int(run), each)]
+            least = min((cure.fit.sum_of_squares for cure in cures), default=0.0)
+            alike = [cure for cure in cures if cure.fit.sum_of_squares <= least + AS_WELL]
+            mistakes = []
+            for cure in sorted(alike, key=lambda cure: cure.fit.sum_of_squares):
+                fit = cure.fit if tried is campaign else fitted(cure.undone(campaign), problem_of)
+                if fit is not None:
+                    mistakes.append(Mistake(cure.what, first.rms, fit.rms))
+            return tuple(mistakes)
     return ()
 
 
@@ -140,8 +156,7 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
     one."""
-    mask = np.isin(_setup_of_rows(campaign), doubted.setups)
-    part = replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
+    part = _part(campaign, _rows_of(campaign, doubted.setups))
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
     of_units = [*unit_mistakes(measured, 1.0)]
@@ -153,13 +168,13 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     for trials, margin in ((of_readings, 1.0), (of_axes, OF_AXES)):
         cures = []
         for what, undo in trials:
-            undone = _with_rows(campaign, mask, undo(part).probings)
+            undone_in = partial(_undone, setups=doubted.setups, undo=undo)
+            undone = undone_in(campaign)
             if not _sum_of_one_step(undone, problem_of) <= margin * limit:
                 continue
             fit = fitted(undone, problem_of)
             if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
-                what = f"{what.split(' (`')[0]} {doubted.in_words}"
-                cures.append(_Cure(Mistake(what, first.rms, fit.rms), fit.sum_of_squares))
+                cures.append(_Cure(f"{what.split(' (`')[0]} {doubted.in_words}", undone_in, fit))
         if cures:
             return cures
     return []
@@ -217,10 +232,21 @@ def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
     )
 
 
-def _setup_of_rows(campaign: Campaign) -> npt.NDArray[np.str_]:
-    """The setup (n,) of every row."""
+def _undone(campaign: Campaign, setups: tuple[str, ...], undo: Undo) -> Campaign:
+    """The campaign with a mistake undone in the rows of some setups."""
+    mask = _rows_of(campaign, setups)
+    return _with_rows(campaign, mask, undo(_part(campaign, mask)).probings)
+
+
+def _rows_of(campaign: Campaign, setups: tuple[str, ...]) -> npt.NDArray[np.bool_]:
+    """Which rows (n,) are of some setups."""
     number = campaign.probings.channels["setup"].astype(np.int64) - 1
-    return np.array([setup.id for setup in campaign.artefact.setups])[number]
+    return np.isin(np.array([setup.id for setup in campaign.artefact.setups])[number], setups)
+
+
+def _part(campaign: Campaign, mask: npt.NDArray[np.bool_]) -> Campaign:
+    """Some rows of a campaign, with the columns that they have."""
+    return replace(campaign, probings=_with_its_columns(campaign.probings.rows(mask)))
 
 
 def _with_its_columns(probings: Probings) -> Probings:

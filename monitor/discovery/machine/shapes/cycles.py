@@ -15,8 +15,8 @@ from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
-    FREQUENCY_STEP,
     SHORTEST_PITCH_MM,
+    pitches_over,
     resolvable,
 )
 from monitor.discovery.search.candidate import Variant
@@ -44,9 +44,8 @@ def cycle_instead(
     travel = float(np.ptp(context.positions[:, effect.term.joint]))
     if travel < FEWEST_PERIODS * SHORTEST_PITCH_MM:
         return []
-    frequencies = np.arange(FEWEST_PERIODS / travel, 1.0 / SHORTEST_PITCH_MM, FREQUENCY_STEP)
     symbol = error_of(free)
-    texts = [f"{symbol}:cyclic{1.0 / frequency:.6g}mm" for frequency in frequencies]
+    texts = [f"{symbol}:cyclic{pitch:.6g}mm" for pitch in pitches_over(travel, travel / FEWEST_PERIODS)]
     variants = [Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(texts)) for text in texts]
     cycles = [
         cycle for cycle in scene_of(scene.fit, resolvable(variants, context)).candidates if cycle.visible

@@ -10,7 +10,7 @@ import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import STEP as ORDER_STEP
-from monitor.discovery.machine.shapes.variants import TIME_CONSTANTS_S, with_drivers
+from monitor.discovery.machine.shapes.variants import TIME_CONSTANTS_S, frequency_step, with_drivers
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
@@ -24,11 +24,12 @@ from monitor.effects.drivers import SettlingDriver, parse_driver
 from monitor.effects.shapes import Cyclic, Harmonic, WindUp
 from monitor.records import Array
 
-# Neighbours on the grid of time constants differ by a factor of two, on that of pitches by a two-hundredth of
-# 1/mm or so; the best value lies between the neighbours of the best of the grid.
+# Neighbours on the grid of time constants differ by a factor of two; the best value lies between the neighbours of the
+# best of the grid.
 GRID_FACTOR = TIME_CONSTANTS_S[1] / TIME_CONSTANTS_S[0]
-# Relative step of the numerical derivative by the searched value.
-STEP = 1e-3
+# Relative step of the numerical derivative by the searched value, and at most which part of the half range: a pitch
+# that differs by a thousandth is a third of a period off after 3 m.
+STEP, STEP_OF_WIDTH = 1e-3, 0.04
 # Twice the logarithm of the likelihood ratio that a value exceeds in 5 % (chi-square with one degree of freedom).
 LIMIT = 3.84
 # Values that are tried for a limit differ by this factor.
@@ -82,11 +83,12 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
         return None
     if isinstance(effect.shape, Cyclic) and family.endswith(":cyclic"):
         pitch = effect.shape.pitch
+        travel = float(np.ptp(candidate.fit.problem.context.positions[:, effect.term.joint]))
         return _Range(
             "pitch",
             "mm",
             pitch,
-            0.5 * pitch / 400.0,
+            pitch * frequency_step(travel),
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
@@ -157,8 +159,9 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     value = float(np.exp(_best_logarithm(badness, searched)))
     refined = at(value)
     estimate = amplitudes(scene, [refined]).estimate
-    high, low = at(value * (1.0 + STEP)), at(value * (1.0 - STEP))
-    slope = ((high.columns - low.columns) @ estimate / (2.0 * STEP * value))[:, None]
+    step = min(STEP, STEP_OF_WIDTH * searched.width)
+    high, low = at(value * (1.0 + step)), at(value * (1.0 - step))
+    slope = ((high.columns - low.columns) @ estimate / (2.0 * step * value))[:, None]
     u = _uncertainty(scene, refined, slope, others)
     likely = searched.likely(value)
     if likely is not None and abs(likely - value) < 2.0 * u:

@@ -36,8 +36,11 @@ LAGS_S = TIME_CONSTANTS_S[:5]
 # What settles within every run does so in minutes; what takes longer than the run is a line in its time.
 PAUSES_S = tuple(300.0 * 2.0**step for step in range(4))
 # Pitches searched for an unknown cycle, from fine screw leads up to a third of a small machine's stroke. The
-# grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
-SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
+# grid is even in 1/pitch; its step is half a period over the travel, of which a wave between two steps leaves its
+# neighbour a fifth at most. Axes of less travel have that of 400 mm.
+SHORTEST_PITCH_MM, LONGEST_PITCH_MM, SHORT_TRAVEL_MM = 4.0, 130.0, 400.0
+# Over more than 3 m of travel the shortest pitches are left out: every one of them is columns of all readings.
+MOST_PERIODS = 750.0
 
 # Widths over which a reversal builds up, from what a long screw gives way to that of covers that drag.
 WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
@@ -159,19 +162,40 @@ def constants_of(driver: Driver) -> tuple[float, ...]:
     return PAUSES_S if isinstance(driver, Settling) else TIME_CONSTANTS_S
 
 
-@lru_cache(maxsize=16)
-def cycles_of_unknown_pitch(chain: Chain) -> tuple[ChainVariant, ...]:
+def cycles_of_unknown_pitch(context: Context) -> tuple[ChainVariant, ...]:
     """Positioning errors of every linear axis with every pitch of the grid."""
-    low, high = 1.0 / LONGEST_PITCH_MM, 1.0 / SHORTEST_PITCH_MM
-    count = int((high - low) / FREQUENCY_STEP) + 1
-    pitches = [1.0 / (low + step * FREQUENCY_STEP) for step in range(count)]
+    travels = {
+        f"E{COMPONENTS[joint.main]}{joint.name}": max(
+            float(np.ptp(context.positions[:, index])), SHORT_TRAVEL_MM
+        )
+        for index, joint in enumerate(context.chain.joints)
+        if joint.kind == "linear"
+    }
+    return _cycles_over(context.chain, tuple(travels.items()))
+
+
+@lru_cache(maxsize=16)
+def _cycles_over(chain: Chain, travels: tuple[tuple[str, float], ...]) -> tuple[ChainVariant, ...]:
+    """Those of positioning errors, each with the travel of its axis in mm."""
     variants: list[ChainVariant] = []
-    for joint in chain.of_kind("linear"):
-        term = f"E{COMPONENTS[joint.main]}{joint.name}"
+    for term, travel in travels:
+        pitches = pitches_over(travel, LONGEST_PITCH_MM)
         for pitch in pitches:
             text = f"{term}:cyclic{pitch:.6g}mm"
-            variants.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
+            variants.append(Variant(f"{term}:cyclic", parse_effect(text, chain), len(pitches)))
     return tuple(variants)
+
+
+def frequency_step(travel: float) -> float:
+    """The step in 1/mm of the grid of pitches of an axis that travelled so many mm."""
+    return 0.5 / max(travel, SHORT_TRAVEL_MM)
+
+
+def pitches_over(travel: float, longest: float) -> list[float]:
+    """The grid of pitches in mm of an axis that travelled so many mm, from the ``longest`` down."""
+    step, low = frequency_step(travel), 1.0 / longest
+    high = min(1.0 / SHORTEST_PITCH_MM, MOST_PERIODS / travel)
+    return [1.0 / (low + number * step) for number in range(int((high - low) / step) + 1)]
 
 
 def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
