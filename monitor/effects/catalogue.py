@@ -112,10 +112,12 @@ def of_ram(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> tuple[s
 
 
 def of_zeros(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
-    """Return what grows in a machine that instruments look at from its work: the places of its linear axes, and what
-    the last axis of a head carries."""
+    """Return what grows in a machine that instruments look at from its work: the places of its linear axes, tables
+    along their own axes, and what the last axis of a head carries."""
     zeros = [f"E{COMPONENTS[joint.main]}0{joint.name}" for joint in chain.of_kind("linear")]
     placed = tuple(f"{zero}@{driver}" for driver in drivers for zero in zeros)
+    tables = [f"E{COMPONENTS[joint.main]}{joint.name}:const" for joint in chain.work if joint.turns]
+    placed += tuple(f"{growth}@{driver}" for driver in drivers for growth in tables)
     return (*placed, *(of_tool_end(chain, drivers) if chain.tool and chain.tool[-1].turns else ()))
 
 

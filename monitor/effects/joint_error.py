@@ -125,6 +125,14 @@ class JointError:
                 THERMAL,
                 OF_DRIVER,
             )
+        if self.joint.turns and self.term.stage != LOCATION and self.term.component == self.joint.main:
+            return Explanation(
+                f"{self.name} or what it carries warms up and grows along its axis",
+                f"warm {self.name} up before measuring and machining, check bearing preload and cooling, or compensate "
+                "from its temperature",
+                THERMAL,
+                OF_DRIVER,
+            )
         return Explanation(
             f"the structure that carries {self.name} warms up unevenly and bends",
             "warm the machine up, shield it from draughts and sun, check the coolant temperature, or compensate",

@@ -335,6 +335,15 @@ def differs_from(number: str, first: int, length: int, genuine: int) -> str:
     )
 
 
+def none_determined(names: Sequence[str]) -> str:
+    """Return that a plan determines no parameter of a model, and where it is said why."""
+    which = f"none of {', '.join(names)}" if names else "no parameter of the model"
+    return (
+        f"the plan determines {which}: `monitor identify` says what each cannot be told apart from; "
+        f"add poses, or state what the setups leave unknown"
+    )
+
+
 def limits_of_type(machine_type: str) -> str:
     """Return where the limits of a trend come from, where they are not the campaign's own."""
     whose = f"the machine type '{machine_type}' in the configuration"

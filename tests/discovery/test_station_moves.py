@@ -73,3 +73,21 @@ def test_a_move_says_when(tmp_path: Path) -> None:
         parse_effect("tracker:moved", context.chain)
     with pytest.raises(EffectError, match="this campaign has no run 7"):
         parse_effect("base:moved(run 7, sequence 3)", context.chain).basis(context)
+
+
+@pytest.mark.slow
+def test_a_tracker_that_walks_through_two_runs_is_no_move(tmp_path: Path) -> None:
+    """At the price of ten nodes a run a walk was never worth it, and was told as a move."""
+    rng = np.random.default_rng(0)
+    track = robots.track(np.random.default_rng([4, 29]), poses=200, fixed_every=10, noise_um=0.0)
+    count = len(track.points)
+    seen = 0.016 * rng.normal(size=(count, 3)) + np.cumsum(0.0015 * rng.normal(size=(count, 3)), axis=0)
+    folder = robots.write_tracked(tmp_path / "robot", replace(track, points=np.round(track.points + seen, 5)))
+    lines = (folder / "probings.csv").read_text().splitlines()
+    later = [f"2,{row + 1}," + line.split(",", 2)[2] for row, line in enumerate(lines[count // 2 + 1 :])]
+    (folder / "probings.csv").write_text("\n".join([*lines[: count // 2 + 1], *later]) + "\n")
+    with (folder / "runs.csv").open("a") as runs:
+        runs.write("2,2026-03-02T12:30:00+01:00,1,false,21.3\n")
+    campaign = read_campaign(folder)
+    told = explain(campaign, METHOD.problem_of(campaign), "tracker", rng=np.random.default_rng(1))
+    assert not any(":moved" in found.effect for found in told.missing)

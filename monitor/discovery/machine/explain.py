@@ -28,6 +28,7 @@ from monitor.discovery.machine.shapes.variants import (
     resolvable,
     reversals_of_unknown_width,
     that_lag,
+    that_moves_first,
     variants_of,
     without_aliases,
     without_part_periods,
@@ -92,7 +93,7 @@ def variants_of_campaign(
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
     shown = filter(problem.can_show, effects)
     variants = [variant for effect in shown for variant in variants_of(effect)]
-    variants = without_aliases(variants, problem.context, pitches)
+    variants = that_moves_first(without_aliases(variants, problem.context, pitches), problem.context)
     variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array, Campaign
+from monitor.reporting.messages import none_determined
 from monitor.statistics import AnalysisOfVariance, FalseDiscoveries, GroupTest, Homogeneity, Pooling
 from monitor.store import (
     Database,
@@ -43,10 +44,15 @@ from monitor.workflow.selections.select import group
 
 
 def _matrix(identification: StoredIdentification, runs: list[int]) -> tuple[list[str], list[Unit], Array]:
-    """Names, display units and values (R, p), in these, of the parameters that have a number in every run."""
+    """Names, display units and values (R, p), in these, of the parameters that have a number in every run.
+
+    Raises DataError where none has.
+    """
     by_run = {run.run: run for run in identification.runs}
     values = np.array([by_run[run].estimate for run in runs])
     complete = np.isfinite(values).all(axis=0)
+    if not complete.any():
+        raise DataError(none_determined(identification.parameters))
     units = [unit for unit, finite in zip(identification.units, complete, strict=True) if finite]
     names = [name for name, finite in zip(identification.parameters, complete, strict=True) if finite]
     return names, units, values[:, complete] / np.array([unit.factor for unit in units])

@@ -21,6 +21,7 @@ from monitor.records import Array, Campaign
 from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
+from monitor.reporting.messages import none_determined
 from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
     FrameworkResult,
@@ -203,6 +204,8 @@ def _propagated(
     inputs = joined(readings, calibrated) if calibrated is not None else readings
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
+    if not names:
+        raise DataError(none_determined(fit.problem.base_names))
     units = _units(fit, names)
     places = [fit.problem.base_names.index(name) for name in names]
     outside = why_outside(fit, linear_axes=request.linear_axes is not None)

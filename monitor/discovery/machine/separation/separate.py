@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
+from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
 from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
@@ -124,11 +125,15 @@ def separating_poses(
 
     ``strokes`` gives the range of axes in mm or rad where the machine file has one. No poses are offered where
     effects differ by their driver (other times and temperatures separate those), where no pose decides, or where
-    the method is not one of touching balls. Of effects with the same driver the poses count at its mean value.
+    the method is not one of touching balls: of those only shifts that are one at every pose are ``together``. Of
+    effects with the same driver the poses count at its mean value.
     """
     problem, context = fit.problem, fit.problem.context
     alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
-    if not isinstance(problem, TouchProblem) or not alike:
+    if not isinstance(problem, TouchProblem):
+        same = [rival for rival in alike if moves_alike(context, effect, coefficients, rival, strokes or {})]
+        return replace(NO_POSES, together=tuple((effect.text, rival.text) for rival in same))
+    if not alike:
         return NO_POSES
     group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
     turned = any(member.joint.kind == "spindle" for member in group)

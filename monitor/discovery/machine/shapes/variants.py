@@ -11,6 +11,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
+from monitor.effects.driver import HeatDriver
 from monitor.effects.drivers import (
     Always,
     Driver,
@@ -54,6 +55,8 @@ FEWEST_PERIODS = 2.0
 # A driver that hardly varies makes nearly the same columns as none; where the data cannot decide, the plain effect
 # leads and the driven one is reported as its rival. 2 log 400 = 12 is what counts as decided.
 ODDS_OF_A_DRIVER = 400.0
+# A screw that does not turn hardly warms up: what moves the tip alike leads, and that of the still axis is its rival.
+ODDS_OF_A_STILL_SCREW = 3.0
 
 
 # Odds against a cube: over positions of one sign it bends as a square does, which leads where both do as well.
@@ -239,6 +242,20 @@ def without_aliases(
         and isinstance(effect.shape, Cyclic)
         and effect.shape.pitch != stated.get(effect.joint.name)
         and not _repeats(effect.shape.pitch, *limits[effect.joint.name])
+        else variant
+        for variant in variants
+    ]
+
+
+def that_moves_first(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
+    """The variants, with the heat of linear axes that never moved less likely beforehand."""
+    still = np.ptp(context.positions, axis=0) < GRID_TOLERANCE_MM
+    return [
+        replace(variant, odds=ODDS_OF_A_STILL_SCREW * variant.odds)
+        if isinstance(effect := variant.effect, ChainEffect)
+        and isinstance(effect.driver, HeatDriver)
+        and not effect.joint.turns
+        and still[effect.term.joint]
         else variant
         for variant in variants
     ]

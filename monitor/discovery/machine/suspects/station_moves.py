@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
-from monitor.discovery.machine.suspects.wander import MOST_NODES, wander
+from monitor.discovery.machine.suspects.wander import wander
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, weigh_beside
 from monitor.effects import ArtefactEffect
@@ -30,6 +30,9 @@ READINGS_EACH_SIDE = 8
 MOMENTS = 40
 # A tripod is knocked more easily than a machine; resting targets outweigh that at once.
 ODDS_OF_BASE = 3.0
+# Nodes of a curve along which a tracker may walk through every run. A walk has most of its power in its slowest parts:
+# at the price of many nodes it explained nothing, and was told as a move.
+NODES = (3, 4, 6, 10)
 # Time constants of what settles in a run, in parts of it.
 SETTLING = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)
 
@@ -46,7 +49,8 @@ def station_moves(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     ]
     if not moves:
         return []
-    rivals = [*weigh_beside(scene, wander(scene, MOST_NODES), steady), *_by_and_by(scene, steady, moves)]
+    walks = [walk for nodes in NODES for walk in wander(scene, nodes)]
+    rivals = [*weigh_beside(scene, walks, steady), *_by_and_by(scene, steady, moves)]
     least = max((rival.score for rival in rivals), default=0.0)
     return [move.candidate.variant for move in moves if move.p_value <= rate and move.score > max(least, 0.0)]
 

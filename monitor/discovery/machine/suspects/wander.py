@@ -99,11 +99,13 @@ def base_instead(scene: ChainScene, selected: Sequence[ChainCandidate], rate: fl
     which of the two is asked, and nothing is paid for the catalogue again. The base has to be seen at ``rate`` beside a
     tracker that moves along any curve.
     """
-    problem = scene.fit.problem
-    first = problem.context.chain.joints[len(problem.context.chain.work)].name
+    tool = scene.fit.problem.context.chain.tool
+    if not scene.fit.problem.resting or not tool:
+        return []
+    first = tool[0].name
     of_base = [candidate for candidate in scene.candidates if _moves_base(candidate, first)]
     named = [each for each in selected if _is_tracker(each) or _moves_base(each, first)]
-    if not of_base or not problem.resting or not any(map(_is_tracker, named)):
+    if not of_base or not any(map(_is_tracker, named)):
         return []
     others = [each for each in selected if not (_is_tracker(each) or _moves_base(each, first))]
     base, worth = _best_base(scene, of_base, others)
