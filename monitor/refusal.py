@@ -28,6 +28,7 @@ class AdviceKind(Enum):
     MORE_MODULES = "more_modules"
     MORE_REFLECTORS = "more_reflectors"
     MORE_POSES = "more_poses"
+    OTHER_MEASUREMENT = "other_measurement"
     OWN_WORDS = "own_words"
 
     @property
@@ -70,6 +71,9 @@ class ReasonKind(Enum):
     NO_NUMBER = "no_number"
     NO_MACHINE_ERROR = "no_machine_error"
     NOT_DETERMINED = "not_determined"
+    NOT_SHOWN = "not_shown"
+    OUTSIDE_MODEL = "outside_model"
+    TURNS_WORKPIECE = "turns_workpiece"
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,8 @@ class Reason:
 
     Of NOT_SEPARATED, ``others`` are the unknowns that they cannot be told from, beside each other; of HELD_AT_ZERO
     those that do the same. Of BARELY_SEEN, ``u`` is the standard uncertainty, in ``unit``, that exceeds what a machine
-    may have.
+    may have; of NOT_SHOWN, OUTSIDE_MODEL and TURNS_WORKPIECE the largest error of the tool, in ``unit``, that an error
+    of ``size`` makes beside all numbers.
     """
 
     kind: ReasonKind
@@ -86,6 +91,7 @@ class Reason:
     advice: Advice | None = field(default=None, metadata=OMITTED)
     u: float | None = field(default=None, metadata=OMITTED)
     unit: str | None = field(default=None, metadata=OMITTED)
+    size: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

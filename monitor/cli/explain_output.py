@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from monitor.cli import output, residual_output
 from monitor.cli.contradiction_output import against_others
 from monitor.cli.identify_output import reversal_words
+from monitor.cli.measurement_output import where
 from monitor.cli.residual_output import four_digits, with_uncertainty
-from monitor.cli.verbs.plan_instruments import where
 from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.workflow.explain.explain_answer import (

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from monitor.cli import output
 from monitor.cli.contradiction_output import likely_mistakes
+from monitor.cli.measurement_output import test_name, where
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.records import FrameOfReference
 from monitor.reporting import messages
@@ -43,6 +44,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     likely_mistakes(answer.likely_mistakes)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
+    _not_seen(answer)
     _taken_up(answer)
     _as_stated(answer)
     _refuted(answer)
@@ -63,6 +65,14 @@ def _added(answer: IdentifyAnswer) -> None:
         alike.setdefault(refusal.why, []).extend(refusal.parameters)
     for why, names in alike.items():
         output.say(f"no number: {', '.join(names)}: {why}")
+
+
+def _not_seen(answer: IdentifyAnswer) -> None:
+    """The errors that are in no number, and which measurement would give one."""
+    for refused in answer.not_seen or ():
+        output.say(f"in no number: {', '.join(refused.parameters)}: {refused.why}")
+    for name, test in (answer.seen_by or {}).items():
+        output.say(f"{name} would show by {test_name(test)}: {where(test)}")
 
 
 def _taken_up(answer: IdentifyAnswer) -> None:

@@ -138,8 +138,8 @@ class TestForecast(Protocol):
     def present(self) -> Mapping[str, float]:
         """Standard uncertainties of the run as it was measured."""
 
-    def expected(self) -> Iterable[ExpectedTest]:
-        """What every single test promises."""
+    def expected(self, *, first_places: bool = False) -> Iterable[ExpectedTest]:
+        """What every single test promises; with ``first_places`` one of those of a setup that move the same axes."""
 
     def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
         """What several tests promise together."""

@@ -35,6 +35,11 @@ def step_between_instruments(
     return f"{measured}: their calibrations (u = {stated}) {'can be' if may_be_all else 'are not'} {what}"
 
 
+def calibrations_apart(before: str, after: str) -> str:
+    """Return that the calibrations of instruments have no part in a step between them."""
+    return f"measured by {before} before and by {after} after it: their calibrations have no part in it"
+
+
 def steps_between_instruments(
     before: str, after: str, parameters: Collection[str], may_be_all: bool, p_value: str
 ) -> str:

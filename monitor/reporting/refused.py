@@ -64,6 +64,7 @@ def refusal_sentence(refusal: Refusal, texts: Texts | None = None) -> str:
         others=", ".join(printed_names(_by_table(reason.others, say), say)),
         u=u,
         unit=reason.unit,
+        size=reason.size,
     )
 
 

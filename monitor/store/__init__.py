@@ -170,6 +170,7 @@ if TYPE_CHECKING:
         campaign_machines as campaign_machines,
         campaign_tolerances as campaign_tolerances,
         check_campaigns as check_campaigns,
+        earlier_frames as earlier_frames,
         identified_runs as identified_runs,
         latest_frames as latest_frames,
         machine_descriptions as machine_descriptions,
@@ -254,8 +255,8 @@ else:
             "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
             "past.simulated": "simulated_campaigns",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
-            "identified_runs latest_frames machine_descriptions machine_runs machine_topology parameter_frames "
-            "probing_counts",
+            "earlier_frames identified_runs latest_frames machine_descriptions machine_runs machine_topology "
+            "parameter_frames probing_counts",
             "held_sizes": "held_bytes",
             "recalling": "Recalled",
             "results": "LackOfFit StoredIdentification StoredRun",

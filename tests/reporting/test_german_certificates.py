@@ -118,7 +118,7 @@ def german_result(result: ResultSet) -> ResultSet:
         "laser cosine error",
     )
     refused = [
-        Refusal((f"EX{number}",), Reason(kind, others, u=1.5, unit="µm"))
+        Refusal((f"EX{number}",), Reason(kind, others, u=1.5, unit="µm", size="100 µrad"))
         for number, kind in enumerate(ReasonKind)
         if kind is not ReasonKind.NOT_SEPARATED
     ]

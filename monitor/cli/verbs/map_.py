@@ -100,6 +100,10 @@ def _say(answer: VolumetricAnswer) -> None:
         output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
     for omitted in answer.left_out:
         output.say(f"not in the map: {omitted.parameter}: {omitted.why}")
+    output.say(
+        "error motions of axes that the model does not have are in no number and no U; `monitor explain` looks for "
+        "those that the readings show"
+    )
     for file in (*(answer.figures or ()), *(answer.tables or ())):
         output.say(file)
 

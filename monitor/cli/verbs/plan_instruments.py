@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.cli import output
+from monitor.cli.measurement_output import test_name, where
 from monitor.workflow.plan.answer import InstrumentPlanAnswer
 from monitor.workflow.plan.test_answer import TestAnswer
 
@@ -12,7 +13,9 @@ def tables(answer: InstrumentPlanAnswer) -> None:
     shown = answer.asked[:4]
     columns = ["test", *(f"u {name}" for name in shown), "where"]
     as_measured = ["as measured", *(_u(answer.present.get(name)) for name in shown), ""]
-    rows = [[_name(test), *(_u(test.u.get(name)) for name in shown), where(test)] for test in answer.tests]
+    rows = [
+        [test_name(test), *(_u(test.u.get(name)) for name in shown), where(test)] for test in answer.tests
+    ]
     units = ", ".join(f"{name} in {answer.units[name]}" for name in shown)
     further = len(answer.asked) - len(shown)
     more = f", ranked for {further} more parameters (--json has them)" if further else ""
@@ -26,7 +29,7 @@ def tables(answer: InstrumentPlanAnswer) -> None:
         output.say("(usual): an instrument that the campaign does not have, with its usual uncertainty")
     for number, test in enumerate(answer.proposed, 1):
         u = ", ".join(f"{name} {_u(test.u.get(name))} {answer.units[name]}" for name in shown)
-        output.say(f"{number}. {_name(test)}: {where(test)}; then u of {u}")
+        output.say(f"{number}. {test_name(test)}: {where(test)}; then u of {u}")
     _remarks(answer)
 
 
@@ -46,7 +49,7 @@ def _remarks(answer: InstrumentPlanAnswer) -> None:
             output.say(f"no single test gives {name} a number; {_pair(answer.pairs.get(name))}")
     for parameter in answer.unseen:
         output.say(
-            f"{parameter.parameter} has no number yet: {_name(parameter.test)} would give it u = {parameter.u:.2g} "
+            f"{parameter.parameter} has no number yet: {test_name(parameter.test)} would give it u = {parameter.u:.2g} "
             f"{parameter.unit} ({where(parameter.test)})"
         )
 
@@ -57,28 +60,7 @@ def _pair(tests: tuple[TestAnswer, ...] | None) -> str:
         return "`monitor identify` says why it has none"
     if not tests:
         return "nor do any two of them; `monitor identify` says why it has none"
-    return "together these do: " + " and ".join(f"{_name(test)} ({where(test)})" for test in tests)
-
-
-def where(test: TestAnswer) -> str:
-    """Which axes move between which readings, and where the others stand."""
-    parts = []
-    for column, (low, high) in test.axes.items():
-        axis, unit = column.upper().rpartition("_")[0], "°" if column.endswith("_deg") else " mm"
-        parts.append(f"{axis} {low:g}{unit}" if low == high else f"{axis} {low:g} to {high:g}{unit}")
-    sentence = f"{test.poses} poses, {', '.join(parts)}"
-    if test.work_point_mm is not None:
-        sentence += f"; work point {', '.join(f'{value:g}' for value in test.work_point_mm)} mm"
-    return sentence
-
-
-def _name(test: TestAnswer) -> str:
-    name = f"{test.instrument} ({test.setup})" if test.available else f"{test.instrument} (usual)"
-    return (
-        name
-        if test.available
-        else f"{name} {test.setup.rpartition('-')[2]}".removesuffix(" bar").removesuffix(" test")
-    )
+    return "together these do: " + " and ".join(f"{test_name(test)} ({where(test)})" for test in tests)
 
 
 def _u(value: float | None) -> str:

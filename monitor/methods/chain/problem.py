@@ -49,6 +49,10 @@ class ChainProblem(MeasuredChain):
         bare = replace(self, added=())
         return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
 
+    def with_base(self, effects: tuple[ChainEffect, ...]) -> Self:
+        """Return the problem with further base effects behind its own, all of them open."""
+        return replace(self, base=(*self.base, *effects))
+
     def for_search(self) -> Self:
         """The problem in which missing effects are searched."""
         return self.foreseen()

@@ -98,7 +98,25 @@ def taken_up(chain: Chain, setups: tuple[Setup, ...]) -> tuple[TakenUp, ...]:
         for name, column in columns.items()
         if name not in base
     ]
-    return (*groups, *_frames(chain, setups, free))
+    return (*groups, *_zeros(chain, by_error, others, tuple(free)), *_frames(chain, setups, free))
+
+
+def _zeros(chain: Chain, by_error: Array, others: Array, free: tuple[str, ...]) -> Iterator[TakenUp]:
+    """The zeros of rotary axes that free errors do at any pose: that of C in ``C B t`` is a turn of B about Z."""
+    usual = {(joint.name, component) for joint, component in location_candidates(chain)}
+    for index, joint in enumerate(chain.joints):
+        column = by_error[:, index, 0, 3 + joint.main]
+        # Those of a chain that is looked at from outside, and of the first axis, are candidates themselves.
+        is_told = (joint.name, 3 + joint.main) in usual or joint is (chain.work or chain.tool)[0]
+        if joint.kind == "rotary" and not is_told and np.any(column) and not _is_new(others, column):
+            members = _members(column, others, free)
+            if members:
+                yield TakenUp(f"E{COMPONENTS[3 + joint.main]}0{joint.name}", members)
+
+
+def _is_new(others: Array, column: Array) -> bool:
+    """Whether a column (N,) does what the others (N, q) do not."""
+    return _with(_orthonormal(others), column)[1]
 
 
 def _members(column: Array, others: Array, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -142,9 +142,13 @@ class InstrumentForecast:
         """Standard uncertainties in internal units of one run as it was measured, NaN where there is no number."""
         return self._measured(tuple(effect.text for effect in self.problem.base)).u()
 
-    def expected(self) -> Iterable[ExpectedTest]:
-        """What every test promises, beside the readings that are there."""
-        for test in self.tests:
+    def expected(self, *, first_places: bool = False) -> Iterable[ExpectedTest]:
+        """What every test promises, beside the readings that are there; with ``first_places`` one of those of a setup
+        that move the same axes."""
+        first = {
+            (test.setup.id, tuple(np.ptp(test.positions, axis=0) > 0.0)): test for test in self.tests[::-1]
+        }
+        for test in reversed(first.values()) if first_places else self.tests:
             yield self._expected((test,))
 
     def together(self, tests: Sequence[PlannedTest]) -> ExpectedTest:
@@ -171,6 +175,9 @@ class InstrumentForecast:
         """The base of a campaign with further setups."""
         if self.model.base:
             return self.model.base
+        return tuple(text for text in self._whole_base(*setups) if text not in self.model.added)
+
+    def _whole_base(self, *setups: Setup) -> tuple[str, ...]:
         others = tuple(replace(setup, work_point=(0.0, 0.0, 0.0)) for setup in setups)
         have = {replace(setup, id="", work_point=(0.0, 0.0, 0.0)) for setup in self.problem.setups}
         new = {setup.id: setup for setup in others if replace(setup, id="") not in have}

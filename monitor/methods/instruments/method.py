@@ -33,7 +33,8 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
     still = tuple(joint.name for joint in still_joints(problem, run))
     if still:
         return Advice(AdviceKind.STOOD_STILL, still)
-    return Advice(AdviceKind.MORE_POSES)
+    # More poses of the same setups often do not help: a square, a level or an autocollimator does.
+    return Advice(AdviceKind.OTHER_MEASUREMENT, parameters[:1])
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:

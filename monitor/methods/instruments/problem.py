@@ -308,6 +308,10 @@ class InstrumentProblem(ChainProblem):
         taken if it is one."""
         return {} if self.masks is None else self.masks
 
+    def with_base(self, effects: tuple[ChainEffect, ...]) -> Self:
+        """Return the problem with further base effects, and nothing of what the setups cannot separate taken out."""
+        return replace(super().with_base(effects), is_whole=True, separated=None, from_others=None)
+
     def with_products(self) -> Self:
         """The problem with all derivatives of its numbers, also those that are products of errors."""
         return replace(self, separated=self._separated, has_products=True)

@@ -140,6 +140,18 @@ def latest_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str]
     return {(machine, parameter): refers_to for machine, parameter, refers_to in rows}
 
 
+def earlier_frames(db: Database, machines: Sequence[str]) -> dict[tuple[str, str], str]:
+    """What the parameters of machines refer to, each as the latest identification that has it says: a campaign of other
+    instruments has other parameters. All identifications of the machines are looked at."""
+    rows = db.rows(
+        "SELECT machine, parameter, arg_max(refers_to, identification_id) FROM parameter_frame "
+        "JOIN identification USING (identification_id) JOIN campaign USING (campaign_id) "
+        "WHERE machine IN (SELECT unnest(CAST(? AS VARCHAR[]))) GROUP BY machine, parameter",
+        [list(machines)],
+    )
+    return {(machine, parameter): refers_to for machine, parameter, refers_to in rows}
+
+
 def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> dict[str, str]:
     """What parameters of a machine refer to, in the words of ``parameter_frame``; "or" where models differ."""
     campaigns = list(campaigns_of_machine(db, machine))

@@ -20,6 +20,7 @@ from monitor.store import (
     FleetSums,
     GroupHours,
     campaign_machines,
+    earlier_frames,
     fleet_sums,
     latest_frames,
     latest_tolerances,
@@ -244,6 +245,9 @@ def _refuted(db: Database, model: str | None) -> dict[str, RefutedCampaign]:
 def _shown(db: Database, rows: list[FleetTableRow]) -> tuple[FleetTableRow, ...]:
     """Return the rows with their ranks and what their parameters refer to."""
     frames = latest_frames(db, sorted({row.machine for row in rows}))
+    lacking = sorted({row.machine for row in rows if (row.machine, row.parameter) not in frames})
+    if lacking:
+        frames = earlier_frames(db, lacking) | frames
     return tuple(
         replace(row, rank=rank, refers_to=frames.get((row.machine, row.parameter)))
         for rank, row in enumerate(rows, start=1)

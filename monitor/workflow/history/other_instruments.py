@@ -18,7 +18,7 @@ import scipy
 
 from monitor.documents import OMITTED
 from monitor.records import Array
-from monitor.reporting.calibration_messages import step_between_instruments
+from monitor.reporting.calibration_messages import calibrations_apart, step_between_instruments
 from monitor.sources import CommonQuantity
 from monitor.statistics import Change
 from monitor.store import MachineHistory
@@ -31,6 +31,10 @@ from monitor.workflow.history.series import Series
 K = 2.0
 #: Steps that are as improbable together as a step of K standard uncertainties are not all of the calibrations.
 LEVEL = 0.05
+
+
+#: Calibrations with less than this of a parameter, in its display unit (1 nm, 1 nrad), have nothing of it.
+LEAST_U = 1e-3
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,8 @@ class OtherInstruments:
 
     def in_words(self, unit: str) -> str:
         """What is said of it beside the step."""
+        if self.u is not None and self.u < LEAST_U:
+            return calibrations_apart(self.before, self.after)
         stated = None if self.u is None else f"{self.u:.2g} {unit}"
         return step_between_instruments(self.before, self.after, stated, self.may_be_all, self.together or ())
 

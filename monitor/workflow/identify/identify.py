@@ -8,10 +8,11 @@ from threadpoolctl import threadpool_limits
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError
-from monitor.methods import campaign_method
+from monitor.methods import InstrumentPlan, campaign_method
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Campaign, CurveCampaign
+from monitor.reporting.refused import refused_parameters
 from monitor.store import (
     Database,
     StoredIdentification,
@@ -26,6 +27,7 @@ from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.mistaken_columns import with_mistake
 from monitor.workflow.identify.mistaken_setups import mistaken_setups
+from monitor.workflow.identify.not_seen import not_seen, seen_by
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve, resolve_for
@@ -82,7 +84,13 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
         judged = None if stored.lack_of_fit is None else stored.lack_of_fit.p_value
         answer = machine_answer(measured.machine, identification, judged)
         mistakes = mistaken_setups(measured, model, *solved[-1])
-        return Identified(replace(answer, likely_mistakes=mistakes or None), stored)
+        answer = replace(answer, likely_mistakes=mistakes or None)
+        if not isinstance(campaign_method(measured).plan, InstrumentPlan):
+            return Identified(answer, stored)
+        outside = not_seen(*solved[-1], identification)
+        tests = seen_by(measured, model, identification, outside)
+        refused = tuple(refused_parameters(each.refusal) for each in outside)
+        return Identified(replace(answer, not_seen=refused or None, seen_by=tests or None), stored)
 
 
 def store(

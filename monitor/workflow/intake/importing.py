@@ -55,7 +55,10 @@ class ImportRequest:
 
     def __post_init__(self) -> None:
         if self.campaign is not None and self.mapping is None:
-            raise InputError("campaign names what files of instruments make together; give their mapping too")
+            raise InputError(
+                "campaign names what files of instruments make together; give their mapping too, or write "
+                'campaign = "NAME" in the mapping.toml of a folder'
+            )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -91,6 +92,34 @@ def measurement_that_tells(
     return _answer(forecast, best, chain_of(campaign.machine).joints)
 
 
+def measurements_that_show(
+    method: InstrumentPlan, campaign: Campaign, model: Model, names: Sequence[str]
+) -> dict[str, TestAnswer]:
+    """For each of ``names`` that one test gives a number the best of them, of the campaign's own instruments where they
+    do; every test at the first place of each of its movements alone."""
+    base = {effect.text for effect in method_base(campaign, model)}
+    joints = chain_of(campaign.machine).joints
+    tests: dict[str, TestAnswer] = {}
+    for added in dict.fromkeys("" if name in base else name for name in names):
+        asked = [name for name in names if name == added or (not added and name in base)]
+        try:
+            forecast, _ = forecast_of(method, campaign, _with_effects(model, [added] if added else []))
+            expected = tuple(forecast.expected(first_places=True))
+        except InputError:
+            continue
+        for name in asked:
+            best = min(expected, key=partial(_order, name), default=None)
+            if best is not None and np.isfinite(best.u.get(name, np.nan)):
+                tests[name] = _answer(forecast, best, joints)
+    return tests
+
+
+def _order(name: str, test: ExpectedTest) -> tuple[bool, bool, float]:
+    """First the tests that give a parameter a number, of them those of own instruments, of these the best."""
+    u = test.u.get(name, np.nan)
+    return not np.isfinite(u), not test.test.available, float(u)
+
+
 def _coefficients(effects: Sequence[str], expected: Sequence[ExpectedTest]) -> tuple[str, ...]:
     """The coefficients of effects among those of the tests: ``EXY:harmonic1.cos``."""
     names = dict.fromkeys(name for test in expected for name in test.u)
@@ -110,19 +139,19 @@ def _effects_asked(request: PlanRequest, campaign: Campaign, model: StoredModel)
     chain = chain_of(campaign.machine)
     texts = [parse_effect(text, chain).text for text in request.separate or ()]
     for name in (*request.parameters, *request.wanted):
-        # A parameter is no effect: EXX is the gain, EXX:poly2 an effect.
-        if ":" in name and name not in model.effects:
+        # A gain is a parameter and no effect, EXX:poly2 an effect, EB0B an error that may lack in the model.
+        if name not in model.effects:
             with suppress(EffectError):
                 texts.append(parse_effect(name, chain).text)
-    base = {effect.text for effect in method_base(campaign, model)}
+    base = {effect.text for effect in method_base(campaign, as_model(model))}
     return tuple(text for text in dict.fromkeys(texts) if text not in base)
 
 
-def method_base(campaign: Campaign, model: StoredModel) -> tuple[Effect, ...]:
+def method_base(campaign: Campaign, model: Model) -> tuple[Effect, ...]:
     """The effects that a campaign's runs have of their own."""
     method = campaign_method(campaign)
     assert isinstance(method, ChainMethod)
-    return method.problem_of(campaign, as_model(model)).base
+    return method.problem_of(campaign, model).base
 
 
 def _names_some(request: PlanRequest) -> bool:

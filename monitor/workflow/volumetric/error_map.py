@@ -11,8 +11,9 @@ from monitor.discovery import Fit
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
-from monitor.reporting.refused import RefusedParameters
+from monitor.reporting.refused import RefusedParameters, refused_parameters
 from monitor.uncertainty.geometric_errors import GeometricErrors
+from monitor.uncertainty.outside_errors import outside_errors
 from monitor.uncertainty.volumetric import VolumetricError, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -81,6 +82,10 @@ def map_of(
     poses = poses_of(errors.chain, errors.context.positions)
     datum = None if absolute else middle(errors.chain, ranges)
     error = volumetric_error(errors, grid(errors.chain, ranges, points, poses), datum)
+    # Location errors are linear along the strokes: the corners show the largest.
+    corners = grid(errors.chain, ranges, 2, poses)
+    outside = outside_errors(fit.problem, errors, corners, datum, left_out)
+    left_out |= {each.symbol: refused_parameters(each.refusal) for each in outside}
     return VolumetricMap(evaluated, errors, ranges, from_strokes, poses, points, error, left_out)
 
 
