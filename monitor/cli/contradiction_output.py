@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from monitor.cli import output
-from monitor.reporting.machine_finding import MistakeFound, mistake_sentence
+from monitor.reporting.machine_finding import MistakeFound, mistake_sentence, what_to_do
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import LikelyMistake
 from monitor.workflow.instruments.answer import AgainstOthers, Suspect
@@ -20,9 +20,10 @@ def likely_mistakes(mistakes: Sequence[LikelyMistake] | None) -> None:
         return
     mm = MICROMETRE.to_internal
     in_words = [
-        MistakeFound(each.what, mm(each.rms_as_recorded_um), mm(each.rms_undone_um)) for each in mistakes
+        MistakeFound(each.what, mm(each.rms_as_recorded_um), mm(each.rms_undone_um), each.explains)
+        for each in mistakes
     ]
-    output.say(f"{mistake_sentence(in_words)} Nothing was changed: correct the file first.")
+    output.say(f"{mistake_sentence(in_words)} Nothing was changed: {what_to_do(in_words)}")
 
 
 def chance(by_chance: float) -> str:

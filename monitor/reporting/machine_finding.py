@@ -27,11 +27,12 @@ class MissingEffect:
 @dataclass(frozen=True)
 class MistakeFound:
     """A likely mistake of the file, and the RMS in mm with it (not finite where the readings fit no machine) and
-    without."""
+    without; ``enough`` where that explains the readings."""
 
     what: str
     rms_as_recorded: float
     rms_undone: float
+    enough: bool = True
 
 
 #: From this correlation of neighbours on a run wanders rather than scatters.
@@ -152,8 +153,8 @@ def machine_sentences(finding: MachineFinding) -> str:
     """The finding in one or two sentences, for people who look rather than read."""
     if finding.mistakes:
         return (
-            mistake_sentence(finding.mistakes)
-            + " Nothing was changed, and no effect was looked for: correct the file first."
+            f"{mistake_sentence(finding.mistakes)} Nothing was changed, and no effect was looked for: "
+            f"{what_to_do(finding.mistakes)}"
         )
     sentences = _missing_sentences(finding)
     if finding.bad_points:
@@ -227,7 +228,20 @@ def mistake_sentence(mistakes: Sequence[MistakeFound]) -> str:
         if np.isfinite(first.rms_as_recorded)
         else "as recorded the readings fit no machine of this file"
     )
-    return f"It looks as if {ways}: {before}, residual {_length(first.rms_undone)} with that undone."
+    left = f"{before}, residual {_length(first.rms_undone)} with that undone"
+    if first.enough:
+        return f"It looks as if {ways}: {left}."
+    return (
+        "No single mistake of those that are tried explains the readings; nearest comes what they would leave if "
+        f"{ways}: {left}, still far more than is stated."
+    )
+
+
+def what_to_do(mistakes: Sequence[MistakeFound]) -> str:
+    """What to do about likely mistakes, as the end of a sentence."""
+    if mistakes[0].enough:
+        return "correct the file first."
+    return "look at all that the file says of these setups, and do not correct this alone."
 
 
 def _length(mm: float) -> str:

@@ -13,10 +13,12 @@ import pytest
 
 from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit, robust_fit
 from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
+from monitor.discovery.machine.mistakes.setup_mistakes import _explains
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.reporting.machine_finding import MistakeFound, mistake_sentence, what_to_do
 from tests.simulator import four_instruments as shop
 from tests.simulator.instrument_errors import week
 
@@ -180,3 +182,25 @@ def test_setups_share_the_rows_that_are_tried_and_their_poses_do(right: Campaign
     assert len(np.unique(x)) == len(
         np.unique(right.probings.readings["X"][right.probings.target == "laser-X"])
     )
+
+
+def test_the_other_frame_of_an_r_test_is_said(right: Campaign) -> None:
+    """Was: the sign of one of its components, which left twelve times what is stated."""
+    setups = tuple(
+        replace(setup, frame="tool") if setup.id == "r-test" else setup for setup in right.artefact.setups
+    )
+    told = _told(replace(right, artefact=replace(right.artefact, setups=setups)))
+    assert told[0] == '`frame = "work"` were right in setup r-test'
+
+
+def test_what_only_comes_nearest_is_not_enough() -> None:
+    """Of 16 µm are 6.7 left, where 0.55 are stated."""
+    nearest = MistakeFound("the sign of dy_um were the other way round", 15.7e-3, 6.68e-3, enough=False)
+    assert mistake_sentence([nearest]).startswith("No single mistake of those that are tried explains")
+    assert "do not correct this alone" in what_to_do([nearest])
+    assert what_to_do([replace(nearest, enough=True)]) == "correct the file first."
+
+
+@pytest.mark.parametrize(("left", "explains"), [(645.0, True), (5e3, True), (2e5, False)])
+def test_a_mistake_explains_where_effects_may_be_all_that_is_left(left: float, explains: bool) -> None:
+    assert _explains(615, 645e3, left) is explains

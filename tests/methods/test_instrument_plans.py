@@ -14,11 +14,13 @@ from monitor.exceptions import InputError
 from monitor.methods import InstrumentPlan, campaign_method
 from monitor.methods.instruments.candidates import CandidateTest, Workspace, usual_instruments
 from monitor.methods.instruments.forecast import InstrumentForecast
+from monitor.methods.method import ExpectedTest
 from monitor.methods.model import chain_of
 from monitor.readers import read_campaign
-from monitor.records import AxisSettings, Campaign, Probings
+from monitor.records import AxisSettings, Campaign, Probings, Setup
 from monitor.store import Database, import_campaign
 from monitor.workflow.plan.answer import InstrumentPlanAnswer
+from monitor.workflow.plan.instruments import _in_turn
 from monitor.workflow.plan.plan import plan
 from monitor.workflow.plan.request import PlanRequest
 from tests.simulator import four_instruments as shop
@@ -170,6 +172,29 @@ def test_wanted_uncertainties_are_reached_by_tests_in_turn(tmp_path: Path) -> No
         *([False] * (len(answer.proposed) - 1)),
         True,
     ]
+
+
+def test_an_instrument_that_is_not_there_is_proposed_where_none_of_the_own_gives_a_number() -> None:
+    """Was: nothing, or "no 12 tests reach": the own laser alone was sought for what it never sees."""
+
+    class Forecast:
+        """Of a laser, which is there and gives no number, and an R-test, which is not."""
+
+        def present(self) -> dict[str, float]:
+            return {"EB0C": np.nan}
+
+        def together(self, tests: list[CandidateTest]) -> ExpectedTest:
+            sees = any(test.setup.id == "r-test" for test in tests)
+            return ExpectedTest(tests[-1], {"EB0C": 2e-6 if sees else np.nan})
+
+    forecast = Forecast()
+    tests = [
+        CandidateTest(Setup(name, "vector", 1e-3), np.zeros((1, 1)), available=name == "laser")
+        for name in ("laser", "r-test")
+    ]
+    expected = [forecast.together([test]) for test in tests]
+    proposed = _in_turn(forecast, expected, ["EB0C"], 1, {"EB0C": 3e-6})  # type: ignore[arg-type]
+    assert [test.test.setup.id for test in proposed] == ["r-test"]
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,9 @@ from monitor.records import Array
 TURNS = 60
 # Singular values below this part of the largest belong to what the axes leave open.
 OPEN = 1e-8
+# Where points spread along one direction by less than this part of what they spread across it, they lie in a plane: two
+# numbers of each show a tilt of the frame only through products of errors.
+FLAT = 5e-3
 # Where axes meet, squares below this part of the largest belong to what the equations leave open: errors of 1 mrad
 # leave a millionth. A few guesses are drawn of it.
 NULL, DRAWS, SEED = 1e-5, 6, 20261122
@@ -72,8 +75,9 @@ def _frame(carried: Array, points: Array) -> tuple[Array, Array]:
     if points.shape[1] == 3:
         turn = nearest_rotation(arm, measured)
         return turn, middle - turn @ of_points
-    # Two numbers: the linear map to them, of least norm, and the two nearest perpendicular unit vectors.
-    plan = np.linalg.lstsq(arm, measured, rcond=OPEN)[0].T
+    # Two numbers: the linear map to them, of least norm, and the two nearest perpendicular unit vectors. Across a plane
+    # its points would draw it after their errors.
+    plan = np.linalg.lstsq(arm, measured, rcond=FLAT)[0].T
     u, _, vt = np.linalg.svd(plan, full_matrices=False)
     flat = u @ vt
     turn = np.vstack([flat, np.cross(flat[0], flat[1])]).T

@@ -11,6 +11,8 @@ import numpy as np
 
 from monitor.discovery import (
     Explanation,
+    Fit,
+    Mistake,
     RobustFit,
     compare as compare_fit,
     explain as search,
@@ -24,6 +26,7 @@ from monitor.discovery import (
     robust_fit,
 )
 from monitor.discovery.curve.explain import explain_curve
+from monitor.discovery.machine.mistakes.cures import Maker
 from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
@@ -63,6 +66,13 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
         raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
+def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:
+    """The mistakes of whole columns, where what is left is more than effects leave."""
+    if is_gross(campaign, first):
+        return find_mistakes(campaign, maker, first)
+    return find_reading_mistakes(campaign, maker, first) if is_far(first) else ()
+
+
 def explanation_of(
     campaign: Campaign, model: StoredModel, robust: RobustFit, rate: float = RATE
 ) -> Explanation:
@@ -77,10 +87,9 @@ def explanation_of(
         mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes:
         mistakes = find_setup_mistakes(campaign, maker, first)
-    if not mistakes and is_gross(campaign, first):
-        mistakes = find_mistakes(campaign, maker, first)
-    elif not mistakes and is_far(first):
-        mistakes = find_reading_mistakes(campaign, maker, first)
+    if not any(mistake.enough for mistake in mistakes):
+        # What comes nearest of single setups is nothing beside what explains all.
+        mistakes = _of_all_setups(campaign, maker, first) or mistakes
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING

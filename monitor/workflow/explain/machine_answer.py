@@ -226,7 +226,7 @@ def is_hopeless(explanation: Explanation) -> bool:
 
 def mistakes_found(mistakes: Sequence[Mistake]) -> list[MistakeFound]:
     """Mistakes as a sentence says them."""
-    return [MistakeFound(each.what, each.rms_as_recorded, each.rms_undone) for each in mistakes]
+    return [MistakeFound(each.what, each.rms_as_recorded, each.rms_undone, each.enough) for each in mistakes]
 
 
 def _as_said(effect: MachineMissing) -> MissingEffect:
@@ -290,7 +290,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         target_word=problem.target_word,
         held_out="runs" if len(problem.runs) > 1 else "blocks of poses",
         likely_mistakes=tuple(
-            LikelyMistake(mistake.what, um(mistake.rms_as_recorded), um(mistake.rms_undone))
+            LikelyMistake(mistake.what, um(mistake.rms_as_recorded), um(mistake.rms_undone), mistake.enough)
             for mistake in explanation.mistakes
         ),
         undecided=_undecided(explanation),

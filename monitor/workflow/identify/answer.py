@@ -107,11 +107,13 @@ class ResponseOverInputs:
 
 @dataclass(frozen=True)
 class LikelyMistake:
-    """What looks wrong in the file, and the RMS with it and with it undone."""
+    """What looks wrong in the file, and the RMS with it and with it undone. Where it ``explains`` the readings, that is
+    what to correct; else it comes nearest, and more or something else is wrong."""
 
     what: str
     rms_as_recorded_um: float
     rms_undone_um: float
+    explains: bool
 
 
 @dataclass(frozen=True, kw_only=True)

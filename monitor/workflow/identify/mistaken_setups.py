@@ -38,4 +38,7 @@ def mistaken_setups(
         campaign, lambda changed: campaign_method(changed).problem_of(changed, stored), fit
     )
     um = MICROMETRE.to_display
-    return tuple(LikelyMistake(each.what, um(each.rms_as_recorded), um(each.rms_undone)) for each in mistakes)
+    return tuple(
+        LikelyMistake(each.what, um(each.rms_as_recorded), um(each.rms_undone), each.enough)
+        for each in mistakes
+    )

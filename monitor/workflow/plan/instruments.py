@@ -319,18 +319,13 @@ def _in_turn(
     count: int,
     wanted: Mapping[str, float],
 ) -> list[ExpectedTest]:
-    """The best next test, the best after it, and so on, of the campaign's own instruments where it has some; up to
+    """The best next test, the best after it, and so on, of the campaign's own instruments where these do; up to
     ``count``, or until the ``wanted`` uncertainties are reached."""
-    candidates = [test for test in expected if test.test.available] or list(expected)
     in_turn: list[ExpectedTest] = []
     while len(in_turn) < count and not (wanted and in_turn and _reached(in_turn[-1].u, wanted)):
         before = [test.test for test in in_turn]
-        present = in_turn[-1].u if in_turn else forecast.present()
-        best = min(
-            (forecast.together([*before, test.test]) for test in candidates),
-            key=lambda test: _rank(test.u, asked),
-        )
-        lacking = _rank(present, asked)[0]
+        lacking = _rank(in_turn[-1].u if in_turn else forecast.present(), asked)[0]
+        best = _best_next(forecast, expected, before, asked, lacking)
         if _rank(best.u, asked)[0] < lacking or lacking < len(asked):
             in_turn.append(best)
             continue
@@ -340,6 +335,30 @@ def _in_turn(
             break
         in_turn += [forecast.together([*before, pair[0].test]), pair[1]]
     return in_turn
+
+
+def _best_next(
+    forecast: TestForecast,
+    expected: Sequence[ExpectedTest],
+    before: Sequence[PlannedTest],
+    asked: Sequence[str],
+    lacking: int,
+) -> ExpectedTest:
+    """The test that leaves least beside those ``before``: of the instruments that are there or proposed already, or of
+    all where ``lacking`` parameters have no number and none of these gives one."""
+
+    def best_of(tests: Iterable[ExpectedTest]) -> ExpectedTest | None:
+        together = (forecast.together([*before, test.test]) for test in tests)
+        return min(together, key=lambda test: _rank(test.u, asked), default=None)
+
+    proposed = {test.setup.id for test in before}
+    mine = [test.test.available or test.test.setup.id in proposed for test in expected]
+    best = best_of(test for test, is_mine in zip(expected, mine, strict=True) if is_mine)
+    if best is not None and (not lacking or _rank(best.u, asked)[0] < lacking):
+        return best
+    other = best_of(test for test, is_mine in zip(expected, mine, strict=True) if not is_mine)
+    both = [each for each in (best, other) if each is not None]
+    return min(both, key=lambda test: _rank(test.u, asked)[0])
 
 
 def _best_pair(

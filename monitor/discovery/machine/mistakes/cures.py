@@ -28,11 +28,13 @@ Maker = Callable[[Campaign], ChainProblem]
 
 @dataclass(frozen=True)
 class Mistake:
-    """A likely mistake of the file: ``what`` in words, and the RMS of all coordinates in mm with it and without."""
+    """A likely mistake of the file: ``what`` in words, and the RMS of all coordinates in mm with it and without. Where
+    it is not ``enough``, it comes nearest of all that are tried and leaves more than effects of a machine may."""
 
     what: str
     rms_as_recorded: float
     rms_undone: float
+    enough: bool = True
 
 
 def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:

@@ -19,6 +19,7 @@ from itertools import chain, islice
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.mistakes.column_mistakes import (
@@ -38,7 +39,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, ContrastKind, Instruments, SetupScatter
-from monitor.records import Array, Campaign, Probings
+from monitor.records import Array, Branch, Campaign, Probings
 
 #: So likely a real error may be to look like a mistake, all mistakes together that are tried.
 BY_CHANCE = 0.01
@@ -54,6 +55,10 @@ AS_WELL = 13.8
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone.
 MOST_TRIED = 3
+#: A mistake explains the readings where chance leaves so much, or where it leaves less than this part of the excess
+#: over what is stated: beside it a machine still has its effects. Else it comes nearest.
+BY_EFFECTS, MOST_LEFT = 1e-6, 0.1
+OTHER_FRAME: dict[Branch, Branch] = {"work": "tool", "tool": "work"}
 #: Runs that are asked, the last one first.
 MOST_RUNS = 5
 
@@ -79,11 +84,13 @@ class _Doubted:
 
 @dataclass(frozen=True)
 class _Cure:
-    """A mistake in words, what undoes it in a campaign, and the fit of the rows that were tried with it undone."""
+    """A mistake in words, what undoes it in a campaign, the fit of the rows that were tried with it undone, and whether
+    it explains them."""
 
     what: str
     undone: Undo
     fit: Fit
+    explains: bool
 
 
 def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
@@ -117,7 +124,7 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
             for cure in sorted(alike, key=lambda cure: cure.fit.sum_of_squares):
                 fit = cure.fit if tried is campaign else fitted(cure.undone(campaign), problem_of)
                 if fit is not None:
-                    mistakes.append(Mistake(cure.what, first.rms, fit.rms))
+                    mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains))
             return tuple(mistakes)
     return ()
 
@@ -160,7 +167,10 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
     of_units = [*unit_mistakes(measured, 1.0)]
-    of_readings = of_units if doubted.is_still else [*reading_mistakes(part), *all_signs(measured), *of_units]
+    of_readings = of_units
+    if not doubted.is_still:
+        frames = _mistaken_frames(part, doubted.setups)
+        of_readings = [*reading_mistakes(part), *all_signs(measured), *of_units, *frames]
     # The axes of several setups of one instrument are those of the machine, which all others move too.
     of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
     count = len(of_readings) + len(of_axes)
@@ -174,7 +184,11 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
                 continue
             fit = fitted(undone, problem_of)
             if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
-                cures.append(_Cure(f"{what.split(' (`')[0]} {doubted.in_words}", undone_in, fit))
+                what = f"{what.split(' (`')[0]} {doubted.in_words}"
+                explains = doubted.is_still or _explains(
+                    max(fit.degrees_of_freedom, 1), first.sum_of_squares, fit.sum_of_squares
+                )
+                cures.append(_Cure(what, undone_in, fit, explains))
         if cures:
             return cures
     return []
@@ -215,6 +229,13 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
     return count_of_quiet * (max(contrast.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
 
 
+def _explains(free: int, recorded: float, undone: float) -> bool:
+    """Whether of a sum of squares as ``recorded`` so much is left with a mistake ``undone`` as effects of the machine
+    may leave; ``free`` are the degrees of freedom."""
+    is_next_to_all = undone - free < MOST_LEFT * (recorded - free)
+    return is_next_to_all or float(scipy.special.chdtrc(free, undone)) > BY_EFFECTS
+
+
 def _is_in_order(scatters: Sequence[SetupScatter], doubted: _Doubted) -> bool:
     """Whether all setups of who is doubted scatter as they state."""
     times = [each.times for each in scatters if each.setup in doubted.setups]
@@ -232,10 +253,24 @@ def _mistaken_axes(part: Campaign) -> Iterator[Trial]:
     )
 
 
+def _mistaken_frames(part: Campaign, of: Sequence[str]) -> Iterator[Trial]:
+    """The other frame of setups whose vectors are read on the side of the work, or of the tool."""
+    frames = {(setup.reading, setup.frame) for setup in part.artefact.setups if setup.id in of}
+    for frame, other in OTHER_FRAME.items():
+        if frames == {("vector", frame)}:
+            yield f'`frame = "{other}"` were right', partial(_with_frame, of, other)
+
+
+def _with_frame(of: Sequence[str], frame: Branch, part: Campaign) -> Campaign:
+    """The campaign with some setups read in another frame."""
+    setups = (replace(setup, frame=frame) if setup.id in of else setup for setup in part.artefact.setups)
+    return replace(part, artefact=replace(part.artefact, setups=tuple(setups)))
+
+
 def _undone(campaign: Campaign, setups: tuple[str, ...], undo: Undo) -> Campaign:
     """The campaign with a mistake undone in the rows of some setups."""
     mask = _rows_of(campaign, setups)
-    return _with_rows(campaign, mask, undo(_part(campaign, mask)).probings)
+    return _with_rows(campaign, mask, undo(_part(campaign, mask)))
 
 
 def _rows_of(campaign: Campaign, setups: tuple[str, ...]) -> npt.NDArray[np.bool_]:
@@ -255,12 +290,13 @@ def _with_its_columns(probings: Probings) -> Probings:
     return replace(probings, channels=recorded)
 
 
-def _with_rows(campaign: Campaign, mask: npt.NDArray[np.bool_], undone: Probings) -> Campaign:
-    """The campaign with some rows as undone."""
+def _with_rows(campaign: Campaign, mask: npt.NDArray[np.bool_], undone: Campaign) -> Campaign:
+    """The campaign with some rows, and the setups, as undone."""
     probings = campaign.probings
-    readings = _merged(probings.readings, mask, undone.readings)
-    channels = _merged(probings.channels, mask, undone.channels)
-    return replace(campaign, probings=replace(probings, readings=readings, channels=channels))
+    readings = _merged(probings.readings, mask, undone.probings.readings)
+    channels = _merged(probings.channels, mask, undone.probings.channels)
+    probings = replace(probings, readings=readings, channels=channels)
+    return replace(campaign, artefact=undone.artefact, probings=probings)
 
 
 def _merged(

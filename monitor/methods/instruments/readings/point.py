@@ -8,21 +8,24 @@ in all rows.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.machine import evaluate
+from monitor.methods.chain.first_frame import FLAT
 from monitor.methods.instruments.frames import first_frame, seen_points
 from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Shown, Stance
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
 from monitor.sources import SCALE
 
-# Where the points vary along the line of sight by less than this part of what they vary across it, two numbers show a
-# tilt of the frame only through products of errors.
-FLAT = 5e-3
+# A third number that is the same in all rows says that a plate is flat where the axes measured its points: those lie in
+# a plane nearly, and off it by more than so many mm. Nearer than that axes lie where they are told to go.
+PROGRAMMED = 5e-5
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Point(Plain):
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
-        measured = _without_constant(rows)
+        measured = _without_constant(rows, setup)
         plane = bool(np.isnan(measured[:, 2]).all())
         rows = replace(rows, measured=measured[:, :2] if plane else measured)
         targets = tuple(str(name) for name in np.unique(rows.target))
@@ -128,18 +131,33 @@ class Point(Plain):
         )
 
 
-def _without_constant(rows: Rows) -> Array:
-    """The measured points (m, 3), the third numbers empty where they are one and the same in all of several rows: a
-    plane that was written down, not measured."""
+def _without_constant(rows: Rows, setup: Setup) -> Array:
+    """The measured points (m, 3), the third numbers empty where they are one and the same in all of several rows and no
+    axis measured that: a plane that was written down."""
     measured = rows.measured.copy()
     z = measured[:, 2]
     moves = np.ptp(rows.positions, axis=0).max(initial=0.0) > 0.0
-    if len(z) > 2 and moves and not np.isnan(z).any() and np.ptp(z) == 0.0:
+    if len(z) > 2 and moves and not np.isnan(z).any() and np.ptp(z) == 0.0 and not _is_flat(rows, setup):
         measured[:, 2] = np.nan
     return measured
 
 
-def _stated_places(setup: Setup, rows: Rows, targets: tuple[str, ...]) -> Array:
+def _is_flat(rows: Rows, setup: Setup) -> bool:
+    """Whether in some run the axes found the points in a plane as nearly as they measure, and not exactly."""
+    count = len(rows)
+    none = np.zeros((count, len(rows.chain.joints), 2, 6))
+    targets = np.unique(rows.target)
+    places = _stated_places(setup, rows, targets)[np.searchsorted(targets, rows.target)]
+    points = evaluate(rows.chain, rows.positions, none, np.zeros((count, 3)), places).residual
+    for run in np.unique(rows.run):
+        arms = points[rows.run == run]
+        spread = np.linalg.svd(arms - arms.mean(axis=0), compute_uv=False) / np.sqrt(len(arms))
+        if len(spread) == 3 and PROGRAMMED < spread[2] < FLAT * spread[1]:
+            return True
+    return False
+
+
+def _stated_places(setup: Setup, rows: Rows, targets: Sequence[str] | npt.NDArray[np.str_]) -> Array:
     """Places (T, 3) of the targets on the tool: as the rows state them, else that of the setup."""
     places = np.tile(setup.tool_point, (len(targets), 1)).astype(np.float64)
     for number, name in enumerate(targets):
