@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.rests_on_output import levels
@@ -199,27 +198,6 @@ def test_a_laser_calibrated_anew_under_its_old_name_is_named_at_the_step(db: Dat
     assert between.may_be_all
     # January and June are by one certificate.
     assert not between_instruments(history, _stepped(past, {"EXX": 2.5}, 0))
-
-
-@pytest.mark.parametrize(
-    ("sizes", "may_be_all"),
-    [((2.0, 2.1, 1.9), True), ((2.0, -2.0, 1.9), False), ((6.0, 6.1, 5.9), False)],
-)
-def test_steps_of_three_gains_by_one_laser_are_judged_at_once(
-    db: Database, sizes: tuple[float, ...], may_be_all: bool
-) -> None:
-    """Each of 2 um/m may be the scales (u = 1.4); two ways at once none can be. By the covariance written out."""
-    history = machine_history(db, "CENTRE-9")
-    past = _stepped(machine_past(history, ()), dict(zip(GAINS, sizes, strict=True)), 1)
-    judged = between_instruments(history, past)
-    assert {each.may_be_all for each in judged.values()} == {may_be_all}
-    assert {each.together for each in judged.values()} == {GAINS}
-    covariance = 0.1**2 * np.eye(3) + 2.0 * U**2
-    expected = chi2.sf(sizes @ np.linalg.solve(covariance, sizes), 3)
-    assert [each.p_value for each in judged.values()] == pytest.approx([expected] * 3, rel=0.2, abs=1e-12)
-    words = {each.in_words("µm/m").rpartition(": ")[2] for each in judged.values()}
-    can = "can be" if may_be_all else "are not"
-    assert all(f"{can} all of the steps of EXX, EYY, EZZ at once" in said for said in words)
 
 
 def test_the_page_says_what_all_runs_rest_on(db: Database) -> None:
