@@ -5,6 +5,7 @@ The simulator shares no code with the package; E_n is computed in the test.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -28,6 +29,7 @@ from monitor.workflow.history.in_common import RestsOn, calibrated_alike, calibr
 from monitor.workflow.history.other_instruments import between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past
 from monitor.workflow.history.series import Series, parameter_series
+from monitor.workflow.history.what_measured import what_measured
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.answer import TrendAnswer
@@ -306,3 +308,24 @@ def test_one_calibration_stated_with_two_uncertainties_is_said() -> None:
         "campaigns state the scale of laser interferometer (C-7) with u = 0.5 µm/m and with 2 µm/m"
     )
     assert calibrated_to(CommonQuantity("bar", "", "length of 100 mm", 3e-4)) == "0.3 µm"
+
+
+@pytest.mark.parametrize("optics", ["K-1", pytest.param("C-7", marks=pytest.mark.slow)])
+def test_optics_without_a_scale_calibrate_no_laser_anew(tmp_path: Path, optics: str) -> None:
+    """The dial stands for optics of the laser, with the same certificate or another one, in January alone."""
+
+    def dial(*of: object) -> tuple[str, list[object]]:
+        text, rows = shop.dial(*of)
+        return re.sub(
+            r'instrument = ".*?"\n', f'instrument = "{LASER}"\ncertificate = "{optics}"\n', text
+        ), rows
+
+    with Database(tmp_path / "shop.duckdb", threads=1) as database:
+        for name, month, others in (("january", 1, (dial,)), ("june", 6, ())):
+            campaign = _campaign(tmp_path / name, month, shop.TRUTH, "C-7", *others)
+            import_campaign(database, campaign)
+            identify(database, IdentifyRequest(campaign.name))
+        history = machine_history(database, "CENTRE-9")
+    assert {of[LASER] for of in history.calibrations.certificates.values()} == {"C-7"}
+    assert what_measured(history)[0] == (f"instruments ({LASER})",)
+    assert not between_instruments(history, _stepped(machine_past(history, ()), {"EXX": 2.5}, 0))
