@@ -46,8 +46,9 @@ AND NOT EXISTS (SELECT 1 FROM common_part AS part WHERE part.identification_id =
 @dataclass(frozen=True)
 class Calibrations:
     """The instruments and artefacts of campaigns: ``certificates`` by campaign and instrument, those of its calibrated
-    scales and lengths where it has any, "" where none is named, and ``unstored``: by campaign the calibrated ones (instrument, certificate) of which its identification, made by an
-    older version, does not say what its runs have of them."""
+    scales and lengths where it has any, "" where none is named, and ``unstored``: by campaign the calibrated ones
+    (instrument, certificate) of which its identification, made by an older version, does not say what its runs have of
+    them."""
 
     certificates: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     unstored: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
