@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from monitor.cli import output
+from monitor.reporting.confounding import whether_with_condition, whether_with_cycle
 from monitor.workflow.trend.answer import ConditionEffect, Cycle, ParameterTrend, TrendAnswer, WarmUp
 
 #: Below this false discovery rate over all parameters a dependence, a cycle or a warm-up is stated.
@@ -19,16 +20,16 @@ def dependences(answer: TrendAnswer) -> Iterator[str]:
             undecided.setdefault(what, []).append(name)
         yield from _of_parameter(name, parameter)
     for what, names in undecided.items():
-        yield f"{', '.join(names)}: whether it goes with {what}"
+        yield f"{', '.join(names)}: {what}"
 
 
 def _undecided(parameter: ParameterTrend) -> Iterator[str]:
     for effect in parameter.conditions:
         if _is_stated(effect.q_value) and effect.not_decided is not None:
-            yield f"{effect.channel}: {effect.not_decided}"
+            yield whether_with_condition(effect.channel, effect.not_decided)
     for wave in parameter.cycles:
         if _is_stated(wave.q_value) and wave.not_decided is not None:
-            yield f"the hour of the {wave.cycle}: {wave.not_decided}".replace("hour of the year", "season")
+            yield whether_with_cycle(wave.cycle, wave.not_decided)
 
 
 def _is_stated(q_value: float | None) -> bool:

@@ -77,14 +77,14 @@ def _not_seen(answer: IdentifyAnswer) -> None:
 
 def _taken_up(answer: IdentifyAnswer) -> None:
     """The errors that have no number of their own."""
-    told = {name for refused in answer.not_seen or () for name in refused.parameters}
+    unseen_by_all = {name for refused in answer.not_seen or () for name in refused.parameters}
     alike: dict[tuple[str, ...], list[str]] = {}
     for taken in answer.taken_up or ():
-        if taken.by and taken.parameter not in told:
+        if taken.by and taken.parameter not in unseen_by_all:
             alike.setdefault(tuple(taken.by), []).append(taken.parameter)
     for by, names in alike.items():
-        own = "has no number of its own" if len(names) == 1 else "have no numbers of their own"
-        output.say(f"{', '.join(names)} {own}: {_doing_the_same(by)}")
+        lacks = "has no number of its own" if len(names) == 1 else "have no numbers of their own"
+        output.say(f"{', '.join(names)} {lacks}: {_doing_the_same(by)}")
     unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
     if unseen:
         output.say(f"such readings see nothing of {', '.join(unseen)}")

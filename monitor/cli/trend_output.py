@@ -10,6 +10,7 @@ from monitor.cli.day_output import resemblance
 from monitor.cli.dependence_output import dependences
 from monitor.cli.forecast_output import forecast_start
 from monitor.cli.rests_on_output import levels, steps_at_once
+from monitor.reporting.confounding import charted
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -246,9 +247,10 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
             yield str(whys[0] or "")
         return
     period, vector = control.period, control.vector
+    of_whom = charted(period.measured_by, period.several_instruments)
     yield (
         f"charts: reference period {(period.reference_from or '')[:10]} to {(period.reference_to or '')[:10]}, "
-        f"{period.reference_points} {period.points}{_of_one(period.measured_by)}; a false alarm once in "
+        f"{period.reference_points} {period.points}{of_whom}; a false alarm once in "
         f"{period.average_run_length:g} {period.points}"
     )
     if len(answer.parameters) == 1:
@@ -259,10 +261,6 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     for name, state in (("T²", vector.t_squared), ("MEWMA", vector.mewma)):
         if state is not None:
             yield _vector(name, state, len(vector.parameters or ()))
-
-
-def _of_one(instruments: str | None) -> str:
-    return "" if instruments is None else f", those by {instruments} alone"
 
 
 def _vector(name: str, state: VectorState, count: int) -> str:

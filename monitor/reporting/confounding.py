@@ -47,3 +47,20 @@ class Confounding:
             f"{widest.by} alone, near {low:.3g} and {high:.3g} {self.unit}".rstrip()
             + ", would decide"
         )
+
+
+def whether_with_condition(channel: str, why_not: object) -> str:
+    """Return that it is not decided whether something goes with a recorded condition."""
+    return f"whether it goes with {channel}: {why_not}"
+
+
+def whether_with_cycle(cycle: str, why_not: object) -> str:
+    """Return that it is not decided whether something goes with the hour of the day or the season."""
+    return f"whether it goes with the {'season' if cycle == 'year' else f'hour of the {cycle}'}: {why_not}"
+
+
+def charted(measured_by: str | None, several: bool | None) -> str:
+    """Return whose points charts are of, behind their number; nothing where all were measured by the same."""
+    if measured_by is not None:
+        return f", those by {measured_by} alone"
+    return ", by several instruments, each of which may be off by its own amount" if several else ""

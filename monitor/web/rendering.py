@@ -14,6 +14,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from monitor import __version__
+from monitor.reporting.confounding import charted, whether_with_condition, whether_with_cycle
 from monitor.reporting.plain_names import plain_name
 from monitor.reporting.resources import report_text
 from monitor.web import words
@@ -70,6 +71,9 @@ def _environment() -> Environment:
     )
     environment.filters["without_option"] = words.without_option
     environment.globals |= {
+        "charted": charted,
+        "whether_with_condition": whether_with_condition,
+        "whether_with_cycle": whether_with_cycle,
         "version": __version__,
         "link": link,
         "maps_style": maps_style,

@@ -5,6 +5,7 @@ The simulator shares no code with the package; E_n is computed in the test.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -12,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.rests_on_output import levels
@@ -29,6 +29,7 @@ from monitor.workflow.history.in_common import RestsOn, calibrated_alike, calibr
 from monitor.workflow.history.other_instruments import between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past
 from monitor.workflow.history.series import Series, parameter_series
+from monitor.workflow.history.what_measured import what_measured
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.answer import TrendAnswer
@@ -201,27 +202,6 @@ def test_a_laser_calibrated_anew_under_its_old_name_is_named_at_the_step(db: Dat
     assert not between_instruments(history, _stepped(past, {"EXX": 2.5}, 0))
 
 
-@pytest.mark.parametrize(
-    ("sizes", "may_be_all"),
-    [((2.0, 2.1, 1.9), True), ((2.0, -2.0, 1.9), False), ((6.0, 6.1, 5.9), False)],
-)
-def test_steps_of_three_gains_by_one_laser_are_judged_at_once(
-    db: Database, sizes: tuple[float, ...], may_be_all: bool
-) -> None:
-    """Each of 2 um/m may be the scales (u = 1.4); two ways at once none can be. By the covariance written out."""
-    history = machine_history(db, "CENTRE-9")
-    past = _stepped(machine_past(history, ()), dict(zip(GAINS, sizes, strict=True)), 1)
-    judged = between_instruments(history, past)
-    assert {each.may_be_all for each in judged.values()} == {may_be_all}
-    assert {each.together for each in judged.values()} == {GAINS}
-    covariance = 0.1**2 * np.eye(3) + 2.0 * U**2
-    expected = chi2.sf(sizes @ np.linalg.solve(covariance, sizes), 3)
-    assert [each.p_value for each in judged.values()] == pytest.approx([expected] * 3, rel=0.2, abs=1e-12)
-    words = {each.in_words("µm/m").rpartition(": ")[2] for each in judged.values()}
-    can = "can be" if may_be_all else "are not"
-    assert all(f"{can} all of the steps of EXX, EYY, EZZ at once" in said for said in words)
-
-
 def test_the_page_says_what_all_runs_rest_on(db: Database) -> None:
     answer = trend(db, TrendRequest("CENTRE-9", campaigns=("january", "june")))
     (stated,) = answer.parameters["EXX"].rests_on or ()
@@ -328,3 +308,24 @@ def test_one_calibration_stated_with_two_uncertainties_is_said() -> None:
         "campaigns state the scale of laser interferometer (C-7) with u = 0.5 µm/m and with 2 µm/m"
     )
     assert calibrated_to(CommonQuantity("bar", "", "length of 100 mm", 3e-4)) == "0.3 µm"
+
+
+@pytest.mark.parametrize("optics", ["K-1", pytest.param("C-7", marks=pytest.mark.slow)])
+def test_optics_without_a_scale_calibrate_no_laser_anew(tmp_path: Path, optics: str) -> None:
+    """The dial stands for optics of the laser, with the same certificate or another one, in January alone."""
+
+    def dial(*of: object) -> tuple[str, list[object]]:
+        text, rows = shop.dial(*of)
+        return re.sub(
+            r'instrument = ".*?"\n', f'instrument = "{LASER}"\ncertificate = "{optics}"\n', text
+        ), rows
+
+    with Database(tmp_path / "shop.duckdb", threads=1) as database:
+        for name, month, others in (("january", 1, (dial,)), ("june", 6, ())):
+            campaign = _campaign(tmp_path / name, month, shop.TRUTH, "C-7", *others)
+            import_campaign(database, campaign)
+            identify(database, IdentifyRequest(campaign.name))
+        history = machine_history(database, "CENTRE-9")
+    assert {of[LASER] for of in history.calibrations.certificates.values()} == {"C-7"}
+    assert what_measured(history)[0] == (f"instruments ({LASER})",)
+    assert not between_instruments(history, _stepped(machine_past(history, ()), {"EXX": 2.5}, 0))

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from monitor.cli.dependence_output import dependences
+from monitor.reporting.confounding import charted
 from monitor.reporting.lacks import Undecided
 from monitor.statistics.groups import eras, interleaved_columns, most_common, share_within
 from monitor.store import Database, MachineEvent, MachineHistory
+from monitor.web.rendering import _environment
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.other_instruments import between_instruments
@@ -158,3 +160,32 @@ def test_groups_by_hand():
     line = np.array([0.0, 1.0, 2.0, 3.0])[:, None]
     # 1 of 5: within pairs (0, 1), (2, 3) the squares are 4 of 0.25, about the mean of all 5.
     assert share_within(line, np.array([0, 0, 1, 1])) == pytest.approx(0.2)
+
+
+def test_the_page_says_what_instruments_leave_undecided_and_follows_no_such_temperature(db):
+    letters = "LB" * 10
+    machine = history(
+        letters, of_letters(letters, 0, 3), of_letters(letters, 7, 20), of_letters(letters, 19, 23)
+    )
+    request = TrendRequest("M", parameter="EXX")
+    answer = _answer(db, request, machine, [], machine_past(machine, []), {})
+    template = _environment().get_template("goes_with.html")
+    said = template.render(statement=answer.parameters["EXX"], trend=answer)
+    follows, _, undecided = said.partition("<dt>Not decided</dt>")
+    assert "method instruments (ball bar)" in follows
+    assert "ambient" not in follows
+    assert (
+        "whether it goes with ambient: the data cannot decide: measured by instruments (laser)" in undecided
+    )
+    assert f", those by {BAR} alone" in said
+
+
+def test_charts_of_a_named_period_say_that_several_instruments_measured():
+    letters = "LB" * 10
+    machine = history(letters, of_letters(letters, 0, 5), [8.0] * 20, [20.0] * 20)
+    first = machine.seconds[0] / 86400.0
+    period = Charts(machine, timedelta(), [], (first, first + 200.0)).period()
+    assert charted(period.measured_by, period.several_instruments).startswith(", by several instruments")
+    plain = history("L" * 20, [0.0] * 20, [8.0] * 20, [20.0] * 20)
+    period = Charts(plain, timedelta(), [], (first, first + 200.0)).period()
+    assert charted(period.measured_by, period.several_instruments) == ""

@@ -45,9 +45,10 @@ AND NOT EXISTS (SELECT 1 FROM common_part AS part WHERE part.identification_id =
 
 @dataclass(frozen=True)
 class Calibrations:
-    """The instruments and artefacts of campaigns: ``certificates`` by campaign and instrument, "" where none is named,
-    and ``unstored``: by campaign the calibrated ones (instrument, certificate) of which its identification, made by an
-    older version, does not say what its runs have of them."""
+    """The instruments and artefacts of campaigns: ``certificates`` by campaign and instrument, those of its calibrated
+    scales and lengths where it has any, "" where none is named, and ``unstored``: by campaign the calibrated ones
+    (instrument, certificate) of which its identification, made by an older version, does not say what its runs have of
+    them."""
 
     certificates: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     unstored: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
@@ -61,23 +62,31 @@ def measured_by(
     numbers = sorted({run.campaign_id for run in runs})
     named = db.rows(_NAMED.format(marks=_marks(numbers)), numbers) if numbers else []
     of_setups: dict[str, list[str]] = {}
-    certificates: dict[str, dict[str, str]] = {}
     calibrated: dict[str, list[tuple[str, str]]] = {}
+    stated: dict[str, dict[str, dict[bool, list[str]]]] = {}
     for campaign, instrument, certificate, is_calibrated, of_setup in named:
         if of_setup and instrument not in of_setups.setdefault(campaign, []):
             of_setups[campaign].append(instrument)
-        of_campaign = certificates.setdefault(campaign, {})
-        # Its angular optics may have another one.
-        others = of_campaign.get(instrument)
-        of_campaign[instrument] = certificate if not others else f"{others}, {certificate}".rstrip(", ")
+        of_instrument = stated.setdefault(campaign, {}).setdefault(instrument, {True: [], False: []})
+        of_instrument[is_calibrated].append(certificate)
         if is_calibrated:
             calibrated.setdefault(campaign, []).append((instrument, certificate))
     brackets = {campaign: f" ({', '.join(instruments)})" for campaign, instruments in of_setups.items()}
+    certificates = {
+        name: {instrument: _certificate(*of.values()) for instrument, of in of_campaign.items()}
+        for name, of_campaign in stated.items()
+    }
     methods = np.array([run.method + brackets.get(run.campaign, "") for run in runs], dtype=np.str_)
     before = _identified_before(db, sorted(identified)) if calibrated else ()
     return methods, Calibrations(
         certificates, {name: tuple(calibrated[name]) for name in before if name in calibrated}
     )
+
+
+def _certificate(of_calibrated: list[str], of_others: list[str]) -> str:
+    """Return the certificates of what is calibrated of an instrument, of all its setups where nothing is: optics
+    without a scale make no campaign one of another calibration."""
+    return ", ".join(dict.fromkeys(filter(None, of_calibrated or of_others)))
 
 
 def _identified_before(db: Database, numbers: list[int]) -> Iterable[str]:

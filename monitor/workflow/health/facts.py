@@ -34,7 +34,7 @@ from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.history.other_instruments import between_instruments
-from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.history.past import ParameterPast, splitting_events
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
@@ -113,7 +113,7 @@ def changes_noted(
     week: Week,
 ) -> list[Change]:
     """Everything that changed, the latest first; ``runs`` are those of the campaign that was explained."""
-    noted, between = [], between_instruments(history, past)
+    noted, between = [], between_instruments(history, past, splitting_events(events))
     for parameter in past.values():
         for change in parameter.search.changes:
             at = moment_of(change.at, parameter.series)

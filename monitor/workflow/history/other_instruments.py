@@ -4,7 +4,8 @@ machine's?
 A calibrated scale is off by the same in all results that rest on it, so that the scatter of the days says nothing of
 it, and a step between two calibrations has the parts of both in its uncertainty (JCGM 100:2008, F.1.2.3). Steps of
 several parameters at one exchange have them in common: whether one error of the calibrations explains all of them is
-one question (chi-square with their covariance), asked of the parameters that did not step there, too.
+one question, asked of the parameters that did not step there, too: of how far each jumps beside the line of its drift
+(``common_error``).
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
+import numpy.typing as npt
 
 from monitor.documents import OMITTED
 from monitor.records import Array
 from monitor.reporting.calibration_messages import calibrations_apart, step_between_instruments
 from monitor.sources import CommonQuantity
 from monitor.statistics import Change
+from monitor.statistics.common_error import Jumps, jumps, p_of_common_error
 from monitor.store import MachineHistory
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.in_common import with_unstored
@@ -33,6 +35,8 @@ K = 2.0
 LEVEL = 0.05
 #: Calibrations with less than this of a parameter, in its display unit (1 nm, 1 nrad), have nothing of it.
 LEAST_U = 1e-3
+#: Coefficients of a jump beside a line, and degrees of freedom besides from which on campaigns say it.
+LINE, ENOUGH = 3, 2
 
 
 def calibrations_may_do(size: float, u: float, apart: Array) -> bool:
@@ -105,6 +109,12 @@ class _Measuring:
     def _certificates(self, run: int) -> Mapping[str, str]:
         return self.history.calibrations.certificates.get(str(self.history.campaign[run]), {})
 
+    def alike(self, run: int) -> npt.NDArray[np.bool_]:
+        """The runs (n,) that were measured by the same as one of them."""
+        campaigns, firsts, index = np.unique(self.history.campaign, return_index=True, return_inverse=True)
+        same = [self.by(run, int(first)) is None for first in firsts]
+        return np.asarray(np.array(same)[index.ravel()] & (len(campaigns) > 0))
+
     def apart(self, name: str, last: int, first: int) -> Array:
         """What the difference of a parameter in two runs has of each quantity (q,)."""
         column = self.history.parameters.index(name)
@@ -118,9 +128,11 @@ class _Measuring:
 
 
 def between_instruments(
-    history: MachineHistory, past: Mapping[str, ParameterPast]
+    history: MachineHistory, past: Mapping[str, ParameterPast], events: Sequence[float] = ()
 ) -> dict[Change, OtherInstruments]:
-    """Return what changed in the measuring at the steps of all parameters; nothing of those where nothing did."""
+    """Return what changed in the measuring at the steps of all parameters; nothing of those where nothing did.
+
+    ``events`` (days since 1970) may have changed the machine: what is beyond them says nothing of a step."""
     by_quantity = with_unstored(history)[0]
     parts = np.array(list(by_quantity.values())).reshape(len(by_quantity), *history.values.shape)
     measuring = _Measuring(history, tuple(by_quantity), parts)
@@ -133,7 +145,7 @@ def between_instruments(
     judged = {}
     for names, steps in exchanges.items():
         for together in _at_once(steps):
-            of_all = _jointly(measuring, past, together) if len(together) > 1 else None
+            of_all = _jointly(measuring, past, together, events) if len(together) > 1 else None
             for step in together:
                 alone = _alone(measuring, step, names)
                 is_joint = of_all is not None and alone.u and step.past.series.name in of_all.together
@@ -178,42 +190,117 @@ class _Jointly(NamedTuple):
     p_value: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """The runs (n,) ``before`` and ``after`` an exchange that the same instruments measured as the ones next to it,
+    between the changes, events and exchanges nearest to it, from ``begins`` to ``ends`` (days since 1970)."""
+
+    before: npt.NDArray[np.bool_]
+    after: npt.NDArray[np.bool_]
+    begins: float
+    ends: float
+
+    def holds(self, parameter: ParameterPast) -> bool:
+        """Whether a parameter changed nowhere in it."""
+        return not any(self.begins < change.at < self.ends for change in parameter.search.changes)
+
+
 def _jointly(
-    measuring: _Measuring, past: Mapping[str, ParameterPast], steps: Sequence[_Step]
+    measuring: _Measuring, past: Mapping[str, ParameterPast], steps: Sequence[_Step], events: Sequence[float]
 ) -> _Jointly | None:
-    """The steps of one exchange at once; None where nothing is known of the calibrations."""
+    """The steps of one exchange at once, with the parameters that did not change there; None where nothing is known of
+    the calibrations, or where too few days say how far the parameters jumped."""
     last, first = min(step.last for step in steps), max(step.first for step in steps)
-    stepped = {step.past.series.name: (step.change.size, step.change.u) for step in steps}
-    differences: dict[str, tuple[float, float]] = {}
-    for name, parameter in past.items():
-        difference = stepped.get(name) or _difference(parameter.series.steady, measuring.history, last, first)
-        if difference is not None and measuring.apart(name, last, first).any():
-            differences[name] = difference
-    if len(differences.keys() & stepped.keys()) < 2:
+    piece = _piece(measuring, steps, last, first, events)
+    stepped = {step.past.series.name for step in steps}
+    touched = {
+        name: parameter
+        for name, parameter in past.items()
+        if (name in stepped or piece.holds(parameter)) and measuring.apart(name, last, first).any()
+    }
+    if len(touched.keys() & stepped) < 2:
         return None
-    sizes, u = np.array(list(differences.values())).T
-    apart = np.array([measuring.apart(name, last, first) for name in differences])
-    chi_square = float(sizes @ np.linalg.solve(np.diag(u**2) + apart @ apart.T, sizes))
-    p_value = float(scipy.special.chdtrc(len(sizes), chi_square))
-    return _Jointly(p_value >= LEVEL, tuple(differences), p_value)
+    runs = piece.before | piece.after
+    for name in stepped & touched.keys():
+        runs = runs & _steady(touched[name])
+    together = {
+        name: parameter for name, parameter in touched.items() if bool(_steady(parameter)[runs].all())
+    }
+    found = _jumps(measuring.history, list(together.values()), runs, piece.after)
+    if found is None:
+        return None
+    apart = np.array([measuring.apart(name, last, first) for name in together])
+    scale = np.array([_scatter_stated(parameter.series) for parameter in together.values()])
+    p_value = p_of_common_error(found, apart, scale)
+    return _Jointly(p_value >= LEVEL, tuple(together), p_value)
 
 
-def _difference(series: Series, history: MachineHistory, last: int, first: int) -> tuple[float, float] | None:
-    """The mean of the days after an exchange less that of those before, with u by the scatter of the days; None where
-    these are too few."""
-    if series.campaign is None:
+def _piece(
+    measuring: _Measuring, steps: Sequence[_Step], last: int, first: int, events: Sequence[float]
+) -> _Piece:
+    t = measuring.history.seconds / SECONDS_PER_DAY
+    here = {step.change for step in steps}
+    changes = (change for step in steps for change in step.past.search.changes if change not in here)
+    bounds = [*events, *(change.at for change in changes)]
+    begins = max((at for at in bounds if at <= t[last]), default=-np.inf)
+    ends = min((at for at in bounds if at > t[first]), default=np.inf)
+    before, after = (measuring.alike(run) for run in (last, first))
+    return _Piece(before & (t >= begins) & (t <= t[last]), after & (t < ends) & (t >= t[first]), begins, ends)
+
+
+def _steady(parameter: ParameterPast) -> npt.NDArray[np.bool_]:
+    """The runs of the machine that count in the long view of a parameter."""
+    mask = parameter.mask.copy()
+    mask[mask] = np.isin(parameter.series.t, parameter.series.steady.t)
+    return mask
+
+
+def _scatter_stated(series: Series) -> float:
+    weights = series.weights()
+    return 1.0 if weights is None else float(np.median(weights))
+
+
+def _jumps(
+    history: MachineHistory,
+    together: Sequence[ParameterPast],
+    runs: npt.NDArray[np.bool_],
+    after: npt.NDArray[np.bool_],
+) -> Jumps | None:
+    """How far parameters jump between runs (n,) and those ``after``: by their campaigns beside a line, as at events,
+    where these are enough; else by their days, beside a line where a side lasts as long as the time between them."""
+    t, later = history.seconds[runs] / SECONDS_PER_DAY, after[runs]
+    if later.all() or not later.any():
         return None
-    t = history.seconds[[last, first]] / SECONDS_PER_DAY
-    sides = []
-    for run in (series.t <= t[0], series.t >= t[1]):
-        index = np.unique(series.days[run], return_inverse=True)[1]
-        sides.append(
-            np.bincount(index, series.values[run]) / np.bincount(index) if run.any() else np.empty(0)
-        )
-    counts = np.array([len(side) for side in sides])
-    freedom = int(counts.sum()) - 2
-    if not counts.all() or freedom < 1:
-        return None
-    variance = sum(float(((side - side.mean()) ** 2).sum()) for side in sides) / freedom
-    u = float(np.sqrt(variance * (1.0 / counts).sum()))
-    return (float(sides[1].mean() - sides[0].mean()), u) if u > 0.0 else None
+    values = np.column_stack([_of_machine(each, each.series.values)[runs] for each in together])
+    days = _of_machine(together[0], together[0].series.days)[runs]
+    campaigns = np.unique(history.campaign[runs], return_inverse=True)[1].ravel()
+    by_campaign, by_day = (
+        _means(np.column_stack([values, t]), later, labels) for labels in (campaigns, days)
+    )
+    if len(by_campaign[0]) >= ENOUGH + LINE:
+        means, side = by_campaign
+        return jumps(means[:, :-1], means[:, -1], side, line=True)
+    means, side = by_day
+    of_days = means[:, -1]
+    gap = float(of_days[side].min() - of_days[~side].max())
+    lasts = max(float(np.ptp(of_days[of])) for of in (side, ~side)) >= gap
+    return jumps(means[:, :-1], of_days, side, line=lasts and len(of_days) >= ENOUGH + LINE)
+
+
+def _of_machine(parameter: ParameterPast, column: npt.NDArray[np.generic]) -> Array:
+    """A column of the runs of a parameter as one of the runs of the machine (n,), NaN where it has none."""
+    every = np.full(len(parameter.mask), np.nan)
+    every[parameter.mask] = column
+    return every
+
+
+def _means(
+    values: Array, after: npt.NDArray[np.bool_], labels: npt.NDArray[np.generic]
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """The means (m, p) of the runs of one label and side, and the mask (m,) of those after."""
+    distinct, index, counts = np.unique(
+        np.column_stack([after, labels]), axis=0, return_inverse=True, return_counts=True
+    )
+    sums = np.zeros((len(distinct), values.shape[1]))
+    np.add.at(sums, index.ravel(), values - values[0])
+    return values[0] + sums / counts[:, np.newaxis], distinct[:, 0] > 0

@@ -332,7 +332,8 @@ class VectorCharts:
 @dataclass(frozen=True)
 class ReferencePeriod:
     """What the charts compare with: ``points`` are runs or days; a false alarm comes once in so many of them. Where
-    several instruments measured, the charts are of the points ``measured_by`` one of them alone."""
+    several instruments measured, the charts are of the points ``measured_by`` one of them alone; of those of a named
+    period, ``several_instruments``, they are of all."""
 
     points: str
     reference_points: int
@@ -340,6 +341,7 @@ class ReferencePeriod:
     reference_to: str | None
     average_run_length: float
     measured_by: str | None = field(default=None, metadata=OMITTED)
+    several_instruments: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

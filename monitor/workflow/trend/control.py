@@ -127,6 +127,7 @@ class Charts:
         by_days = are_days(history)
         self.is_since_event = len(charted.run) < len(history.run)
         self.instruments = None
+        self.several = reference is not None and len(what_measured(charted)[0]) > 1
         if reference is None:
             charted, self.instruments = by_one_instrument(charted, by_days=by_days)
         self.points = points_of(charted, offset, by_days=by_days)
@@ -136,7 +137,9 @@ class Charts:
         """The reference period in words and dates."""
         times = self.points.t[self.inside]
         first, last = (self._date(times[index]) if len(times) else None for index in (0, -1))
-        return ReferencePeriod(self.points.kind, len(times), first, last, RUN_LENGTH, self.instruments)
+        return ReferencePeriod(
+            self.points.kind, len(times), first, last, RUN_LENGTH, self.instruments, self.several or None
+        )
 
     def of(self, column: int) -> ParameterCharts:
         """Shewhart, EWMA and CUSUM of one parameter: state, limits, and the alarms after the reference period."""

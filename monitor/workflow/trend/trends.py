@@ -191,7 +191,7 @@ def _answer(
         None if reference is None else (days_since_1970(reference[0]), days_since_1970(reference[1])),
     )
     check = _next_check(history, request)
-    page = _Page(request, history, charts, check, between_instruments(whole, every))
+    page = _Page(request, history, charts, check, between_instruments(whole, every, splitting_events(events)))
     parameters = with_discovery_rates({name: page.parameter(parameter) for name, parameter in past.items()})
     parameters = _with_event_steps(parameters, event_steps(every, events))
     control = ControlCharts(

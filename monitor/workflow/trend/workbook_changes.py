@@ -37,7 +37,7 @@ def workbook_changes(db: Database, machine: str | None) -> tuple[ComputedChange,
         history = machine_history(db, name, followed_by=numbered_by(db, name))
         events = machine_events(db, name)
         past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-        others = between_instruments(history, past)
+        others = between_instruments(history, past, splitting_events(events))
         changes = [row for parameter in past.values() for row in _changes(name, others, parameter)]
         changes += [_at_event(name, step) for step in event_steps(past, events)]
         rows += changes
