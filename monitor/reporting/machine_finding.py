@@ -92,7 +92,8 @@ class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
     more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how. ``unseen``:
-    the tests of all residuals together do not show what is missing."""
+    the tests of all residuals together do not show what is missing. ``not_followed`` are errors that the model has in a
+    shape which does not follow them."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -106,6 +107,7 @@ class MachineFinding:
     scattering: Sequence[Scattering] = ()
     unlike_runs: Sequence[RunUnlike] = ()
     unseen: bool = False
+    not_followed: Sequence[str] = ()
 
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
@@ -122,6 +124,11 @@ UNSEEN = (
 TOGETHER = (
     "by all residuals together; `monitor explain {campaign}` also looks for single effects, which may be too small for "
     "this test"
+)
+# What is said where an error is in the model in an unknown shape.
+NOT_FOLLOWED = (
+    "What is left of {errors} is not followed by the shape that was added: further shapes of it were not looked for, "
+    "and effects of other errors only beside all that it could do; measure it at more positions."
 )
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
@@ -179,6 +186,8 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"Could not be fitted and {'was' if len(finding.unfitted) == 1 else 'were'} skipped: "
             f"{', '.join(finding.unfitted)}."
         )
+    if finding.not_followed:
+        sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
 
 
@@ -200,6 +209,8 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
             "Nothing is missing that this plan can see."
             if finding.explained
             else "The model does not explain the measurements, but no effect of the catalogue explains more."
+            if not finding.not_followed
+            else "The model does not explain the measurements, but no other error explains more."
         ]
     first = finding.missing[0]
     sentences = [f"The model lacks {first.effect}: {first.meaning}."]

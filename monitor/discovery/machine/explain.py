@@ -23,6 +23,7 @@ from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
+from monitor.discovery.machine.shapes.shapes_of_model import not_followed
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
@@ -61,7 +62,7 @@ class Explanation:
     ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
     leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
     less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
-    under the model as given.
+    under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
     """
 
     comparison: ChainComparison
@@ -79,6 +80,7 @@ class Explanation:
     scatter: tuple[Scatter, ...] = ()
     apart: tuple[RunApart, ...] = ()
     together: Verdict | None = None
+    not_followed: tuple[str, ...] = ()
 
 
 def variants_of_campaign(
@@ -133,9 +135,10 @@ def explain(
         steady = steady.with_correlation(correlation_under(latest.under))
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
+    left = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
-    if not missing:
+    if not missing and not left:
         verdict = compare(latest.under, campaign.name, model).verdict
     as_given = compare(first, campaign.name, model)
     return Explanation(
@@ -153,6 +156,7 @@ def explain(
         taken_for_machine=taken_for_machine(latest.scene),
         scatter=tuple(suspects.scatter.values()),
         apart=_apart(latest, variants, varies=bool(suspects.varying)),
+        not_followed=left,
     )
 
 

@@ -311,11 +311,13 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 hopeless=is_hopeless(explanation),
                 mistakes=mistakes_found(explanation.mistakes),
                 unseen=explanation.together is Verdict.EXPLAINED,
+                not_followed=explanation.not_followed,
             )
         ),
         residual_map=residual_map,
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
+        not_followed=explanation.not_followed,
         limits_reached=tuple(explanation.limits),
         remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
