@@ -135,10 +135,10 @@ def explain(
         steady = steady.with_correlation(correlation_under(latest.under))
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
-    left = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
+    unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
-    if not missing and not left:
+    if not missing and not unfollowed:
         verdict = compare(latest.under, campaign.name, model).verdict
     as_given = compare(first, campaign.name, model)
     return Explanation(
@@ -156,7 +156,7 @@ def explain(
         taken_for_machine=taken_for_machine(latest.scene),
         scatter=tuple(suspects.scatter.values()),
         apart=_apart(latest, variants, varies=bool(suspects.varying)),
-        not_followed=left,
+        not_followed=unfollowed,
     )
 
 

@@ -53,14 +53,14 @@ def not_followed(scene: ChainScene, found: Sequence[ChainCandidate], rate: float
     """The errors that the model has in a free shape and of which some shape was found as well, or still stands out
     beside what was found."""
     families = family_count(scene)
-    left = []
+    unfollowed = []
     for whole in _in_any_shape(scene):
         shapes = [each for each in scene.candidates if each.visible and _is_shape_of(each, {error_of(whole)})]
         others = [each for each in found if not _is_shape_of(each, {error_of(whole)})]
         weighed = weigh_beside(scene, [whole, *shapes], others)
         if min(evidence.p_value for evidence in weighed) * families <= rate:
-            left.append(error_of(whole))
-    return tuple(left)
+            unfollowed.append(error_of(whole))
+    return tuple(unfollowed)
 
 
 def _in_any_shape(scene: ChainScene) -> tuple[ChainCandidate, ...]:
