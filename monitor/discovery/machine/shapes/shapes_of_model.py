@@ -43,20 +43,20 @@ def under_the_model(
     scene: ChainScene, searched: ChainScene, result: ChainScan
 ) -> tuple[ChainScene, ChainScan]:
     """What was found in the ``searched`` scene, weighed in that of the model as it is, with the candidates of both."""
-    known = {id(each) for each in scene.candidates}
-    more = [each for each in searched.candidates if id(each) not in known]
+    of_the_model = {id(each) for each in scene.candidates}
+    more = [each for each in searched.candidates if id(each) not in of_the_model]
     scene = replace(scene, candidates=(*scene.candidates, *more))
     return scene, ScanResult(findings_of(scene, result.candidates))
 
 
-def not_followed(scene: ChainScene, found: Sequence[ChainCandidate], rate: float) -> tuple[str, ...]:
-    """The errors that the model has in a free shape and of which some shape was found as well, or still stands out
-    beside what was found."""
+def not_followed(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> tuple[str, ...]:
+    """The errors that the model has in a free shape and of which some shape was selected as well, or still stands out
+    beside what was selected."""
     families = family_count(scene)
     unfollowed = []
     for whole in _in_any_shape(scene):
         shapes = [each for each in scene.candidates if each.visible and _is_shape_of(each, {error_of(whole)})]
-        others = [each for each in found if not _is_shape_of(each, {error_of(whole)})]
+        others = [each for each in selected if not _is_shape_of(each, {error_of(whole)})]
         weighed = weigh_beside(scene, [whole, *shapes], others)
         if min(evidence.p_value for evidence in weighed) * families <= rate:
             unfollowed.append(error_of(whole))
