@@ -56,6 +56,7 @@ def test_the_right_error_alone_is_named(virtual_campaigns, trial, explained, fam
     assert again.missing == again.not_followed == ()
 
 
+@pytest.mark.slow
 def test_what_a_shape_that_was_added_does_not_follow_is_no_effect_of_another_error(virtual_campaigns):
     """A step within 0.2 mm is no part of a free shape: `ECX:free(6)` of 3.8 µm was told beside it, and the warm-up that
     is there was not."""

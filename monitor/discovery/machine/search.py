@@ -14,7 +14,11 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVar
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.several_instead import several_instead
-from monitor.discovery.machine.shapes.shapes_of_model import beside_free_shapes, not_followed, under_the_model
+from monitor.discovery.machine.shapes.shapes_of_model import (
+    beside_free_shapes,
+    may_be_mimics,
+    under_the_model,
+)
 from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
@@ -29,7 +33,7 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
     """Scan a scene, and where a free shape of the model does not follow its error, once more beside all that this error
     could do; return the scene with the candidates that were added."""
     searched, result = _searched(scene, drivers, rate)
-    if result.candidates and not_followed(searched, result.candidates, rate):
+    if may_be_mimics(searched, result.candidates, rate):
         beside = beside_free_shapes(scene)
         searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
     return searched, by_error_taken_away(searched, standing_out(searched, result))

@@ -16,6 +16,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
@@ -25,6 +26,14 @@ from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
+
+
+def may_be_mimics(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> bool:
+    """Whether what was selected may mimic what a free shape of the model leaves of its error: where this still stands
+    out beside it, and where another error is told in a free shape, which follows whatever is left."""
+    if not selected or not _in_any_shape(scene):
+        return False
+    return any(map(price_of_parts, selected)) or bool(not_followed(scene, selected, rate))
 
 
 def beside_free_shapes(scene: ChainScene) -> ChainScene:
