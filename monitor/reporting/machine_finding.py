@@ -93,7 +93,9 @@ class MachineFinding:
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
     more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how. ``unseen``:
     the tests of all residuals together do not show what is missing. ``not_followed`` are errors that the model has in a
-    shape which does not follow them."""
+    shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
+    ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
+    explains the measurements without what was left out, and the tests of all residuals deny it."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -108,6 +110,9 @@ class MachineFinding:
     unlike_runs: Sequence[RunUnlike] = ()
     unseen: bool = False
     not_followed: Sequence[str] = ()
+    recurring: int = 0
+    unchecked: bool = False
+    contradicted: bool = False
 
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
@@ -129,6 +134,19 @@ TOGETHER = (
 NOT_FOLLOWED = (
     "What is left of {errors} is not followed by the shape that was added: further shapes of it were not looked for, "
     "and effects of other errors only beside all that it could do; measure it at more positions."
+)
+# What is said of readings that were left out and may be an error of the machine.
+RECURRING = (
+    "{count} readings are off alike in most runs at nearly the same places: they are no bad points, the model lacks "
+    "something there. They were left out of the search for effects; see whether a small move decides there from which "
+    "side an axis came."
+)
+UNCHECKED = (
+    "They lie where no other run read, and are so many that they may be an error which the model lacks."
+)
+CONTRADICTED = (
+    "The model explains the measurements without what was left out; `monitor compare`, which counts it, says that "
+    "something is missing."
 )
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
@@ -167,6 +185,10 @@ def machine_sentences(finding: MachineFinding) -> str:
         sentences.append(
             f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
         )
+        sentences += [UNCHECKED] if finding.unchecked else []
+    if finding.recurring:
+        sentences.append(RECURRING.format(count=finding.recurring))
+    sentences += [CONTRADICTED] if finding.contradicted else []
     for each in finding.scattering:
         sentences.append(
             f"{each.target_word} {each.target} scatters {each.times:.1f} times as much as the others "
