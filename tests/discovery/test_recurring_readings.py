@@ -1,5 +1,5 @@
-"""A plate that is laid anew in every run: what recurs at the same balls is the machine, single rows are bad points, and its turn
-makes no cycle.
+"""A plate that is laid anew in every run: what recurs at the same balls is the machine, single rows are bad points, and
+its turn makes no cycle.
 
 Simulated with numpy; errors are of the readings themselves, so that no effect of the catalogue has them.
 """
