@@ -19,7 +19,7 @@ from monitor.records import Array
 
 @dataclass(frozen=True)
 class WindUp(DescribedShape):
-    """Half the reversal error, which builds up evenly over a width of travel after each reversal, in ``unit``:
+    """Half the reversal error, which builds up evenly over a width of travel after each reversal, in ``width_unit``:
     mm of linear axes, deg of rotary ones.
 
     Moves shorter than the width leave it in between, as a play operator does. What a control does while it positions (a
@@ -27,7 +27,7 @@ class WindUp(DescribedShape):
     """
 
     width: float
-    unit: str = "mm"
+    width_unit: str = "mm"
     pattern: ClassVar[str] = r"windup(?P<width>\d+(?:\.\d+)?)(?P<unit>mm|deg)"
 
     @classmethod
@@ -37,21 +37,23 @@ class WindUp(DescribedShape):
     @property
     def text(self) -> str:
         """The shape as written, with four digits of the width."""
-        return f"windup{self.width:.4g}{self.unit}"
+        return f"windup{self.width:.4g}{self.width_unit}"
 
     def refuse(self, text: str, error: JointError) -> None:
-        unit = width_unit(error.joint)
-        if self.unit != unit:
+        unit = unit_of_width(error.joint)
+        if self.width_unit != unit:
             kind = "linear" if error.joint.turns else "rotary"
             raise EffectError(
-                f"'{text}': a width in {self.unit} belongs to a {kind} axis; for {error.name} write "
+                f"'{text}': a width in {self.width_unit} belongs to a {kind} axis; for {error.name} write "
                 f"windup{self.width:g}{unit}"
             )
 
     def columns(self, context: Context, joint: int) -> Array:
         if self.width <= 0:
-            raise EffectError(f"the width of windup{self.width:g}{self.unit} must be above 0 {self.unit}")
-        width = np.deg2rad(self.width) if self.unit == "deg" else self.width
+            raise EffectError(
+                f"the width of windup{self.width:g}{self.width_unit} must be above 0 {self.width_unit}"
+            )
+        width = np.deg2rad(self.width) if self.width_unit == "deg" else self.width
         return wound_up(context, joint, float(width))[:, None]
 
     def phrase(self, error: JointError) -> str:
@@ -77,7 +79,7 @@ class WindUp(DescribedShape):
         )
 
 
-def width_unit(joint: Joint) -> str:
+def unit_of_width(joint: Joint) -> str:
     """The unit in which the widths of an axis are written."""
     return "deg" if joint.turns else "mm"
 

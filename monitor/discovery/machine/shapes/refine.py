@@ -22,7 +22,7 @@ from monitor.effects import ChainEffect, Context, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import SettlingDriver, parse_driver
 from monitor.effects.shapes import Cyclic, Harmonic, WindUp
-from monitor.effects.shapes.windup import width_unit
+from monitor.effects.shapes.windup import unit_of_width
 from monitor.records import Array
 
 # Neighbours on the grid of time constants differ by a factor of two, on that of pitches by a two-hundredth of
@@ -95,7 +95,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
     if isinstance(effect.shape, WindUp):
         return _Range(
             "width",
-            effect.shape.unit,
+            effect.shape.width_unit,
             effect.shape.width,
             float(np.log(GRID_FACTOR)),
             1e-3,
@@ -121,7 +121,7 @@ def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
 
 
 def _with_width(effect: ChainEffect, width: float) -> ChainEffect:
-    shape = WindUp(width, width_unit(effect.joint))
+    shape = WindUp(width, unit_of_width(effect.joint))
     return replace(effect, shape=shape, shape_text=shape.text)
 
 

@@ -24,7 +24,7 @@ from monitor.effects.drivers import (
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
 from monitor.effects.shapes.poly import Poly
-from monitor.effects.shapes.windup import width_unit
+from monitor.effects.shapes.windup import unit_of_width
 from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
@@ -182,7 +182,7 @@ def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
     for index, joint in enumerate(context.chain.joints):
         term = f"E{COMPONENTS[joint.main + 3 * joint.turns]}{joint.name}"
         travel = float(np.ptp(context.positions[:, index]))
-        unit, grid = width_unit(joint), WIDTHS_MM
+        unit, grid = unit_of_width(joint), WIDTHS_MM
         if joint.turns:
             travel, grid = float(np.rad2deg(travel)), WIDTHS_DEG
         texts = [f"{term}:windup{width:g}{unit}" for width in grid if width < travel]
