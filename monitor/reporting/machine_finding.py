@@ -181,14 +181,7 @@ def machine_sentences(finding: MachineFinding) -> str:
             + " Nothing was changed, and no effect was looked for: correct the file first."
         )
     sentences = _missing_sentences(finding)
-    if finding.bad_points:
-        sentences.append(
-            f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
-        )
-        sentences += [UNCHECKED] if finding.unchecked else []
-    if finding.recurring:
-        sentences.append(RECURRING.format(count=finding.recurring))
-    sentences += [CONTRADICTED] if finding.contradicted else []
+    sentences += _left_out(finding)
     for each in finding.scattering:
         sentences.append(
             f"{each.target_word} {each.target} scatters {each.times:.1f} times as much as the others "
@@ -211,6 +204,19 @@ def machine_sentences(finding: MachineFinding) -> str:
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
+
+
+def _left_out(finding: MachineFinding) -> list[str]:
+    """What is said of readings that were left out."""
+    sentences = []
+    if finding.bad_points:
+        sentences.append(
+            f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
+        )
+        sentences += [UNCHECKED] if finding.unchecked else []
+    if finding.recurring:
+        sentences.append(RECURRING.format(count=finding.recurring))
+    return sentences + ([CONTRADICTED] if finding.contradicted else [])
 
 
 def _unlike(unlike: RunUnlike) -> str:
