@@ -52,6 +52,8 @@ def _machine(explanation: MachineExplanation) -> None:
         _advice(effect, "data", explanation.comparison.campaign)
     for reading in explanation.suspect_data:
         _bad_probing(reading, explanation.target_word)
+    for reading in explanation.recurring_data:
+        _recurring_probing(reading, explanation.target_word)
     output.say(explanation.answer)
     _remaining(explanation)
     _next_step(explanation)
@@ -134,6 +136,13 @@ def _bad_probing(reading: BadProbing, target_word: str) -> None:
     output.say(
         f"bad point: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: {reading.axis} is "
         f"off by {reading.size_um:.1f} µm; it was left out"
+    )
+
+
+def _recurring_probing(reading: BadProbing, target_word: str) -> None:
+    output.say(
+        f"recurs in most runs: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: "
+        f"{reading.axis} is off by {reading.size_um:.1f} µm; it was left out"
     )
 
 

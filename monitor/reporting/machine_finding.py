@@ -93,7 +93,10 @@ class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
     more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how. ``unseen``:
-    the tests of all residuals together do not show what is missing."""
+    the tests of all residuals together do not show what is missing. ``not_followed`` are errors that the model has in a
+    shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
+    ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
+    explains the measurements without what was left out, and the tests of all residuals deny it."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -107,6 +110,10 @@ class MachineFinding:
     scattering: Sequence[Scattering] = ()
     unlike_runs: Sequence[RunUnlike] = ()
     unseen: bool = False
+    not_followed: Sequence[str] = ()
+    recurring: int = 0
+    unchecked: bool = False
+    contradicted: bool = False
 
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
@@ -123,6 +130,24 @@ UNSEEN = (
 TOGETHER = (
     "by all residuals together; `monitor explain {campaign}` also looks for single effects, which may be too small for "
     "this test"
+)
+# What is said where an error is in the model in an unknown shape.
+NOT_FOLLOWED = (
+    "What is left of {errors} is not followed by the shape that was added: further shapes of it were not looked for, "
+    "and effects of other errors only beside all that it could do; measure it at more positions."
+)
+# What is said of readings that were left out and may be an error of the machine.
+RECURRING = (
+    "{count} readings are off alike in most runs at nearly the same places: they are no bad points, the model lacks "
+    "something there. They were left out of the search for effects; see whether a small move decides there from which "
+    "side an axis came."
+)
+UNCHECKED = (
+    "They lie where no other run read, and are so many that they may be an error which the model lacks."
+)
+CONTRADICTED = (
+    "The model explains the measurements without what was left out; `monitor compare`, which counts it, says that "
+    "something is missing."
 )
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
@@ -157,10 +182,7 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"{what_to_do(finding.mistakes)}"
         )
     sentences = _missing_sentences(finding)
-    if finding.bad_points:
-        sentences.append(
-            f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
-        )
+    sentences += _left_out(finding)
     for each in finding.scattering:
         sentences.append(
             f"{each.target_word} {each.target} scatters {each.times:.1f} times as much as the others "
@@ -180,7 +202,22 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"Could not be fitted and {'was' if len(finding.unfitted) == 1 else 'were'} skipped: "
             f"{', '.join(finding.unfitted)}."
         )
+    if finding.not_followed:
+        sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
+
+
+def _left_out(finding: MachineFinding) -> list[str]:
+    """What is said of readings that were left out."""
+    sentences = []
+    if finding.bad_points:
+        sentences.append(
+            f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
+        )
+        sentences += [UNCHECKED] if finding.unchecked else []
+    if finding.recurring:
+        sentences.append(RECURRING.format(count=finding.recurring))
+    return sentences + ([CONTRADICTED] if finding.contradicted else [])
 
 
 def _unlike(unlike: RunUnlike) -> str:
@@ -201,6 +238,8 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
             "Nothing is missing that this plan can see."
             if finding.explained
             else "The model does not explain the measurements, but no effect of the catalogue explains more."
+            if not finding.not_followed
+            else "The model does not explain the measurements, but no other error explains more."
         ]
     first = finding.missing[0]
     sentences = [f"The model lacks {first.effect}: {first.meaning}."]

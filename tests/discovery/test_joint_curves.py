@@ -183,3 +183,25 @@ def test_a_base_that_settles_beside_curves_is_no_drift_of_the_tracker(robots, se
     curves = [effect for effect in answer.missing if "harmonic" in effect.effect]
     assert len(curves) == 2
     assert all(effect.q_value <= 0.01 for effect in curves)
+
+
+@pytest.mark.slow
+def test_low_orders_over_a_part_of_a_turn_do_not_cancel_each_other(robots, tmp_path, monkeypatch):
+    """A step of 700 urad within 130 degrees of J3: orders 1 to 3 of 35 to 46 mrad and 13 to 17 mm were told. Of the
+    step the largest deviation from its mean is 408 urad; lines overshoot beside it by up to a third."""
+    limited = tuple(
+        (*words, (-70.0, 60.0)) if words[0] == "J3" else (*words, limits) for *words, limits in robots.ELBOW
+    )
+    monkeypatch.setattr(robots, "ELBOW", limited)
+    orders = 0.7 * np.arange(1, 80, 2)
+    step = [robots.Line(order, 350e-6 * 2.8 / np.pi / order, 0.1 * order + np.pi / 2) for order in orders]
+    session = robots.measure(
+        np.random.default_rng(2), robots.Scene(curves={"J3": step}), poses=260, fixed_every=30
+    )
+    campaign = read_campaign(robots.write_session(tmp_path / "robot", session))
+    (found,) = explain(
+        campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(0)
+    ).missing
+    assert found.effect.startswith("EBJ3:harmonics(2,3,")
+    assert 408e-6 - 3.0 * found.u < found.amplitude < 1.35 * 408e-6
+    assert found.peak < 0.7

@@ -52,7 +52,23 @@ def test_the_right_error_alone_is_named(virtual_campaigns, trial, explained, fam
         assert found.nearest is not None
         assert len(found.curve.at) > 10
     grown = problem_of(campaign, Model("grown", added=(found.effect,)))
-    assert explain(campaign, grown, "grown", rng=np.random.default_rng(1)).missing == ()
+    again = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
+    assert again.missing == again.not_followed == ()
+
+
+@pytest.mark.slow
+def test_what_a_shape_that_was_added_does_not_follow_is_no_effect_of_another_error(virtual_campaigns):
+    """A step within 0.2 mm is no part of a free shape: `ECX:free(6)` of 3.8 µm was told beside it, and the warm-up that
+    is there was not."""
+    step = simulator().Effect(
+        "EXX:curve", peak_um=8.0, curve=lambda q, travel, now: np.tanh(5.0 * (q - 12.0))
+    )
+    more = simulator().Effect("EZC1:const@warmup", peak_um=6.0)
+    campaign, _ = virtual_campaigns.virtual(400, [step, more], days=1, runs_per_day=4)
+    grown = problem_of(campaign, Model("grown", added=("EXX:free(6,36,37,44,45,46)",)))
+    again = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
+    assert [found.effect for found in again.missing] == ["EZC1:const@warmup"]
+    assert again.not_followed == ("EXX",)
 
 
 def test_the_way_since_a_reversal_is_that_of_the_simulator(virtual_campaigns, trial):

@@ -213,9 +213,15 @@ def test_a_drive_that_is_wound_up_follows_once_its_width_is_used_up(make: Callab
     expected = [0.0, 1.0, 1.0, 0.5, 0.0, -1.0, -1.0, -0.5, 0.5]
     np.testing.assert_allclose(columns("EXX:windup20mm", context).ravel(), expected, atol=1e-12)
     with pytest.raises(
-        EffectError, match=re.escape("a width in mm belongs to a linear axis; for B write reversal")
+        EffectError, match=re.escape("a width in mm belongs to a linear axis; for B write windup20deg")
     ):
         parse_effect("EBB:windup20mm", CHAIN)
+    with pytest.raises(EffectError, match=re.escape("a width in deg belongs to a rotary axis; for X write")):
+        parse_effect("EXX:windup20deg", CHAIN)
+    turned = make({"B": np.deg2rad(positions)}, run=[1] * 8 + [2])
+    np.testing.assert_allclose(
+        np.abs(columns("EBB:windup20deg", turned)).ravel(), np.abs(expected), atol=1e-12
+    )
     with pytest.raises(EffectError, match=re.escape("the width of windup0mm must be above 0 mm")):
         columns("EXX:windup0mm", context)
 

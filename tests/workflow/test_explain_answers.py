@@ -88,3 +88,10 @@ def test_nobody_is_asked_to_record_what_follows_from_the_times(driver: str, with
     assert recorded.endswith(
         "ambient_degC changes, and record it" if within_runs else "ambient_degC, and record it"
     )
+
+
+def test_an_error_that_the_shape_in_the_model_does_not_follow_is_said_last() -> None:
+    finding = MachineFinding(False, (), 0, (), (), 8, (), False, (), not_followed=("EXX", "EYY"))
+    first, last = machine_sentences(finding).split(". ")
+    assert first == "The model does not explain the measurements, but no other error explains more"
+    assert last.startswith("What is left of EXX and EYY is not followed by the shape that was added")

@@ -23,6 +23,7 @@ from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
+from monitor.discovery.machine.shapes.shapes_of_model import not_followed
 from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
@@ -35,6 +36,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
 from monitor.discovery.machine.suspects.steps import Step, find_steps
@@ -62,7 +64,9 @@ class Explanation:
     ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
     leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
     less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
-    under the model as given.
+    under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
+    ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
+    there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
     """
 
     comparison: ChainComparison
@@ -80,6 +84,9 @@ class Explanation:
     scatter: tuple[Scatter, ...] = ()
     apart: tuple[RunApart, ...] = ()
     together: Verdict | None = None
+    not_followed: tuple[str, ...] = ()
+    recurring: tuple[BadPoint, ...] = ()
+    unchecked: bool = False
 
 
 def variants_of_campaign(
@@ -134,16 +141,21 @@ def explain(
         steady = steady.with_correlation(correlation_under(latest.under))
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
+    unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
+    as_given = compare(first, campaign.name, model)
+    points = sorted(suspects.bad.values(), key=lambda point: point.row)
+    recur = recurring(latest.under, points)
+    single = [point for point in points if point.row not in recur]
+    unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
-    if not missing:
+    if not (missing or unfollowed or recur or unchecked):
         verdict = compare(latest.under, campaign.name, model).verdict
-    as_given = compare(first, campaign.name, model)
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
         together=as_given.verdict,
         missing=missing,
-        suspect=tuple(sorted(suspects.bad.values(), key=lambda point: point.row)),
+        suspect=tuple(single),
         moves=tuple(suspects.moves.values()),
         steps=tuple(_steps(campaign, latest, rng)),
         blind=_blind(latest.scene, missing),
@@ -154,6 +166,9 @@ def explain(
         taken_for_machine=taken_for_machine(latest.scene),
         scatter=tuple(suspects.scatter.values()),
         apart=_apart(latest, variants, varies=bool(suspects.varying)),
+        not_followed=unfollowed,
+        recurring=tuple(point for point in points if point.row in recur),
+        unchecked=unchecked,
     )
 
 

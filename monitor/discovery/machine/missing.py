@@ -29,6 +29,7 @@ from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
+from monitor.effects.shapes import Harmonics
 from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe
 from monitor.records import Array
@@ -273,13 +274,15 @@ def _missing(
     coefficients, covariance = sizes
     candidate, effect = refined.candidate, refined.candidate.effect
     amplitude, u = _amplitude(effect, coefficients, covariance)
-    unit = None
-    if isinstance(effect, ChainEffect) and isinstance(effect.driver, LinkWeights):
-        unit = effect.term.unit
-        amplitude, u = largest_deviation(
-            effect.basis(scene.fit.problem.context).columns, coefficients, covariance
-        )
-    raw, curve = candidate.raw, None
+    unit, raw, curve = None, candidate.raw, None
+    if isinstance(effect, ChainEffect):
+        by_weights, by_lines = isinstance(effect.driver, LinkWeights), isinstance(effect.shape, Harmonics)
+        if by_weights or by_lines:
+            # Over a part of a turn low orders nearly cancel: what the joint does there is their sum.
+            columns = effect.basis(scene.fit.problem.context).columns
+            amplitude, u = largest_deviation(columns, coefficients, covariance)
+        unit = effect.term.unit if by_weights else None
+        raw = raw - raw.mean(axis=0) if by_lines else raw
     if candidate.variant.nearest is not None and not is_curve(candidate):
         curve = curve_of(scene.fit.problem.context, effect, coefficients, covariance)
     if curve is not None:

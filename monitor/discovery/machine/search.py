@@ -14,6 +14,11 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVar
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.several_instead import several_instead
+from monitor.discovery.machine.shapes.shapes_of_model import (
+    beside_free_shapes,
+    may_be_mimics,
+    under_the_model,
+)
 from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
@@ -25,8 +30,18 @@ MOST_GEARS, MOST_DRIFTS, MOST_MOVES = 12, 60, 4
 
 
 def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
+    """Scan a scene, and where a free shape of the model does not follow its error, once more beside all that this error
+    could do; return the scene with the candidates that were added."""
+    searched, result = _searched(scene, drivers, rate)
+    if may_be_mimics(searched, result.candidates, rate):
+        beside = beside_free_shapes(scene)
+        searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
+    return searched, by_error_taken_away(searched, standing_out(searched, result))
+
+
+def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
     """Scan a scene; where gears, drifts of one run or moves of the station stand out of what it leaves, once more with
-    them; at last with tables instead of several shapes. Return the scene with the candidates that were added."""
+    them; at last with tables instead of several shapes."""
 
     def scanned(
         scene: ChainScene, begin: Sequence[ChainCandidate], shared: Sequence[ChainCandidate] = ()
@@ -52,12 +67,11 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
                 scene, result = with_tables(scene, result, scanned)
             result = with_base_instead(scene, result, rate)
             plain, catalogued = scene, standing_out(scene, result)
-            scene, result = several_instead(
+            return several_instead(
                 plain,
                 with_unknown_shapes(plain, catalogued),
                 partial(_in_their_own_shapes, plain, catalogued, drivers, rate),
             )
-            return scene, by_error_taken_away(scene, standing_out(scene, result))
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
 
 

@@ -54,7 +54,7 @@ def parse_shape(text: str) -> Shape:
             f"there is no shape '{text}'; {hint}"
             "there are const, poly1 to poly9, harmonic1 to harmonic9999, "
             "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), reversal, "
-            "windup40mm (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
+            "windup40mm or windup40deg (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
             f"table(-100,0,100) for your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

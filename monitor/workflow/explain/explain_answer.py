@@ -262,8 +262,11 @@ class MachineExplanation:
     leave nothing to see, ``not_recorded`` those that lack a column, and why;
     ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
     at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
-    but could not be fitted, and were skipped. ``remaining`` is what is left with all that is missing in the model, None
-    where nothing is. The residual is pictured where something is missing. ``taken_for_machine`` are errors of
+    but could not be fitted, and were skipped. ``not_followed`` are errors that the model has in an unknown shape which
+    does not follow them. ``recurring_data`` were left out too, but most runs left them alike at nearly the same place:
+    the model lacks something there. ``remaining`` is what is left with all that is missing in the model, None where
+    nothing is.
+    The residual is pictured where something is missing. ``taken_for_machine`` are errors of
     instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
     other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
     instrument contradicts all others with all of this in the model too: that comes first.
@@ -283,6 +286,8 @@ class MachineExplanation:
     residual_map: ResidualMap | None
     residual_against: ResidualAgainst | None
     not_fitted: tuple[str, ...] = ()
+    not_followed: tuple[str, ...] = ()
+    recurring_data: tuple[BadProbing, ...] = ()
     limits_reached: tuple[str, ...] = ()
     remaining: Remaining | None = None
     taken_for_machine: tuple[InstrumentAlias, ...] = ()

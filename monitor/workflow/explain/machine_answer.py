@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistake
+from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.discovery.machine.suspects.steps import Step
 from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
 from monitor.machine import Chain
@@ -261,15 +262,13 @@ def _undecided(explanation: Explanation) -> tuple[str, ...]:
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
+    is_explained = explanation.comparison.verdict is not Verdict.SOMETHING_IS_MISSING
     missing = tuple(
         _machine_missing(effect, problem.context.chain, is_planned=has_plan_of_pairs(problem))
         for effect in explanation.missing
     )
     comparison = machine_comparison(explanation.comparison, problem)
-    suspect_data = tuple(
-        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
-        for point in explanation.suspect
-    )
+    suspect_data, recurring_data = _probings(explanation.suspect), _probings(explanation.recurring)
     changes = _changes(explanation)
     scattering = tuple(
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
@@ -296,7 +295,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         undecided=_undecided(explanation),
         answer=machine_sentences(
             MachineFinding(
-                explained=comparison.verdict is not Verdict.SOMETHING_IS_MISSING,
+                explained=is_explained,
                 missing=[_as_said(effect) for effect in missing],
                 bad_points=len(suspect_data),
                 moves=tuple(_move(change, problem.target_word) for change in changes),
@@ -311,17 +310,32 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 hopeless=is_hopeless(explanation),
                 mistakes=mistakes_found(explanation.mistakes),
                 unseen=explanation.together is Verdict.EXPLAINED,
+                not_followed=explanation.not_followed,
+                recurring=len(recurring_data),
+                unchecked=explanation.unchecked,
+                contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
             )
         ),
         residual_map=residual_map,
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
+        not_followed=explanation.not_followed,
+        recurring_data=recurring_data,
         limits_reached=tuple(explanation.limits),
         remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
         scattering=scattering,
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
+    )
+
+
+def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
+    """Readings that were left out."""
+    um = MICROMETRE.to_display
+    return tuple(
+        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
+        for point in points
     )
 
 

@@ -21,7 +21,6 @@ from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.suspects.wander import base_instead
 from monitor.discovery.search.candidate import side_by_side
 from monitor.discovery.search.evidence import pool_of
-from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import ScanResult, except_for, findings_without_rivals
 from monitor.discovery.search.steps import step_by_step
@@ -31,9 +30,6 @@ from monitor.records import Array
 MOST_EFFECTS = 12
 # So many of the best candidates of a step are tried.
 MOST_TRIED = 5
-# An effect whose displacement is this many times as large as what it takes of the residual is nearly cancelled by
-# others: no finding. A load that gives way moves poses at full reach some ten times as much as the usual one.
-LARGEST_RATIO = 40.0
 
 
 def search_beside_curves(
@@ -116,11 +112,7 @@ def _stands(pursuit: Pursuit, candidate: ChainCandidate, new: Array, level: floa
         return False
     if pursuit.held_out(new) >= pursuit.held_out():
         return False
-    columns = without(pursuit.basis, candidate.columns[pursuit.order])
-    sizes = np.linalg.pinv(columns, rcond=1e-6) @ pursuit.residual
-    peak = float(np.linalg.norm(candidate.raw @ sizes, axis=1).max())
-    removed = pursuit.fit.sigma**2 * float(np.sum((new.T @ pursuit.residual) ** 2))
-    return not nearly_cancelled(peak, removed, pursuit.fit.readings, LARGEST_RATIO)
+    return not pursuit.cancels(candidate, new)
 
 
 def _contains(whole: ChainCandidate, part: ChainCandidate) -> bool:

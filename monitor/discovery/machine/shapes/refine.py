@@ -22,6 +22,7 @@ from monitor.effects import ChainEffect, Context, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import SettlingDriver, parse_driver
 from monitor.effects.shapes import Cyclic, Harmonic, WindUp
+from monitor.effects.shapes.windup import unit_of_width
 from monitor.records import Array
 
 # Neighbours on the grid of time constants differ by a factor of two; the best value lies between the neighbours of the
@@ -96,7 +97,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
     if isinstance(effect.shape, WindUp):
         return _Range(
             "width",
-            "mm",
+            effect.shape.width_unit,
             effect.shape.width,
             float(np.log(GRID_FACTOR)),
             1e-3,
@@ -122,7 +123,8 @@ def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
 
 
 def _with_width(effect: ChainEffect, width: float) -> ChainEffect:
-    return replace(effect, shape=WindUp(width), shape_text=f"windup{width:.4g}mm")
+    shape = WindUp(width, unit_of_width(effect.joint))
+    return replace(effect, shape=shape, shape_text=shape.text)
 
 
 def _with_pitch(effect: ChainEffect, pitch: float) -> ChainEffect:

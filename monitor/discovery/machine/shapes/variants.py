@@ -25,6 +25,7 @@ from monitor.effects.drivers import (
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
 from monitor.effects.shapes.poly import Poly
+from monitor.effects.shapes.windup import unit_of_width
 from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
@@ -45,6 +46,7 @@ MOST_PERIODS = 750.0
 
 # Widths over which a reversal builds up, from what a long screw gives way to that of covers that drag.
 WIDTHS_MM = tuple(10.0 * 2.0**step for step in range(6))
+WIDTHS_DEG = tuple(5.0 * 2.0**step for step in range(6))
 
 # Positions that lie together within this are one; a cycle needs its two coefficients, the base's zero and gain, and
 # some to spare.
@@ -202,17 +204,19 @@ def pitches_over(travel: float, longest: float) -> list[float]:
 
 
 def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
-    """Positioning errors of every linear axis that build up after a reversal, with every width within its travel."""
+    """Positioning errors of every axis that build up after a reversal, with every width within its travel."""
     variants: list[ChainVariant] = []
     for index, joint in enumerate(context.chain.joints):
-        if joint.kind == "linear":
-            term = f"E{COMPONENTS[joint.main]}{joint.name}"
-            travel = float(np.ptp(context.positions[:, index]))
-            texts = [f"{term}:windup{width:g}mm" for width in WIDTHS_MM if width < travel]
-            variants += [
-                Variant(f"{term}:windup", parse_effect(text, context.chain), len(texts), ODDS_OF_A_WIDTH)
-                for text in texts
-            ]
+        term = f"E{COMPONENTS[joint.main + 3 * joint.turns]}{joint.name}"
+        travel = float(np.ptp(context.positions[:, index]))
+        unit, grid = unit_of_width(joint), WIDTHS_MM
+        if joint.turns:
+            travel, grid = float(np.rad2deg(travel)), WIDTHS_DEG
+        texts = [f"{term}:windup{width:g}{unit}" for width in grid if width < travel]
+        variants += [
+            Variant(f"{term}:windup", parse_effect(text, context.chain), len(texts), ODDS_OF_A_WIDTH)
+            for text in texts
+        ]
     return variants
 
 

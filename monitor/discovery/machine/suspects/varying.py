@@ -15,6 +15,7 @@ from monitor.discovery.machine.shapes.refine import refine_all
 from monitor.discovery.machine.shapes.variants import NEVER_FOUND, each_run, with_drivers
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.evidence import Evidence
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.scan import scan
 
 # With fewer runs, another size in every run is no pattern.
@@ -47,6 +48,19 @@ def _weigh(scene: ChainScene, variants: Sequence[ChainVariant]) -> list[Evidence
     return sorted(weigh_in_each_run(candidates, scene), key=lambda evidence: -evidence.score)
 
 
+def _is_cancelled(scene: ChainScene, evidence: Evidence[ChainCandidate]) -> bool:
+    """Whether an effect is many times as large in a run as what it takes of the residual: the run's own unknowns nearly
+    cancel it, as those of a plate cancel a cycle of which its spacing is a multiple."""
+    fit, candidate = scene.fit, evidence.candidate
+    columns = candidate.columns.reshape(*fit.white.shape, -1)
+    raw, run, peak = candidate.raw, fit.problem.context.run, 0.0
+    for number, of_run in enumerate(fit.problem.runs):
+        sizes = np.linalg.lstsq(columns[number], fit.white[number], rcond=None)[0]
+        moved = np.linalg.norm(raw[run == of_run] @ sizes, axis=1)
+        peak = max(peak, float(moved.max(initial=0.0)))
+    return nearly_cancelled(peak, fit.sigma**2 * evidence.explained, fit.readings)
+
+
 def most_varying(
     fit: Fit, variants: Sequence[ChainVariant], scene: ChainScene | None = None
 ) -> Varying | None:
@@ -67,9 +81,10 @@ def most_varying(
     ]
     scene = scene_of(fit, bare) if scene is None else scene
     weighed = _weigh(scene, bare)
-    if not weighed or weighed[0].p_value * len(weighed) > FALSE_ALARM:
+    surely = (evidence for evidence in weighed if evidence.p_value * len(weighed) <= FALSE_ALARM)
+    best = next((evidence for evidence in surely if not _is_cancelled(scene, evidence)), None)
+    if best is None:
         return None
-    best = weighed[0]
     remainder = float(scene.residual @ scene.residual) - best.explained
     freedom = max(scene.degrees_of_freedom - best.rank, 1)
     gain = best.explained * freedom / remainder - best.rank * np.log(scene.degrees_of_freedom)
