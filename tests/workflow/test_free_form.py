@@ -70,7 +70,8 @@ def test_the_map_knows_the_known_length(db):
     place = mapped.errors.names.index("EXX(110)")
     assert mapped.errors.estimate[place] == pytest.approx(campaign.artefact.self_calibration.length.value)
     assert mapped.errors.covariance[place, place] ** 0.5 == pytest.approx(0.5e-3, rel=1e-3)
-    assert document.left_out == ()
+    # What the map leaves out are places and turns of axes that these readings do not show; the length is none of them.
+    assert {each.parameter[2] for each in document.left_out} == {"0"}
     assert not any(name.startswith("shape") for name in mapped.errors.names)
 
 

@@ -1,7 +1,8 @@
 """What every parameter refers to, on every topology of the examples: in SQL, in exports, in JSON, in the DCC's names.
 
 The rule is written here once more from the topology string alone: a location error refers to the axis before it in its
-branch, counted from the bed; an error motion to its own axis.
+branch, counted from the bed; an error motion to its own axis. Where only rotary axes carry the workpiece, the frame of
+the machine is fixed to the first of them, and the tool's first axis refers to that.
 """
 
 from __future__ import annotations
@@ -41,8 +42,11 @@ def expected(symbol: str, topology: str) -> str | None:
     motion = re.fullmatch(r"E[XYZABC]([XYZABC]1?)([:(].*)?", symbol)
     if location is None:
         return None if motion is None else f"axis {motion[1]} itself"
-    (branch,) = (axes for axes in branches(topology) if location[1] in axes)
+    of_work, of_tool = branches(topology)
+    branch = of_work if location[1] in of_work else of_tool
     place = branch.index(location[1])
+    if place == 0 and branch is not of_work and of_work and not set("XYZ").intersection(of_work):
+        return f"axis {of_work[0]}"
     return "machine" if place == 0 else f"axis {branch[place - 1]}"
 
 
