@@ -77,11 +77,11 @@ from monitor.workflow.run_statistics.answer import VectorTests
 from monitor.workflow.sight import EffectSight
 from monitor.workflow.simulation import SimulateAnswer
 from monitor.workflow.simulation import SimulateMachineAnswer
-from monitor.workflow.trend.answer import ControlCharts
 from monitor.workflow.trend.answer import ParameterTrend
 from monitor.workflow.trend.answer import RecordedEvent
 from monitor.workflow.trend.answer import TrendAnswer
 from monitor.workflow.trend.answer import VolumetricForecast
+from monitor.workflow.trend.charts_answer import ControlCharts
 from monitor.workflow.uncertainty.answer import FrameworkAnswer
 from monitor.workflow.uncertainty.answer import LackOfFitCause
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer

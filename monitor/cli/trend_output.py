@@ -20,9 +20,9 @@ from monitor.workflow.trend.answer import (
     ParameterTrend,
     StepAtEvent,
     TrendAnswer,
-    VectorState,
     VolumetricForecast,
 )
+from monitor.workflow.trend.charts_answer import VectorState
 
 #: From so many runs on it is said why there are no charts.
 FEWEST_RUNS = 10

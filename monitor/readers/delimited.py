@@ -103,36 +103,37 @@ def with_points(
     Where nothing says what a comma is, a file that has numbers with commas and numbers with points is refused: "1,234"
     may be one and a bit or a thousand.
     """
-    decimal = style.decimal
-    if decimal is None and style.separator == ",":
-        decimal = "."
-    if decimal is None:
-        comma = _first_of(rows, lines, _COMMA)
-        point = _first_of(rows, lines, _POINT)
-        grouped = _grouped(rows, lines)
-        if comma is not None and point is not None:
-            faults.add(
-                file, comma[0], None,
-                f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; "
-                + (
-                    "the numbers have thousands separators: export them without"
-                    if grouped is not None
-                    else "say in the mapping which is the decimal mark: decimal = \"comma\" or decimal = \"point\""
-                ),
-            )  # fmt: skip
-        elif grouped is not None and not _has_decimals(rows, "." if comma is None else ","):
-            faults.add(
-                file, grouped[0], None,
-                f"{quoted(grouped[1])} may have a decimal mark or a thousands separator, as others of its column are "
-                'whole; export it without, or say in the mapping which is the decimal mark: decimal = "comma" or '
-                'decimal = "point"',
-            )  # fmt: skip
-        decimal = "." if comma is None else ","
+    decimal = style.decimal or ("." if style.separator == "," else _decimal_mark(file, rows, lines, faults))
     if decimal == ".":
         return [list(row) for row in rows], decimal
     return [
         [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
     ], decimal
+
+
+def _decimal_mark(file: str, rows: Sequence[Sequence[str]], lines: Sequence[int], faults: Faults) -> str:
+    """Return the decimal mark by the numbers themselves, with a fault where they do not say it."""
+    comma = _first_of(rows, lines, _COMMA)
+    point = _first_of(rows, lines, _POINT)
+    grouped = _grouped(rows, lines)
+    if comma is not None and point is not None:
+        faults.add(
+            file, comma[0], None,
+            f"{quoted(comma[1])} has a comma and {quoted(point[1])} on line {point[0]} a point; "
+            + (
+                "the numbers have thousands separators: export them without"
+                if grouped is not None
+                else "say in the mapping which is the decimal mark: decimal = \"comma\" or decimal = \"point\""
+            ),
+        )  # fmt: skip
+    elif grouped is not None and not _has_decimals(rows, "." if comma is None else ","):
+        faults.add(
+            file, grouped[0], None,
+            f"{quoted(grouped[1])} may have a decimal mark or a thousands separator, as others of its column are "
+            'whole; export it without, or say in the mapping which is the decimal mark: decimal = "comma" or '
+            'decimal = "point"',
+        )  # fmt: skip
+    return "." if comma is None else ","
 
 
 def _grouped(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[int, str] | None:

@@ -267,12 +267,12 @@ def mistake_sentence(mistakes: Sequence[MistakeFound]) -> str:
         if np.isfinite(first.rms_as_recorded)
         else "as recorded the readings fit no machine of this file"
     )
-    left = f"{before}, residual {_length(first.rms_undone)} with that undone"
+    remainder = f"{before}, residual {_length(first.rms_undone)} with that undone"
     if first.enough:
-        return f"It looks as if {ways}: {left}."
+        return f"It looks as if {ways}: {remainder}."
     return (
         "No single mistake of those that are tried explains the readings; nearest comes what they would leave if "
-        f"{ways}: {left}, still far more than is stated."
+        f"{ways}: {remainder}, still far more than is stated."
     )
 
 

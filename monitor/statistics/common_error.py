@@ -43,17 +43,17 @@ def jumps(values: Array, t: Array, after: npt.NDArray[np.bool_], *, line: bool) 
     return Jumps(fitted[1], rest.T @ rest / dof * float(inverse[1] @ inverse[1]), dof)
 
 
-def p_of_common_error(found: Jumps, apart: Array, scale: Array) -> float:
+def p_of_common_error(steps: Jumps, apart: Array, scale: Array) -> float:
     """Return the probability of jumps as unlike one error as these where there is nothing else.
 
     ``apart`` (p, q) are what the quantities change by for one standard uncertainty of each error, ``scale`` (p,) by
     what they are compared: their stated uncertainties, which need not be right.
     """
-    sizes, parts = found.sizes / scale, apart / scale[:, np.newaxis]
-    covariance = found.covariance / np.outer(scale, scale)
+    sizes, parts = steps.sizes / scale, apart / scale[:, np.newaxis]
+    covariance = steps.covariance / np.outer(scale, scale)
     directions, lengths, _ = np.linalg.svd(parts, full_matrices=False)
     along = directions[:, lengths > NOTHING * lengths.max()]
-    p_error = _p_of_size(along.T @ sizes, along.T @ covariance @ along, along.T @ parts, found.dof)
+    p_error = _p_of_size(along.T @ sizes, along.T @ covariance @ along, along.T @ parts, steps.dof)
     beyond = np.eye(len(sizes)) - along @ along.T
     free = len(sizes) - along.shape[1]
     if free == 0:
@@ -62,7 +62,7 @@ def p_of_common_error(found: Jumps, apart: Array, scale: Array) -> float:
     u = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", beyond, covariance, beyond), np.finfo(np.float64).tiny))
     # Of one contrast the rows are one question.
     questions = 1 if free == 1 else len(beyond)
-    p_beyond = questions * 2.0 * float(scipy.special.stdtr(found.dof, -np.max(np.abs(beyond @ sizes) / u)))
+    p_beyond = questions * 2.0 * float(scipy.special.stdtr(steps.dof, -np.max(np.abs(beyond @ sizes) / u)))
     return min(1.0, 2.0 * min(p_error, p_beyond))
 
 

@@ -11,6 +11,7 @@ import pytest
 from monitor.cli.dependence_output import dependences
 from monitor.reporting.confounding import charted
 from monitor.reporting.lacks import Undecided
+from monitor.sources import CommonQuantity
 from monitor.statistics.groups import eras, interleaved_columns, most_common, share_within
 from monitor.store import Database, MachineEvent, MachineHistory
 from monitor.web.rendering import _environment
@@ -149,6 +150,29 @@ def test_charts_are_of_one_instrument_and_name_it():
     assert np.ptp(charts.points.values[charts.inside, 0]) < 2.0
     plain = Charts(history("L" * 20, [0.0] * 20, [8.0] * 20, [20.0] * 20), timedelta(), [], None)
     assert plain.period().measured_by is None
+
+
+@pytest.mark.parametrize(
+    ("part", "campaigns_of_each", "points"),
+    [(0.02, 6, 48), (0.5, 6, 12), (None, 6, 12), (0.5, 2, 48)],
+)
+def test_a_new_certificate_begins_charts_anew_where_it_shows_and_leaves_points_enough(
+    part: float | None, campaigns_of_each: int, points: int
+) -> None:
+    """Yearly calibrations left four points and no chart: of 0.3 µm/m scatter a part of 0.02 shows nothing."""
+    machine = history("L" * 24, [0.0] * 24, [8.0] * 24, [20.0] * 24)
+    numbers = np.array([int(name[1:]) // campaigns_of_each for name in machine.campaign.tolist()])
+    certificates = {f"c{i}": {"laser": f"L-{i // campaigns_of_each}"} for i in range(24)}
+    common_parts = {
+        CommonQuantity("laser", f"L-{number}", "scale", 1e-6): np.where(numbers == number, part, 0.0)[:, None]
+        for number in range(24 // campaigns_of_each)
+        if part is not None
+    }
+    calibrations = replace(machine.calibrations, certificates=certificates)
+    machine = replace(machine, calibrations=calibrations, common_parts=common_parts)
+    charts = Charts(machine, timedelta(), [], None)
+    assert len(charts.points.t) == points
+    assert (charts.period().measured_by is None) == (points == 48)
 
 
 def test_groups_by_hand():

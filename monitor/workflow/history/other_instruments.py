@@ -226,12 +226,12 @@ def _jointly(
     together = {
         name: parameter for name, parameter in touched.items() if bool(_steady(parameter)[runs].all())
     }
-    found = _jumps(measuring.history, list(together.values()), runs, piece.after)
-    if found is None:
+    sizes = _jumps(measuring.history, list(together.values()), runs, piece.after)
+    if sizes is None:
         return None
     apart = np.array([measuring.apart(name, last, first) for name in together])
     scale = np.array([_scatter_stated(parameter.series) for parameter in together.values()])
-    p_value = p_of_common_error(found, apart, scale)
+    p_value = p_of_common_error(sizes, apart, scale)
     return _Jointly(p_value >= LEVEL, tuple(together), p_value)
 
 
@@ -239,8 +239,8 @@ def _piece(
     measuring: _Measuring, steps: Sequence[_Step], last: int, first: int, events: Sequence[float]
 ) -> _Piece:
     t = measuring.history.seconds / SECONDS_PER_DAY
-    here = {step.change for step in steps}
-    changes = (change for step in steps for change in step.past.search.changes if change not in here)
+    of_exchange = {step.change for step in steps}
+    changes = (change for step in steps for change in step.past.search.changes if change not in of_exchange)
     bounds = [*events, *(change.at for change in changes)]
     begins = max((at for at in bounds if at <= t[last]), default=-np.inf)
     ends = min((at for at in bounds if at > t[first]), default=np.inf)

@@ -9,7 +9,7 @@ amount, the charts are of one alone, that which measured last of those with poin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 
 import numpy as np
@@ -31,7 +31,7 @@ from monitor.workflow.history.calendar import SECONDS_PER_DAY, date
 from monitor.workflow.history.changes import DAYS_FOR_MEANS
 from monitor.workflow.history.series import day_numbers, steady_runs
 from monitor.workflow.history.what_measured import what_measured
-from monitor.workflow.trend.answer import (
+from monitor.workflow.trend.charts_answer import (
     CusumState,
     EwmaState,
     ParameterCharts,
@@ -49,6 +49,10 @@ VECTOR_RUN_LENGTH, VECTOR_TRIALS = 200.0, 1000
 EWMA_WEIGHT = 0.2
 #: Without a named reference period: the first points since the last event, a third of all, at least 8 and at most 30.
 SHARE, FEWEST, MOST = 3, 8, 30
+#: Another calibration shows in a chart from this part of the scatter of its points on: two are apart by 1.4 of it.
+SHOWS = 0.25
+#: Median of what two values of a normal distribution of standard deviation 1 differ by.
+MEDIAN_APART = 0.954
 #: A parameter takes part in the charts of the vector where it has more than this share of the points.
 COMPLETE = 0.9
 
@@ -95,15 +99,42 @@ def since_last_event(history: MachineHistory, events: Sequence[float]) -> Machin
 
 def by_one_instrument(history: MachineHistory, *, by_days: bool) -> tuple[MachineHistory, str | None]:
     """The runs by the instruments, with their certificates, that measured last of those with more points than the
-    shortest reference period; of the last ones where none has. With what they are called, None where all are by one."""
-    names, by = what_measured(history)
-    if len(names) == 1:
-        return history, None
+    shortest reference period; whatever the certificates where each has too few, and of the last ones where all have.
+    With what they are called, None where all are by one."""
     steady = steady_runs(history)
     labels = day_numbers(history) if by_days else np.arange(len(history.run))
-    enough = [group for group in range(len(names)) if len(np.unique(labels[steady & (by == group)])) > FEWEST]
+    scatter = _scatter(points_of(history, timedelta(0), by_days=by_days).values)
+    for certified in (_that_show(history, scatter), {}):
+        calibrations = replace(history.calibrations, certificates=certified)
+        names, by = what_measured(replace(history, calibrations=calibrations))
+        if len(names) == 1:
+            return history, None
+        groups = range(len(names))
+        enough = [group for group in groups if len(np.unique(labels[steady & (by == group)])) > FEWEST]
+        if enough:
+            break
     charted = by[np.isin(by, enough)][-1] if enough else by[-1]
     return history.part(by == charted), names[charted]
+
+
+def _that_show(history: MachineHistory, scatter: Array) -> dict[str, dict[str, str]]:
+    """The certificates of each campaign, without those of instruments of which no parameter has so much of its
+    ``scatter`` (p,) that another calibration shows in a chart; where nothing is stored of that, it may show."""
+    hidden: dict[str, bool] = {}
+    for quantity, part in history.common_parts.items():
+        is_hidden = not bool((np.abs(part) > SHOWS * scatter).any())
+        hidden[quantity.of] = hidden.get(quantity.of, True) and is_hidden
+    return {
+        campaign: {of: certificate for of, certificate in certificates.items() if not hidden.get(of, False)}
+        for campaign, certificates in history.calibrations.certificates.items()
+    }
+
+
+def _scatter(points: Array) -> Array:
+    """How points (m, p) scatter, (p,), by what neighbours differ by: a step between two of them counts little."""
+    columns = (column[np.isfinite(column)] for column in points.T)
+    apart = (np.abs(np.diff(column)) for column in columns)
+    return np.array([float(np.median(each)) / MEDIAN_APART if len(each) else 0.0 for each in apart])
 
 
 def reference_points(points: Points, reference: tuple[float, float] | None) -> npt.NDArray[np.bool_]:

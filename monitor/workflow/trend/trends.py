@@ -41,13 +41,13 @@ from monitor.workflow.history.past import ParameterPast, machine_past, splitting
 from monitor.workflow.history.refuted import ModelRefuted, model_refuted
 from monitor.workflow.history.runs import same_hours, selected_campaigns
 from monitor.workflow.trend.answer import (
-    ControlCharts,
     ParameterTrend,
     RecordedEvent,
     StepAtEvent,
     TrendAnswer,
 )
 from monitor.workflow.trend.causes import METHOD, conditions, cycles
+from monitor.workflow.trend.charts_answer import ControlCharts
 from monitor.workflow.trend.control import Charts
 from monitor.workflow.trend.discovery_rates import with_discovery_rates
 from monitor.workflow.trend.forecast import backtested, limit_forecast

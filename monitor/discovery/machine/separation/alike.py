@@ -45,8 +45,8 @@ def moves_alike(
     assert pose.by_error is not None
     wanted = effect.basis(anywhere).displacement(pose.by_error).reshape(3 * POSES, -1) @ coefficients
     columns = rival.basis(anywhere).displacement(pose.by_error).reshape(3 * POSES, -1)
-    left = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    return float(np.linalg.norm(left)) <= SAME * float(np.linalg.norm(wanted))
+    remainder = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    return float(np.linalg.norm(remainder)) <= SAME * float(np.linalg.norm(wanted))
 
 
 def _anywhere(context: Context, strokes: Mapping[str, tuple[float, float]]) -> Context:

@@ -128,18 +128,18 @@ def separating_poses(
     the method is not one of touching balls: of those only shifts that are one at every pose are ``together``. Of
     effects with the same driver the poses count at its mean value.
     """
-    problem, context = fit.problem, fit.problem.context
+    problem, context, strokes = fit.problem, fit.problem.context, strokes or {}
     alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
     if not isinstance(problem, TouchProblem):
-        same = [rival for rival in alike if moves_alike(context, effect, coefficients, rival, strokes or {})]
-        return replace(NO_POSES, together=tuple((effect.text, rival.text) for rival in same))
+        same = (rival.text for rival in alike if moves_alike(context, effect, coefficients, rival, strokes))
+        return replace(NO_POSES, together=tuple((effect.text, name) for name in same))
     if not alike:
         return NO_POSES
     group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
     turned = any(member.joint.kind == "spindle" for member in group)
-    grid = _grid(context.chain, context.positions, strokes or {}, EIGHTHS if turned else QUARTERS)
+    grid = _grid(context.chain, context.positions, strokes, EIGHTHS if turned else QUARTERS)
     tip = problem.own_of(fit.solution.local)[0, -3:]
-    touches = _reachable_touches(problem, grid, tip, strokes or {})
+    touches = _reachable_touches(problem, grid, tip, strokes)
     if touches is None:
         return NO_POSES
     new = touches.context(context)
@@ -148,7 +148,7 @@ def separating_poses(
     pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
     selection = select_poses(pairs, len(problem.runs))
     together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
-    setups = _second_setups(fit, group, present, coefficients, selection.alike, strokes or {})
+    setups = _second_setups(fit, group, present, coefficients, selection.alike, strokes)
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
     numbers = np.unique(new.run)
     poses = tuple(

@@ -29,12 +29,12 @@ def _fellows(fit: Fit, row: int) -> npt.NDArray[np.int64]:
     at about the same place of its run."""
     context = fit.problem.context
     near = NEAR_PART * np.ptp(context.positions, axis=0) + 1e-9
-    there = np.all(np.abs(context.positions - context.positions[row]) <= near, axis=1)
-    there &= (context.target == context.target[row]) & (context.run != context.run[row])
-    rows = np.flatnonzero(there)
+    alike = np.all(np.abs(context.positions - context.positions[row]) <= near, axis=1)
+    alike &= (context.target == context.target[row]) & (context.run != context.run[row])
+    rows = np.flatnonzero(alike)
     runs, first = np.unique(context.run, return_index=True)
-    place = np.arange(len(context)) - first[np.searchsorted(runs, context.run)]
-    rows = rows[np.argsort(np.abs(place[rows] - place[row]), kind="stable")]
+    in_run = np.arange(len(context)) - first[np.searchsorted(runs, context.run)]
+    rows = rows[np.argsort(np.abs(in_run[rows] - in_run[row]), kind="stable")]
     return rows[np.unique(context.run[rows], return_index=True)[1]]
 
 
