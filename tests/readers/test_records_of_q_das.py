@@ -148,3 +148,17 @@ def test_a_point_whose_every_row_is_marked_invalid_is_said(two_records: Path) ->
         CampaignError, match=r"marks every row invalid: y on line 221 \(attribute K0002 = 255 of H1\)"
     ):
         _mapped(two_records, 'record = 2\nwhere = { target = "H1" }')
+
+
+def test_the_last_value_may_have_fewer_fields_where_further_lines_follow(two_records: Path) -> None:
+    path = two_records / "plate.dfq"
+    *head, first, second = path.read_text(encoding="cp1252").splitlines()
+    *others, last = first.split("\x0f")
+    short = "\x0f".join([*others, last.split("\x14")[0]])
+    path.write_text("\n".join([*head, short, second]) + "\n", encoding="cp1252")
+    assert np.count_nonzero(_rows(_mapped(two_records, "record = 1"))) == 24
+    path.write_text("\n".join([*head, second, short]) + "\n", encoding="cp1252")
+    with pytest.raises(
+        CampaignError, match=r"line 221: the last value of the line has 1 fields where the others"
+    ):
+        read_campaign(two_records)

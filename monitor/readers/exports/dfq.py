@@ -243,7 +243,9 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
 
 
 def _whole_line(part: _Part, named: set[int], name: str, faults: Faults) -> None:
-    """Refuse lines of values that end before the last characteristic, or within the fields of the last value."""
+    """Refuse lines of values that end before the last characteristic, and the last line where it ends within the fields
+    of its last value: no other line can be cut there."""
+    end = max(part.lines, default=0)
     for line, fields in part.lines.items():
         if len(fields) < max(named, default=0):
             faults.add(
@@ -252,7 +254,7 @@ def _whole_line(part: _Part, named: set[int], name: str, faults: Faults) -> None
                 "here: export it again",
             )  # fmt: skip
             return
-        if len(fields) > 1 and fields[-1] < min(fields[:-1]):
+        if line == end and len(fields) > 1 and fields[-1] < min(fields[:-1]):
             faults.add(
                 name, line, None,
                 f"the last value of the line has {fields[-1]} fields where the others have {min(fields[:-1])}; the "
