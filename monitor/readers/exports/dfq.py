@@ -133,11 +133,11 @@ def _dated(part: _Part) -> tuple[str, ...]:
     is_below = any(last == part.records(number) for number, (_, last) in ends.items())
     unclear: list[int] = []
     for number, dates in sorted(part.dates.items()):
-        above = [place for place, _, _ in dates]
+        above = [values for values, _, _ in dates]
         if len(set(above)) == part.records(number) == len(dates):
             records = list(range(len(dates)))
         elif is_above != is_below:
-            records = [place - is_below for place in above]
+            records = [values - is_below for values in above]
         else:
             unclear.append(dates[0][2])
             continue

@@ -255,8 +255,8 @@ def _is_result(word: str) -> bool:
 
 def _result(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[str, int] | None:
     """Return the first word that begins a row and may mean a result over the others, and its line."""
-    words = zip(map(_first, rows), lines, strict=True)
-    return next(((word, line) for word, line in words if _is_result(word)), None)
+    firsts = zip(map(_first, rows), lines, strict=True)
+    return next(((word, line) for word, line in firsts if _is_result(word)), None)
 
 
 def _begin_with_numbers(rows: Sequence[Sequence[str]]) -> bool:
