@@ -148,6 +148,33 @@ def test_a_plan_names_the_measurement_that_would_see_what_has_no_number(tmp_path
     assert all(parameter.test.u[name] == parameter.u for name, parameter in unseen.items())
 
 
+def test_a_planned_test_says_where_the_axes_stand_at_each_pose(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The simulator of the tests, another program, moves a machine without errors there: a bar keeps its length, and
+    an R-test's sphere its place."""
+    answer = _plan(tmp_path, strokes=True, poses=2)
+    chain = shop.machine(pitch=0.0, truth=dict.fromkeys(shop.TRUTH, 0.0))
+    for test in (*answer.tests, *answer.proposed):
+        assert test.axes_by_pose is not None
+        assert len(test.axes_by_pose) == test.poses
+        for column, ends in test.axes.items():
+            readings = [pose[column] for pose in test.axes_by_pose]
+            assert (min(readings), max(readings)) == pytest.approx(ends, abs=1e-3)
+        if test.work_point_mm is not None:
+            poses = [
+                {key.split("_")[0].upper(): at for key, at in pose.items()} for pose in test.axes_by_pose
+            ]
+            apart = [float(np.linalg.norm(shop.seen(chain, pose) - test.work_point_mm)) for pose in poses]
+            length = 0.0 if test.reading == "vector" else np.mean(apart)
+            assert apart == pytest.approx([length] * test.poses, abs=2e-3)
+            assert (length > 0.0) == (test.reading == "distance")
+    assert {"vector", "distance"} <= {test.reading for test in answer.tests}
+    assert all(parameter.test.axes_by_pose is None for parameter in answer.unseen)
+    tables(answer)
+    assert "--json has every pose of these tests (axes_by_pose)" in capsys.readouterr().out
+
+
 def test_an_axis_of_unknown_stroke_that_stood_still_is_named(tmp_path: Path) -> None:
     answer = _plan(tmp_path)
     assert answer.standing == ("Z",)

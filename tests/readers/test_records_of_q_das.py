@@ -11,6 +11,9 @@ import pytest
 
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
+from monitor.readers.export import Export, ExportFile
+from monitor.readers.exports import dfq
+from monitor.readers.faults import Faults
 from monitor.records import Campaign
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "files-of-a-plate"
@@ -86,3 +89,76 @@ def test_records_of_one_clamping_share_a_run_where_that_is_said(two_records: Pat
 def test_a_record_that_there_is_not_is_refused(two_records: Path, keys: str, message: str) -> None:
     with pytest.raises(CampaignError, match=message):
         _mapped(two_records, keys)
+
+
+def _read(values: str, record: int | None = None) -> Export:
+    """What is read of a file with the coordinates of P1 and these values, ``a b c`` a line of K-fields each."""
+    names = "".join(f"K2002/{number} P1.{letter}\n" for number, letter in enumerate("XYZ", start=1))
+    faults = Faults([])
+    export = dfq.read(ExportFile("a.dfq", (names + values).encode()), record, faults)
+    assert export is not None, faults.sorted()
+    return export
+
+
+def _record(number: int, date: str | None, place: str) -> str:
+    """A record in K-fields: its date above each value, below each, or once above or below all of them."""
+    values = [f"K0001/{which} {number}.{which}00\n" for which in (1, 2, 3)]
+    dates = [f"K0004/{which} {date}\n" if date else "" for which in (1, 2, 3)]
+    once = f"K0004/0 {date}\n" if date else ""
+    return {
+        "above": "".join(map("".join, zip(dates, values, strict=True))),
+        "below": "".join(map("".join, zip(values, dates, strict=True))),
+        "above all": once + "".join(values),
+        "below all": "".join(values) + once,
+    }[place]
+
+
+@pytest.mark.parametrize("place", ["above", "below", "above all", "below all"])
+@pytest.mark.parametrize(
+    "dates",
+    [("1.3.2026", "2.3.2026", "3.3.2026"), ("1.3.2026", None, "3.3.2026"), ("1.3.2026", "2.3.2026", None)],
+)
+def test_each_record_has_its_own_date_wherever_it_stands(place: str, dates: tuple[str | None, ...]) -> None:
+    text = "".join(_record(number, date, place) for number, date in enumerate(dates, start=1))
+    # Without the last date, dates below the values stand where dates above them could.
+    is_unclear = dates[2] is None and place.startswith("below")
+    for number, date in enumerate(dates, start=1):
+        export = _read(text, number)
+        assert export.started == (None if is_unclear else date)
+        assert any(
+            "may be the date of the value above it or of that below" in note for note in export.notes
+        ) == (is_unclear)
+
+
+@pytest.mark.parametrize("place", ["above", "below"])
+def test_a_record_without_a_date_does_not_get_that_of_the_next(place: str) -> None:
+    text = _record(1, None, place) + _record(2, "2.3.2026", place)
+    assert _read(text, 1).started is None
+    assert _read(text, 2).started == ("2.3.2026" if place == "below" else None)
+
+
+def test_a_point_whose_every_row_is_marked_invalid_is_said(two_records: Path) -> None:
+    """One coordinate that does not count leaves no row where its point alone is read, and no column goes silently."""
+    path = two_records / "plate.dfq"
+    *head, first, second = path.read_text(encoding="cp1252").splitlines()
+    cells = second.split("\x0f")
+    cells[1] = f"{cells[1].split(chr(0x14))[0]}\x14255"
+    path.write_text("\n".join([*head, first, "\x0f".join(cells)]) + "\n", encoding="cp1252")
+    with pytest.raises(
+        CampaignError, match=r"marks every row invalid: y on line 221 \(attribute K0002 = 255 of H1\)"
+    ):
+        _mapped(two_records, 'record = 2\nwhere = { target = "H1" }')
+
+
+def test_the_last_value_may_have_fewer_fields_where_further_lines_follow(two_records: Path) -> None:
+    path = two_records / "plate.dfq"
+    *head, first, second = path.read_text(encoding="cp1252").splitlines()
+    *others, last = first.split("\x0f")
+    short = "\x0f".join([*others, last.split("\x14")[0]])
+    path.write_text("\n".join([*head, short, second]) + "\n", encoding="cp1252")
+    assert np.count_nonzero(_rows(_mapped(two_records, "record = 1"))) == 24
+    path.write_text("\n".join([*head, second, short]) + "\n", encoding="cp1252")
+    with pytest.raises(
+        CampaignError, match=r"line 221: the last value of the line has 1 fields where the others"
+    ):
+        read_campaign(two_records)

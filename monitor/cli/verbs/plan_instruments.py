@@ -30,6 +30,8 @@ def tables(answer: InstrumentPlanAnswer) -> None:
     for number, test in enumerate(answer.proposed, 1):
         u = ", ".join(f"{name} {_u(test.u.get(name))} {answer.units[name]}" for name in shown)
         output.say(f"{number}. {test_name(test)}: {where(test)}; then u of {u}")
+    if answer.tests:
+        output.say("--json has every pose of these tests (axes_by_pose)")
     _remarks(answer)
 
 

@@ -37,19 +37,25 @@ _NAME, _NOMINAL, _UNIT, _VALUE, _ATTRIBUTE, _DATE = "2002", "2101", "2142", "000
 @dataclass
 class _Part:
     """What has been read: fields of each characteristic by its number, its values with their lines, the records that
-    its attributes mark invalid, and of each line of values how many fields every one of them has."""
+    its attributes mark invalid, its dates with their lines and how many values stand above each, and of each line of
+    values how many fields every one of them has. ``started`` has the date of a record."""
 
     fields: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
     values: dict[int, list[tuple[str, int]]] = field(default_factory=dict)
     facts: list[Fact] = field(default_factory=list)
     started: dict[int, str] = field(default_factory=dict)
     invalid: dict[int, dict[int, str]] = field(default_factory=dict)
+    dates: dict[int, list[tuple[int, str, int]]] = field(default_factory=dict)
     lines: dict[int, list[int]] = field(default_factory=dict)
 
     def text(self, key: str, number: int) -> str | None:
         """Return a field of a characteristic, or that of all of them."""
         entry = self.fields.get((key, number)) or self.fields.get((key, 0))
         return None if entry is None else entry[0]
+
+    def records(self, number: int) -> int:
+        """Return how many values of a characteristic have been read; of 0, how many records of the part."""
+        return len(self.values.get(number, ())) if number else max(map(len, self.values.values()), default=0)
 
     def mark(self, number: int, record: int, attribute: str) -> None:
         """Note that a record of a characteristic does not count."""
@@ -110,9 +116,40 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
         _complete(part, file.name, faults)
     if len(faults) > before:
         return None
+    notes = (*_dated(part), *_unmeasured(part))
     points = _points(part, file.name, decoded[1], record, faults)
     export = points or _table(part, decoded[1])
-    return None if len(faults) > before else replace(export, notes=_unmeasured(part))
+    return None if len(faults) > before else replace(export, notes=notes)
+
+
+def _dated(part: _Part) -> tuple[str, ...]:
+    """Give the records the dates of K-fields; a sentence on those of which the file does not say whose they are.
+
+    A date stands above its value or below it: as many dates as values are theirs in turn. Fewer are told apart where
+    some date stands above the first value of its characteristic or below the last.
+    """
+    ends = {number: (dates[0][0], dates[-1][0]) for number, dates in part.dates.items()}
+    is_above = any(first == 0 for first, _ in ends.values())
+    is_below = any(last == part.records(number) for number, (_, last) in ends.items())
+    unclear: list[int] = []
+    for number, dates in sorted(part.dates.items()):
+        above = [values for values, _, _ in dates]
+        if len(set(above)) == part.records(number) == len(dates):
+            records = list(range(len(dates)))
+        elif is_above != is_below:
+            records = [values - is_below for values in above]
+        else:
+            unclear.append(dates[0][2])
+            continue
+        for record, (_, date, _) in zip(records, dates, strict=True):
+            if date and record < part.records(number):
+                part.started.setdefault(record, date)
+    if not unclear:
+        return ()
+    return (
+        f"K0004 on line {min(unclear)} may be the date of the value above it or of that below it, and is taken for "
+        "neither; write [[runs]] with started_at where no other date stands",
+    )
 
 
 def _unmeasured(part: _Part) -> tuple[str, ...]:
@@ -144,7 +181,7 @@ def _line(part: _Part, line: str, number: int) -> str | None:
             part.mark(which, len(part.values[which]) - 1, value)
         return None
     if key == _DATE:
-        part.started.setdefault(max(len(part.values.get(which, ())) - 1, 0), value.replace("/", " "))
+        part.dates.setdefault(which, []).append((part.records(which), value.replace("/", " "), number))
     elif key.startswith("1") and value:
         part.facts.append(Fact(f"K{key}", value, number))
     part.fields[key, which] = (value, number)
@@ -206,7 +243,9 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
 
 
 def _whole_line(part: _Part, named: set[int], name: str, faults: Faults) -> None:
-    """Refuse lines of values that end before the last characteristic, or within the fields of the last value."""
+    """Refuse lines of values that end before the last characteristic, and the last line where it ends within the fields
+    of its last value: no other line can be cut there."""
+    end = max(part.lines, default=0)
     for line, fields in part.lines.items():
         if len(fields) < max(named, default=0):
             faults.add(
@@ -215,7 +254,7 @@ def _whole_line(part: _Part, named: set[int], name: str, faults: Faults) -> None
                 "here: export it again",
             )  # fmt: skip
             return
-        if len(fields) > 1 and fields[-1] < min(fields[:-1]):
+        if line == end and len(fields) > 1 and fields[-1] < min(fields[:-1]):
             faults.add(
                 name, line, None,
                 f"the last value of the line has {fields[-1]} fields where the others have {min(fields[:-1])}; the "

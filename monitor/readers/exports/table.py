@@ -139,7 +139,9 @@ def read_text(
     started = next((fact.value for fact in facts if fact.key.casefold() in _DATES), None)
     columns = dict(zip(head.names, zip(*plain, strict=True), strict=True))
     layout = f"{encoding}, {Style(separator, decimal)}"
-    return Export(columns, head.units, at, layout, facts, started, tuple(_repeated(plain, at)))
+    return Export(
+        columns, head.units, at, layout, facts, started, (*_repeated(plain, at), *_taken_as_names(rows, at))
+    )
 
 
 def _head(
@@ -226,14 +228,14 @@ def _rows(
                 f"{len(cells)} {'cell' if len(cells) == 1 else 'cells'} where the table has {width}; the file is cut "
                 "here, or something else than a row stands here: remove the line or export again",
             )  # fmt: skip
-    for row, number in zip(rows, at, strict=True):
-        if (word := _summing(row)) is not None:
-            faults.add(
-                name, number, None,
-                f"{quoted(word)} begins a line of results and no row; remove it and those like it, or export the rows "
-                "alone",
-            )  # fmt: skip
-            break
+    result = _result(rows, at)
+    if result is not None and _begin_with_numbers(rows):
+        word, number = result
+        faults.add(
+            name, number, None,
+            f"{quoted(word)} begins a line of results and no row; remove it and those like it, or export the rows "
+            "alone",
+        )  # fmt: skip
     return rows, at
 
 
@@ -242,10 +244,36 @@ def _names(cells: Sequence[str]) -> list[str]:
     return [name_and_unit(cell)[0].casefold() for cell in cells]
 
 
-def _summing(row: Sequence[str]) -> str | None:
-    """Return the word that makes a row a result over the others, in its first cell that is not empty."""
-    first = next((cell for cell in row if cell), "")
-    return first if first.strip(" :=.").casefold() in _RESULTS else None
+def _first(row: Sequence[str]) -> str:
+    """Return the first cell of a row that is not empty."""
+    return next((cell for cell in row if cell), "")
+
+
+def _is_result(word: str) -> bool:
+    return word.strip(" :=.").casefold() in _RESULTS
+
+
+def _result(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[str, int] | None:
+    """Return the first word that begins a row and may mean a result over the others, and its line."""
+    firsts = zip(map(_first, rows), lines, strict=True)
+    return next(((word, line) for word, line in firsts if _is_result(word)), None)
+
+
+def _begin_with_numbers(rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether most rows but results begin with a number, a date or a time; else names stand there, as MAX."""
+    firsts = [first for row in rows if not _is_result(first := _first(row))]
+    return 2 * sum(first.lstrip("+-.,")[:1].isdigit() for first in firsts) > len(firsts)
+
+
+def _taken_as_names(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> list[str]:
+    """Return a sentence on a row of names whose name may mean a result over the others."""
+    result = _result(rows, lines)
+    if result is None:
+        return []
+    word, line = result
+    return [
+        f"{quoted(word)} on line {line} is read as a row, since names begin the others; is it a result over them?"
+    ]
 
 
 def _with_its_unit(lines: Sequence[str]) -> tuple[int, str | None]:

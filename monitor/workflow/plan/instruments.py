@@ -20,6 +20,7 @@ from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model, label
 from monitor.workflow.plan.answer import InstrumentPlanAnswer, UnseenParameter
+from monitor.workflow.plan.named_tests import PLACED, named_test, planned_test, shown_u
 from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.plan.strokes import strokes_of
 from monitor.workflow.plan.test_answer import TestAnswer
@@ -30,8 +31,6 @@ LISTED, MOST_TESTS = 12, 12
 MOST_PAIRED = 24
 #: A rotary axis that turned by less (rad) may turn all around.
 LEAST_TURN = 0.5
-#: Kinds whose bar or sphere stands at a place that the plan chooses.
-PLACED = ("distance", "vector")
 
 
 def plan_instruments(
@@ -61,9 +60,9 @@ def plan_instruments(
         run=run,
         asked=asked,
         units={name: forecast.unit_of(name).name for name in _names(present, expected)},
-        present=_shown(forecast, present),
-        tests=tuple(_answer(forecast, test, joints) for test in ranked),
-        proposed=tuple(_answer(forecast, test, joints) for test in in_turn),
+        present=shown_u(forecast, present),
+        tests=tuple(planned_test(forecast, test, joints) for test in ranked),
+        proposed=tuple(planned_test(forecast, test, joints) for test in in_turn),
         unseen=unseen(forecast, joints, present, expected),
         standing=tuple(joint.name for joint in joints if _stands(campaign, joint)),
         pairs=_pairs(forecast, present, expected, asked, joints) if _names_some(request) else {},
@@ -89,7 +88,7 @@ def measurement_that_tells(
     )
     if not asked or _rank(best.u, asked)[0] > 0:
         return None
-    return _answer(forecast, best, chain_of(campaign.machine).joints)
+    return named_test(forecast, best, chain_of(campaign.machine).joints)
 
 
 def measurements_that_show(
@@ -110,7 +109,7 @@ def measurements_that_show(
         for name in asked:
             best = min(expected, key=partial(_order, name), default=None)
             if best is not None and np.isfinite(best.u.get(name, np.nan)):
-                tests[name] = _answer(forecast, best, joints)
+                tests[name] = named_test(forecast, best, joints)
     return tests
 
 
@@ -257,7 +256,7 @@ def unseen(
             unit = forecast.unit_of(name)
             answers.append(
                 UnseenParameter(
-                    name, unit.name, unit.to_display(best.u[name]), _answer(forecast, best, joints)
+                    name, unit.name, unit.to_display(best.u[name]), named_test(forecast, best, joints)
                 )
             )
     return tuple(answers)
@@ -402,37 +401,9 @@ def _pairs(
         if any(np.isfinite(u.get(name, np.nan)) for u in (present, *(test.u for test in expected))):
             continue
         pair = _best_pair(forecast, expected, (), (name,))
-        pairs[name] = () if pair is None else tuple(_answer(forecast, test, joints) for test in pair)
+        pairs[name] = () if pair is None else tuple(planned_test(forecast, test, joints) for test in pair)
     return pairs
 
 
 def _reached(u: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
     return all(u.get(name, np.inf) <= limit for name, limit in wanted.items())
-
-
-def _shown(forecast: TestForecast, u: Mapping[str, float]) -> dict[str, float | None]:
-    return {
-        name: forecast.unit_of(name).to_display(value) if np.isfinite(value) else None
-        for name, value in u.items()
-    }
-
-
-def _answer(forecast: TestForecast, expected: ExpectedTest, joints: Sequence[Joint]) -> TestAnswer:
-    test = expected.test
-    axes = {}
-    for index, joint in enumerate(joints):
-        readings = joint.sign * test.positions[:, index]
-        shown = np.rad2deg(readings) if joint.turns else readings
-        column = f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}"
-        axes[column] = (round(float(shown.min()), 3) + 0.0, round(float(shown.max()), 3) + 0.0)
-    x, y, z = (round(value, 3) + 0.0 for value in test.setup.work_point)
-    return TestAnswer(
-        instrument=test.setup.instrument or test.setup.id,
-        setup=test.setup.id,
-        reading=test.setup.reading,
-        available=test.available,
-        poses=len(test.positions),
-        axes=axes,
-        u=_shown(forecast, expected.u),
-        work_point_mm=(x, y, z) if test.setup.reading in PLACED else None,
-    )
