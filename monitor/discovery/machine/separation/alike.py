@@ -53,7 +53,12 @@ def _anywhere(context: Context, strokes: Mapping[str, tuple[float, float]]) -> C
     """The context of poses drawn over the whole travel, everything else as in the mean of the campaign."""
     rng = np.random.default_rng(0)
     ranges = np.array([strokes.get(joint.name, _any_range(joint)) for joint in context.chain.joints])
-    channels = {name: np.full(POSES, float(np.nanmean(values))) for name, values in context.columns.items()}
+    channels = {
+        name: np.full(
+            POSES, float(np.mean(values[np.isfinite(values)])) if np.isfinite(values).any() else np.nan
+        )
+        for name, values in context.columns.items()
+    }
     rows = np.zeros(POSES, dtype=np.int64)
     return replace(
         context,
