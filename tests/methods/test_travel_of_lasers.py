@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,18 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.compare import compare
-from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.instruments.instruments import instruments
+from monitor.workflow.instruments.request import InstrumentsRequest
+from monitor.workflow.predict.predict import predict
+from monitor.workflow.predict.request import PredictRequest
+from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.volumetric import map_run
 from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 
@@ -79,6 +88,39 @@ def test_compare_refuses_in_the_words_of_identify(tmp_path: Path) -> None:
         with pytest.raises(DataError, match="the readings of setup laser-Z are its travel") as identified:
             identify(db, IdentifyRequest(campaign.name))
     assert str(said.value) == str(identified.value)
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Database, str, str]]:
+    """The lasers of which one has the other sign, stored, with what `identify` says of them."""
+    folder = tmp_path_factory.mktemp("turned")
+    campaign = lasers(folder, scaled(-1.0))
+    with Database(folder / "shop.duckdb") as db:
+        import_campaign(db, campaign)
+        with pytest.raises(DataError, match="setup laser-Z are its travel with the other sign") as said:
+            identify(db, IdentifyRequest(campaign.name))
+        yield db, campaign.name, str(said.value)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda db, name: evaluate(db, UncertaintyRequest(name)),
+        lambda db, name: map_run(db, VolumetricRequest(name)),
+        lambda db, name: instruments(db, InstrumentsRequest(name)),
+        lambda db, name: predict(db, PredictRequest(name)),
+        lambda db, name: explain(db, ExplainRequest(name)),
+    ],
+    ids=["uncertainty", "map", "contributions", "predict", "explain"],
+)
+def test_every_verb_refuses_in_the_words_of_identify(
+    turned: tuple[Database, str, str], asked: Callable[[Database, str], object]
+) -> None:
+    """`uncertainty`, `map` and certificates said to check signs, topology, targets and units."""
+    db, name, words = turned
+    with pytest.raises(DataError, match="setup laser-Z are its travel with the other sign") as said:
+        asked(db, name)
+    assert str(said.value) == words
 
 
 def test_right_lasers_are_not_named(tmp_path: Path) -> None:
