@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from monitor.discovery import only_misread
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
@@ -121,6 +123,23 @@ def test_every_verb_refuses_in_the_words_of_identify(
     with pytest.raises(DataError, match="setup laser-Z are its travel with the other sign") as said:
         asked(db, name)
     assert str(said.value) == words
+
+
+def test_one_laser_is_misread_only_where_all_others_agree_without_it(tmp_path: Path) -> None:
+    """The column of X with the other sign turns the laser too, but the bars and the R-test contradict it as well."""
+    rng = np.random.default_rng(9100)
+    campaign = read_campaign(centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng)))
+    assert isinstance(campaign, Campaign)
+    probings, method = campaign.probings, campaign_method(campaign)
+    of_laser = probings.channels["setup"] == 1 + [each.id for each in campaign.artefact.setups].index(
+        "laser-X"
+    )
+    reading = np.where(of_laser, -1.0, 1.0) * probings.channels["reading_um"]
+    laser = replace(probings, channels={**probings.channels, "reading_um": reading})
+    column = replace(probings, readings={**probings.readings, "X": -probings.readings["X"]})
+    assert only_misread(campaign, method.problem_of) is None
+    assert only_misread(replace(campaign, probings=laser), method.problem_of) == "laser-X"
+    assert only_misread(replace(campaign, probings=column), method.problem_of) is None
 
 
 def test_right_lasers_are_not_named(tmp_path: Path) -> None:
