@@ -18,7 +18,7 @@ from monitor.discovery.machine.mistakes.mistakes import (
     is_gross,
 )
 from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
-from monitor.discovery.machine.mistakes.setup_mistakes import find_setup_mistakes
+from monitor.discovery.machine.mistakes.setup_mistakes import find_setup_mistakes, only_misread
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict
 
@@ -41,6 +41,7 @@ __all__ = [
     "fit",
     "is_far",
     "is_gross",
+    "only_misread",
     "robust_fit",
     "version_error",
 ]

@@ -247,12 +247,13 @@ class SetupDrift:
 class Instruments(Able):
     """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``contrasts`` what
     each setup says against all others, ``scatters`` what its readings scatter, ``drifts`` which setups run off with the
-    time."""
+    time, ``misread`` which ones read something else than they are set up for, without a fit."""
 
     shares: SharesOf
     contrasts: Callable[[ChainProblem, Solution, int], tuple[Contrast, ...]]
     scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]
+    misread: Callable[[ChainProblem], tuple[str, ...]]
 
 
 @dataclass(frozen=True)

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from monitor.discovery import only_misread
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.explain.compare import compare
-from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.instruments.instruments import instruments
+from monitor.workflow.instruments.request import InstrumentsRequest
+from monitor.workflow.predict.predict import predict
+from monitor.workflow.predict.request import PredictRequest
+from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.volumetric import map_run
 from tests.simulator import four_instruments as shop, horizontal_centre as centre
 
 
@@ -79,6 +90,56 @@ def test_compare_refuses_in_the_words_of_identify(tmp_path: Path) -> None:
         with pytest.raises(DataError, match="the readings of setup laser-Z are its travel") as identified:
             identify(db, IdentifyRequest(campaign.name))
     assert str(said.value) == str(identified.value)
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Database, str, str]]:
+    """The lasers of which one has the other sign, stored, with what `identify` says of them."""
+    folder = tmp_path_factory.mktemp("turned")
+    campaign = lasers(folder, scaled(-1.0))
+    with Database(folder / "shop.duckdb") as db:
+        import_campaign(db, campaign)
+        with pytest.raises(DataError, match="setup laser-Z are its travel with the other sign") as said:
+            identify(db, IdentifyRequest(campaign.name))
+        yield db, campaign.name, str(said.value)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda db, name: evaluate(db, UncertaintyRequest(name)),
+        lambda db, name: map_run(db, VolumetricRequest(name)),
+        lambda db, name: instruments(db, InstrumentsRequest(name)),
+        lambda db, name: predict(db, PredictRequest(name)),
+        lambda db, name: explain(db, ExplainRequest(name)),
+    ],
+    ids=["uncertainty", "map", "contributions", "predict", "explain"],
+)
+def test_every_verb_refuses_in_the_words_of_identify(
+    turned: tuple[Database, str, str], asked: Callable[[Database, str], object]
+) -> None:
+    """`uncertainty`, `map` and certificates said to check signs, topology, targets and units."""
+    db, name, words = turned
+    with pytest.raises(DataError, match="setup laser-Z are its travel with the other sign") as said:
+        asked(db, name)
+    assert str(said.value) == words
+
+
+def test_one_laser_is_misread_only_where_all_others_agree_without_it(tmp_path: Path) -> None:
+    """The column of X with the other sign turns the laser too, but the bars and the R-test contradict it as well."""
+    rng = np.random.default_rng(9100)
+    campaign = read_campaign(centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng)))
+    assert isinstance(campaign, Campaign)
+    probings, method = campaign.probings, campaign_method(campaign)
+    of_laser = probings.channels["setup"] == 1 + [each.id for each in campaign.artefact.setups].index(
+        "laser-X"
+    )
+    reading = np.where(of_laser, -1.0, 1.0) * probings.channels["reading_um"]
+    laser = replace(probings, channels={**probings.channels, "reading_um": reading})
+    column = replace(probings, readings={**probings.readings, "X": -probings.readings["X"]})
+    assert only_misread(campaign, method.problem_of) is None
+    assert only_misread(replace(campaign, probings=laser), method.problem_of) == "laser-X"
+    assert only_misread(replace(campaign, probings=column), method.problem_of) is None
 
 
 def test_right_lasers_are_not_named(tmp_path: Path) -> None:

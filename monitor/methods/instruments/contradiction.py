@@ -142,7 +142,8 @@ def _wrong_unit(parts: Iterable[Part]) -> str | None:
 def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
     """What may keep a fit from settling, as the end of a refusal; ``bars`` kept one direction, so that a centre which
     is stated some millimetres wrong cannot be mended."""
-    hints = (*_other_travels(parts), *_other_lengths(parts), *_other_tool_points(parts))
+    travels = (f"the readings of setup {name} are {what}" for name, what in other_travels(parts))
+    hints = (*travels, *_other_lengths(parts), *_other_tool_points(parts))
     suspected = "".join(f"; {what}" for what in hints)
     return suspected + "".join(
         f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
@@ -151,8 +152,9 @@ def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
     )
 
 
-def _other_travels(parts: Iterable[Part]) -> Iterator[str]:
-    """The setups of lasers whose readings are not the travel of the tool point along their direction, in words."""
+def other_travels(parts: Iterable[Part]) -> Iterator[tuple[str, str]]:
+    """The setups of lasers whose readings are not the travel of the tool point along their direction: the id, and what
+    they are in words."""
     for part in parts:
         if not isinstance(part.reading, Displacement):
             continue
@@ -163,7 +165,7 @@ def _other_travels(parts: Iterable[Part]) -> Iterator[str]:
             read = part.rows.measured[mine, 0] - part.rows.measured[mine, 0].mean()
             what = _travel_in_words(travel, read)
             if what is not None:
-                yield f"the readings of setup {part.id} are {what}"
+                yield part.id, what
                 break
 
 

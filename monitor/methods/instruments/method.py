@@ -12,6 +12,7 @@ from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.as_stated import as_stated
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.contradiction import other_travels
 from monitor.methods.instruments.contrasts import contrasts, scatters
 from monitor.methods.instruments.drifts import drifts
 from monitor.methods.instruments.forecast import InstrumentForecast
@@ -58,6 +59,12 @@ def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
     return (*taken_up(problem.context.chain, problem.setups), *centres, *absent)
 
 
+def misread(problem: ChainProblem) -> tuple[str, ...]:
+    """The lasers whose readings are not the travel along their direction."""
+    assert isinstance(problem, InstrumentProblem)
+    return tuple(name for name, _ in other_travels(problem.parts))
+
+
 METHOD = ChainMethod(
     name=NAME,
     title="instruments",
@@ -70,7 +77,7 @@ METHOD = ChainMethod(
     trial_rows=150,
     taken_up=without_numbers,
     as_stated=as_stated,
-    instruments=Instruments(shares, contrasts, scatters, drifts),
+    instruments=Instruments(shares, contrasts, scatters, drifts, misread),
     standards=StandardTests(standard_tests),
     plan=InstrumentPlan(InstrumentForecast),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),

@@ -26,10 +26,11 @@ def grounds_against(
     if None in by_run:
         # Loaded here: what is stored waits for no solver.
         from monitor.discovery import robust_fit
-        from monitor.workflow.identify.fitting import machine_problem
+        from monitor.workflow.identify.fitting import explained_refusals, machine_problem
         from monitor.workflow.uncertainty.grounds import grounds_of
 
-        robust = robust_fit(machine_problem(campaign, model))
+        with explained_refusals(campaign, model):
+            robust = robust_fit(machine_problem(campaign, model))
         by_run = [grounds_of(campaign, robust, run) for run in stored]
     simulated = (
         [Ground(GroundKind.SIMULATED, min(stored), campaign.machine.id)] if campaign.machine.virtual else []

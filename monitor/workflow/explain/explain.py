@@ -28,7 +28,6 @@ from monitor.discovery import (
 from monitor.discovery.curve.explain import explain_curve
 from monitor.discovery.machine.mistakes.cures import Maker
 from monitor.documents import to_document
-from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
@@ -42,8 +41,7 @@ from monitor.workflow.explain.machine_answer import is_hopeless, machine_explana
 from monitor.workflow.explain.measurements import with_measurements
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
-from monitor.workflow.identify.fitting import curve_problem, machine_problem
-from monitor.workflow.identify.mistaken_columns import refusal_of
+from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
 from monitor.workflow.instruments.against_others import against_others
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
@@ -58,12 +56,10 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
     Raises DataError where it cannot be fitted, with what looks wrong in the file where that can be said, or where what
     follows takes more memory, ``times`` that of all derivatives, than there is.
     """
-    try:
+    with explained_refusals(campaign, model):
         problem = machine_problem(campaign, model)
         with within_memory(problem, times):
             return robust_fit(problem)
-    except DataError as refusal:
-        raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:

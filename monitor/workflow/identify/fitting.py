@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from monitor.discovery import Fit, fit
@@ -36,6 +38,18 @@ def curve_problem(curve: CurveCampaign, model: StoredModel) -> CurveProblem:
     return campaign_method(curve).problem_of(curve, as_model(model))
 
 
+@contextmanager
+def explained_refusals(campaign: Campaign, model: StoredModel) -> Iterator[None]:
+    """A fit of a machine's campaign within: what refuses it is said in the words of ``identify``, whoever asked.
+
+    Raises DataError for a DataError, with what looks wrong in the file where that can be said.
+    """
+    try:
+        yield
+    except DataError as refusal:
+        raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
+
+
 def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | CurveFit:
     """A version of a model fitted to a campaign.
 
@@ -43,10 +57,8 @@ def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | Curv
     """
     if isinstance(campaign, CurveCampaign):
         return campaign_method(campaign).fit(curve_problem(campaign, model))
-    try:
+    with explained_refusals(campaign, model):
         return fit(machine_problem(campaign, model))
-    except DataError as refusal:
-        raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
 def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:

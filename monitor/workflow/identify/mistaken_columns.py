@@ -31,8 +31,8 @@ def with_mistake(
     """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
 
     Columns that the import saw exchanged are said again. Else the changes are tried that would let the readings fit,
-    which takes up to half a minute; where none does, what else the import noticed of the columns is said. Of very many
-    rows a part is tried.
+    which takes up to half a minute; where none does, what else the import noticed of the columns is said. Where the
+    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
     if isinstance(refusal, MistakenUnitError | TooManyRowsError):
         return refusal
@@ -40,11 +40,14 @@ def with_mistake(
     if exchanged:
         return _with_sentences(refusal, exchanged)
     # Loaded here: only readings that contradict the file need the search.
-    from monitor.discovery import find_mistakes
+    from monitor.discovery import find_mistakes, only_misread
     from monitor.reporting.machine_finding import mistake_sentence
     from monitor.workflow.explain.machine_answer import mistakes_found
 
     _, part = next(parts_of(campaign))
+    misread = only_misread(part, problem_of)
+    if misread is not None and f"setup {misread} " in str(refusal):
+        return refusal
     mistakes = find_mistakes(part, problem_of, None)
     said = (mistake_sentence(mistakes_found(mistakes)),) if mistakes else column_doubts(campaign)
     return _with_sentences(refusal, said) if said else refusal

@@ -10,7 +10,7 @@ from monitor.methods.chain.problem import solve_problem
 from monitor.store import Database
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
-from monitor.workflow.identify.fitting import machine_problem
+from monitor.workflow.identify.fitting import explained_refusals, machine_problem
 from monitor.workflow.identify.request import StepwiseRequest
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve_for
@@ -26,8 +26,11 @@ def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
     assert isinstance(stepwise, Stepwise)  # required with the campaign
     number = max(run.run for run in campaign.runs) if request.run is None else request.run
     campaign = only_run(campaign, number)
-    problem = machine_problem(campaign, resolve_for(db, request.model, campaign.method, campaign.machine.id))
-    coefficients = stepwise.coefficients(problem, solve_problem(problem), number)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
+    with explained_refusals(campaign, model):
+        problem = machine_problem(campaign, model)
+        solution = solve_problem(problem)
+    coefficients = stepwise.coefficients(problem, solution, number)
     return StepwiseAnswer(
         request.campaign,
         number,

@@ -17,7 +17,7 @@ from monitor.methods.method import Instruments, InstrumentShare, Unable
 from monitor.records import Array
 from monitor.store import Database
 from monitor.units import Unit
-from monitor.workflow.identify.fitting import machine_problem
+from monitor.workflow.identify.fitting import explained_refusals, machine_problem
 from monitor.workflow.instruments.answer import (
     Agreement,
     AloneValue,
@@ -46,13 +46,15 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
     ability = campaign_method(campaign).instruments
     assert isinstance(ability, Instruments)
     model = resolve_for(db, request.model, campaign.method, subject_of(campaign))
-    problem = machine_problem(campaign, model)
+    with explained_refusals(campaign, model):
+        problem = machine_problem(campaign, model)
     run = int(problem.runs[-1]) if request.run is None else request.run
     if run not in problem.runs:
         raise NotFoundError(
             f"campaign {campaign.name} has no run {run}; it has runs {', '.join(map(str, problem.runs))}"
         )
-    solution = solve_problem(problem)
+    with explained_refusals(campaign, model):
+        solution = solve_problem(problem)
     of_all, beforehand = ability.shares(problem, solution, run)
     parameters, open_ones = _parameters(problem, solution, run, of_all, beforehand)
     return InstrumentsAnswer(

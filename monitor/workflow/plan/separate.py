@@ -7,12 +7,11 @@ import numpy as np
 from monitor.discovery import fit
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.effects import parse_effect
-from monitor.methods import campaign_method
 from monitor.records import Campaign
 from monitor.store import StoredModel
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.explain.explain_answer import DeviationsApart
-from monitor.workflow.models import as_model
+from monitor.workflow.identify.fitting import explained_refusals, machine_problem
 from monitor.workflow.plan.answer import SeparationAnswer, SeparationVerdict
 from monitor.workflow.plan.strokes import strokes_of
 
@@ -25,7 +24,8 @@ def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -
 
     Raises EffectError for an effect that the machine does not have.
     """
-    fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
+    with explained_refusals(campaign, model):
+        fitted = fit(machine_problem(campaign, model))
     context = fitted.problem.context
     effect, rival = (parse_effect(text, context.chain) for text in texts)
     basis = effect.basis(context)

@@ -41,8 +41,9 @@ from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.runs.sensitivity import sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
+from monitor.workflow.identify.fitting import explained_refusals, machine_problem
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import as_model, resolve_for
+from monitor.workflow.models import resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.beside import Linearised, beside_readings
@@ -134,11 +135,13 @@ def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest
     """As ``evaluate``, of a campaign that is loaded."""
     campaign = runs_before(whole, request.before)
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
-    problem = campaign_method(campaign).problem_of(campaign, as_model(model))
+    with explained_refusals(campaign, model):
+        problem = machine_problem(campaign, model)
     of_run = problem.context.run == (problem.runs[-1] if request.run is None else request.run)
     # Before the fit, which takes minutes and memory where the rows are so many: a number is a reading or more.
     _refuse_too_many(int(np.isfinite(problem.sigma[of_run]).sum()), request.method)
-    fitted = fit(problem)
+    with explained_refusals(campaign, model):
+        fitted = fit(problem)
     selected = None
     if request.select is not None:
         selected = selected_readings(db, request.select, campaign.name, model, fitted.problem)

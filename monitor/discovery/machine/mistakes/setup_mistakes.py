@@ -32,7 +32,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     turned_axes,
     unit_mistakes,
 )
-from monitor.discovery.machine.mistakes.cures import Maker, Mistake, fitted, without_gross
+from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms, fitted, without_gross
 from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
@@ -127,6 +127,23 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
                     mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains))
             return tuple(mistakes)
     return ()
+
+
+def only_misread(campaign: Campaign, problem_of: Maker) -> str | None:
+    """The one setup that reads something else than it is set up for, where all others agree without it: no column that
+    they read too is wrong. None where there is none, or more."""
+    ability = campaign_method(campaign).instruments
+    if not isinstance(ability, Instruments):
+        return None
+    try:
+        misread = ability.misread(problem_of(campaign))
+    except MonitorError:
+        return None
+    rest = campaign.probings.rows(~_rows_of(campaign, misread))
+    if len(misread) != 1 or not len(rest):
+        return None
+    agrees = cured_rms(replace(campaign, probings=rest), problem_of, np.inf) is not None
+    return misread[0] if agrees else None
 
 
 def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> list[_Doubted]:
