@@ -204,14 +204,18 @@ def pitches_over(travel: float, longest: float) -> list[float]:
 
 
 def reversals_of_unknown_width(context: Context) -> list[ChainVariant]:
-    """Positioning errors of every axis that build up after a reversal, with every width within its travel."""
+    """Positioning errors of every axis that build up after a reversal, with every width within its travel.
+
+    Of a rotary axis widths within half of it: over a part of a turn that is not reversed what builds up for longer is
+    a line, and a turn that is a line has simpler names.
+    """
     variants: list[ChainVariant] = []
     for index, joint in enumerate(context.chain.joints):
         term = f"E{COMPONENTS[joint.main + 3 * joint.turns]}{joint.name}"
         travel = float(np.ptp(context.positions[:, index]))
         unit, grid = unit_of_width(joint), WIDTHS_MM
         if joint.turns:
-            travel, grid = float(np.rad2deg(travel)), WIDTHS_DEG
+            travel, grid = float(np.rad2deg(travel)) / 2.0, WIDTHS_DEG
         texts = [f"{term}:windup{width:g}{unit}" for width in grid if width < travel]
         variants += [
             Variant(f"{term}:windup", parse_effect(text, context.chain), len(texts), ODDS_OF_A_WIDTH)
