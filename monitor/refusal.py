@@ -75,6 +75,11 @@ class ReasonKind(Enum):
     OUTSIDE_MODEL = "outside_model"
     TURNS_WORKPIECE = "turns_workpiece"
 
+    @property
+    def is_outside_model(self) -> bool:
+        """Whether it is said of errors of the machine that are no parameters of the model."""
+        return self in (ReasonKind.NOT_SHOWN, ReasonKind.OUTSIDE_MODEL, ReasonKind.TURNS_WORKPIECE)
+
 
 @dataclass(frozen=True)
 class Reason:

@@ -59,10 +59,13 @@ class PoseError:
 
 @dataclass(frozen=True)
 class LeftOutOfMap:
-    """A parameter that the map does not contain, and why."""
+    """A parameter that the map does not contain, and why; ``outside_model`` where it is an error of the machine which the
+    model does not have.
+    """
 
     parameter: str
     why: str
+    outside_model: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.machine import Chain
 from monitor.records import Array
+from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.svg.map_slices import Slice, slices_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import label
@@ -51,7 +52,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         ),
         datum=None if error.datum is None else _at(chain, error.datum),
         parameters=tuple(error.names),
-        left_out=tuple(LeftOutOfMap(name, refused.why) for name, refused in mapped.left_out.items()),
+        left_out=tuple(_left_out(name, refused) for name, refused in mapped.left_out.items()),
         worst=_point(mapped, error.worst, k, by_parameter),
         mean=_length(*error.mean, k),
         rms=_length(*error.rms, k),
@@ -61,6 +62,11 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         refers_to=refers_to((*error.names, *mapped.left_out), chain),
         vectors_refer_to=VECTORS,
     )
+
+
+def _left_out(name: str, refused: RefusedParameters) -> LeftOutOfMap:
+    is_outside = refused.reason is not None and refused.reason.kind.is_outside_model
+    return LeftOutOfMap(name, refused.why, True if is_outside else None)
 
 
 def _um(length: float) -> float:
