@@ -59,7 +59,7 @@ class PoseError:
 
 @dataclass(frozen=True)
 class LeftOutOfMap:
-    """A parameter that the map does not contain, and why; ``outside_model`` where it is an error of the machine which the
+    """A parameter that the map does not contain, and why; ``outside_model`` where it is an error of the machine that the
     model does not have.
     """
 
