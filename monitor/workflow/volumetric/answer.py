@@ -59,8 +59,9 @@ class PoseError:
 
 @dataclass(frozen=True)
 class LeftOutOfMap:
-    """A parameter that the map does not contain, and why; ``outside_model`` where it is an error of the machine that the
-    model does not have.
+    """A parameter that the map does not contain, and why.
+
+    ``outside_model``: it is an error of the machine that the model does not have.
     """
 
     parameter: str
