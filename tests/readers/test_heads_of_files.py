@@ -16,21 +16,13 @@ from monitor.readers.row_places import RowPlaces
 from monitor.records import SourceFile
 from monitor.row_files import rows_in, runs_in
 from monitor.workflow.intake.gross_doubts import gross_doubts
+from tests.readers.test_exports import HEAD as OF_WEEK
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LASERS, PLATE = "files-as-they-come", "files-of-a-plate"
-HEAD = """\
-format = 1
-campaign = "week-12"
-method = "instruments"
-
-[machine]
-id = "M1"
-topology = "w C Y b X Z t"
-
-[dates]
-utc_offset = "+01:00"
-
+HEAD = (
+    f"{OF_WEEK}\n"
+    + """\
 [[setups]]
 id = "laser-X"
 reading = "displacement"
@@ -50,6 +42,7 @@ z_mm = 0.0
 c_deg = 0.0
 reading_um = { column = "Deviation", deviation = true }
 """
+)
 
 
 def changed(around: Path, sample: str, name: str, *changes: tuple[str, str], mapping: str = "") -> Exports:
@@ -361,7 +354,7 @@ def test_the_files_of_rows_and_runs_go_by_their_own_names():
 
 
 def test_rows_that_cannot_be_read_are_the_fault_and_not_a_setup_without_rows(tmp_path):
-    with pytest.raises(CampaignError) as caught:
+    with pytest.raises(CampaignError, match="is not a number") as caught:
         laser(tmp_path, COLUMNS + "0;(1.0)\n100;(2.0)\n")
     assert "has no row" not in str(caught.value)
     assert "laser.csv, line 2, column Deviation (reading_um): '(1.0)' is not a number" in str(caught.value)
