@@ -6,7 +6,7 @@ are one file in ``methods``, an instrument's own file is one in ``exports``, rea
 plug-ins come through the entry points of the group ``monitor.readers``.
 """
 
-from monitor.readers.doubts import doubts
+from monitor.readers.doubts.doubts import doubts
 from monitor.readers.folder_names import names_in
 from monitor.readers.formats.export_1 import files_in, recognises as is_export_folder
 from monitor.readers.linear_axes import read_linear_axes

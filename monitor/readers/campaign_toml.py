@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from monitor.readers.axes import axes_of_machine
-from monitor.readers.decimals import decimal_in
 from monitor.readers.setups.file import FORMATS, probe_of
+from monitor.readers.tables.decimals import decimal_in
 from monitor.records import (
     Artefact,
     Campaign,

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from monitor.exceptions import CampaignError, InputError
 from monitor.readers.axes import axes_of, axes_of_machine
+from monitor.readers.campaign.probings_file import SETUP
 from monitor.readers.campaign_toml import campaign_toml
-from monitor.readers.decimals import decimal_in
-from monitor.readers.probings_file import SETUP
 from monitor.readers.registry import read_campaign
+from monitor.readers.tables.decimals import decimal_in
 from monitor.records import Campaign
 
 FIRST_OF_RUNS = ("run", "started_at", "day", "warm_up", "ambient_degC")

@@ -18,7 +18,7 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.readers import read_campaign
-from monitor.readers.doubts import doubts
+from monitor.readers.doubts.doubts import doubts
 
 ARCHIVE = Path(__file__).parents[1] / "archives" / "monitor-0.1.0.duckdb.gz"
 

@@ -17,7 +17,7 @@ from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
-from monitor.readers.doubts import column_doubts
+from monitor.readers.doubts.doubts import column_doubts
 from monitor.records import Campaign, Probings
 from monitor.store import Database, StoredModel, import_campaign
 from monitor.workflow.campaign_parts import only_run

@@ -146,10 +146,10 @@ def _campaigns() -> Iterator[bytes]:
 def tables() -> Take:
     """Tables as a spreadsheet saves them: separated by semicolons or tabs, with decimal commas, with a title above."""
     from monitor.exceptions import CampaignError
-    from monitor.readers.csv_table import parse_csv
+    from monitor.readers.campaign.runs_file import read_runs
     from monitor.readers.faults import Faults
     from monitor.readers.files import decode
-    from monitor.readers.runs_file import read_runs
+    from monitor.readers.tables.csv_table import parse_csv
 
     def take(content: bytes) -> object:
         faults = Faults(("runs.csv",))
@@ -179,7 +179,7 @@ def workbooks() -> Take:
     """A part of a workbook in place of a sound one; behind the parts, the whole file."""
     from monitor.exceptions import CampaignError
     from monitor.readers.faults import Faults
-    from monitor.readers.workbook import read_sheet
+    from monitor.readers.tables.workbook import read_sheet
 
     parts = _parts_of_a_workbook()
     names = sorted(parts)

@@ -14,7 +14,7 @@ import pytest
 
 from monitor.methods.bar_temperature import BarTemperature, bar_temperature
 from monitor.methods.samba.method import METHOD as samba
-from monitor.readers.doubts import implausible_temperatures
+from monitor.readers.doubts.doubts import implausible_temperatures
 from monitor.records import Array, Campaign
 
 STEEL, WARM, AIR = 11.5e-6, 27.0, 21.5

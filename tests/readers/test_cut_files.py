@@ -9,9 +9,9 @@ import pytest
 
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
-from monitor.readers.csv_table import parse_csv
-from monitor.readers.cut_files import is_cut
 from monitor.readers.faults import Faults
+from monitor.readers.tables.csv_table import parse_csv
+from monitor.readers.tables.cut_files import is_cut
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROWS = "".join(f"{number},{number / 3:.2f}\n" for number in range(1, 9))

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from monitor.readers import doubts, read_campaign
-from monitor.readers.axes_doubts import mistaken_axes
-from monitor.readers.unit_doubts import runs_in_units
+from monitor.readers.doubts.axes_doubts import mistaken_axes
+from monitor.readers.doubts.unit_doubts import runs_in_units
 from monitor.records import Campaign
 from monitor.workflow.intake.gross_doubts import gross_doubts
 

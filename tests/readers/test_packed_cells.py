@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.readers.packed_cells import CELLS_AT_ONCE, PackedCells
+from monitor.readers.tables.packed_cells import CELLS_AT_ONCE, PackedCells
 
 
 @pytest.mark.parametrize("count", [0, 1, CELLS_AT_ONCE - 1, CELLS_AT_ONCE, 2 * CELLS_AT_ONCE + 3])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from monitor.readers import read_campaign
-from monitor.readers.repeated_rows import repeated_rows
+from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.records import Campaign
 
 Seeds = Callable[[int, int], Iterable[int]]

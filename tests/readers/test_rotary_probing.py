@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from monitor.readers import read_campaign, write_campaign
-from monitor.readers.doubts import doubts
+from monitor.readers.doubts.doubts import doubts
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples/tilting-table"
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 from monitor.exceptions import CampaignError, InputError
 from monitor.readers import read_campaign, write_campaign
-from monitor.readers.decimals import decimal_in
+from monitor.readers.tables.decimals import decimal_in
 from monitor.records import Campaign
 from monitor.units import DEGREE, MICROMETRE
 

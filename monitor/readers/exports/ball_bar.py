@@ -14,12 +14,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from monitor.readers.delimited import Style, cells_of, fact_of, is_data, length_of, plain_key, quantity_of
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.exports import table as plain_table
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import decimal_of, foreign_unit
+from monitor.readers.tables.delimited import (
+    Style,
+    cells_of,
+    fact_of,
+    is_data,
+    length_of,
+    plain_key,
+    quantity_of,
+)
+from monitor.readers.tables.foreign_text import decode_foreign
 from monitor.readers.toml_table import Table
 
 #: What a head calls the length of a bar.

@@ -15,11 +15,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.tables.cut_files import CUT, is_cut
+from monitor.readers.tables.foreign_text import decode_foreign
 from monitor.readers.toml_table import Table
 
 _FIELD = re.compile(r"K([0-9]{4})(?:/([0-9]{1,6}))?(?:\s+(.*?))?\s*")

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
-from monitor.readers.foreign_text import decode_foreign
+from monitor.readers.tables.foreign_text import decode_foreign
 from monitor.readers.toml_table import Table
 
 _WORD = re.compile(

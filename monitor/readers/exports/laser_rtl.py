@@ -14,8 +14,8 @@ from decimal import Decimal
 
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.foreign_text import decode_foreign
 from monitor.readers.foreign_units import decimal_of
+from monitor.readers.tables.foreign_text import decode_foreign
 
 #: Run, number of the target, deviation, line.
 Row = tuple[int, int, str, int]

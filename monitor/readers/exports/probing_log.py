@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, one_of, quoted
-from monitor.readers.foreign_text import decode_foreign
+from monitor.readers.tables.foreign_text import decode_foreign
 
 _BEGIN = re.compile(r"\s*(measuring log|messprotokoll)\b.*", re.IGNORECASE)
 _END = re.compile(r"\s*(end of measuring log|ende (des )?messprotokolls?)\b.*", re.IGNORECASE)

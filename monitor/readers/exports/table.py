@@ -10,7 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from monitor.exceptions import did_you_mean
-from monitor.readers.delimited import (
+from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
+from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.tables.delimited import (
     DECIMALS,
     SEPARATORS,
     Style,
@@ -22,12 +25,9 @@ from monitor.readers.delimited import (
     separator_of,
     with_points,
 )
-from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
-from monitor.readers.faults import Faults, one_of, quoted
-from monitor.readers.foreign_text import decode_foreign
-from monitor.readers.foreign_units import foreign_unit
+from monitor.readers.tables.foreign_text import decode_foreign
+from monitor.readers.tables.workbook import read_sheet
 from monitor.readers.toml_table import Table
-from monitor.readers.workbook import read_sheet
 
 #: Words that begin a line below a table and are a result over its rows.
 _RESULTS = frozenset((

@@ -11,12 +11,12 @@ import numpy as np
 
 from monitor.bounded import read_bounded
 from monitor.exceptions import CampaignError, did_you_mean
-from monitor.readers.csv_table import CsvTable, parse_csv
-from monitor.readers.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
+from monitor.readers.campaign.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader, method_rules
-from monitor.readers.spreadsheet import read_table, renamed
+from monitor.readers.tables.csv_table import CsvTable, parse_csv
+from monitor.readers.tables.spreadsheet import read_table, renamed
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import CurveCampaign, Instrument, SourceFile
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from monitor.exceptions import CampaignError
-from monitor.readers import probings_file, runs_file
-from monitor.readers.campaign_parts import EMPTY, campaign_of, read_head, read_parts
-from monitor.readers.csv_table import CsvTable, parse_csv
+from monitor.readers.campaign import probings_file, runs_file
+from monitor.readers.campaign.campaign_parts import EMPTY, campaign_of, read_head, read_parts
 from monitor.readers.faults import Faults
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader
-from monitor.readers.spreadsheet import TableText, read_table, renamed
+from monitor.readers.tables.csv_table import CsvTable, parse_csv
+from monitor.readers.tables.spreadsheet import TableText, read_table, renamed
 from monitor.readers.toml_table import parse_toml
 from monitor.records import Campaign, SourceFile
 

@@ -10,10 +10,9 @@ from datetime import datetime
 from pathlib import Path
 
 from monitor.exceptions import CampaignError, Fault
-from monitor.readers import probings_file, runs_file
 from monitor.readers.axes import axes_of_machine
-from monitor.readers.campaign_parts import Head, campaign_of, read_head, read_parts
-from monitor.readers.csv_table import MOST_LINES, CsvTable
+from monitor.readers.campaign import probings_file, runs_file
+from monitor.readers.campaign.campaign_parts import Head, campaign_of, read_head, read_parts
 from monitor.readers.export import LARGEST_EXPORT, Export, ExportFile
 from monitor.readers.exports import table as plain_table
 from monitor.readers.faults import Faults, one_of, quoted
@@ -25,6 +24,7 @@ from monitor.readers.mapping.rows import TARGET, TIME, Rows, Wanted, rows_of
 from monitor.readers.mapping.stated import compare
 from monitor.readers.mapping.understood import UnderstoodFile, columns_of
 from monitor.readers.setups.file import FORMATS
+from monitor.readers.tables.csv_table import MOST_LINES, CsvTable
 from monitor.readers.toml_table import parse_toml
 from monitor.records import Campaign, Setup, SourceFile
 

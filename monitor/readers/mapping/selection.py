@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.exceptions import did_you_mean
-from monitor.readers.delimited import name_and_unit
 from monitor.readers.export import Export
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.mapping.column_source import ColumnSource
 from monitor.readers.mapping.mapping_file import Entry
+from monitor.readers.tables.delimited import name_and_unit
 
 
 def matching(export: Export, name: str) -> str | None:

@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from monitor.readers.delimited import length_of, plain_key
 from monitor.readers.export import Export, Fact
 from monitor.readers.exports.ball_bar import RADIUS_KEYS
 from monitor.readers.faults import one_of
 from monitor.readers.foreign_units import decimal_of
 from monitor.readers.mapping.mapping_file import OVERRULED, Entry
 from monitor.readers.mapping.rows import Rows, Wanted
+from monitor.readers.tables.delimited import length_of, plain_key
 
 #: Axes that move less have the same reading in all rows, in mm or degrees.
 _STILL = 1e-3

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import Fault
+from monitor.readers.campaign.probings_file import SETUP
 from monitor.readers.faults import quoted
 from monitor.readers.method_rules import MethodRules, Plan
-from monitor.readers.probings_file import SETUP
 from monitor.readers.setups.file import FORMATS, QUATERNION, ReadingFormat
 from monitor.records import Array, Setup
 from monitor.units import CONDITION_SUFFIXES

@@ -11,7 +11,7 @@ import numpy as np
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM
-from monitor.readers.chain_tables import LETTERS, unit_vector
+from monitor.readers.campaign.chain_tables import LETTERS, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.setups.agreement import DIRECTION, LENGTH, check_agreement, check_one_statement
 from monitor.readers.setups.known_key import read_known

@@ -8,7 +8,7 @@ import numpy as np
 
 from monitor.discovery import Fit, Mistake
 from monitor.discovery.machine.mistakes.cures import Maker, cured_rms
-from monitor.readers.unit_doubts import RunInUnit, off_places, runs_in_units
+from monitor.readers.doubts.unit_doubts import RunInUnit, off_places, runs_in_units
 from monitor.records import Array, Campaign
 from monitor.units import UNIT_WORDS
 

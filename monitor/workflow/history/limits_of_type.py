@@ -25,7 +25,7 @@ def limits_without_parameter(
     if machine_type == ANY_TYPE:
         return ()
     # Loaded here: most places state no tolerances by type, and have no need of the readers.
-    from monitor.readers.machine_file import TERM
+    from monitor.readers.campaign.machine_file import TERM
 
     axes = {term[3] for parameter in parameters if (term := TERM.fullmatch(parameter))}
     astray = [limit for limit in limits if (term := TERM.fullmatch(limit)) and term[3] not in axes]

@@ -8,7 +8,7 @@ from monitor.exceptions import DataError, MistakenUnitError, TooManyRowsError
 from monitor.methods.chain.parts import parts_of
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.suspects import with_suspects
-from monitor.readers.doubts import column_doubts, exchanged_columns
+from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
 
 

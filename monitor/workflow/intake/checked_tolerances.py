@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from monitor.exceptions import CampaignError, EffectError, Fault
 from monitor.readers import line_of_tolerance
-from monitor.readers.machine_file import EFFECT_SIGN, TERM, not_of_effect
+from monitor.readers.campaign.machine_file import EFFECT_SIGN, TERM, not_of_effect
 from monitor.records import Campaign
 
 if TYPE_CHECKING:

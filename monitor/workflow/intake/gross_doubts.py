@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from monitor.exceptions import MonitorError
+from monitor.readers.doubts.unit_doubts import off_places, runs_in_units
 from monitor.readers.row_places import RowPlaces
-from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign
 
 

@@ -16,13 +16,13 @@ from monitor.methods import campaign_method
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.instruments.contradiction import STATED_WITHIN
 from monitor.methods.method import Instruments
-from monitor.readers.doubts import (
+from monitor.readers.doubts.doubts import (
     AIR_RANGE,
     LARGEST_BAR_DIFFERENCE,
     bar_difference,
     implausible_temperatures,
 )
-from monitor.readers.unit_doubts import off_places, runs_in_units
+from monitor.readers.doubts.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.grounds import IN_U, SEVERAL, Ground, GroundKind
 from monitor.units import MICROMETRE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
-from monitor.readers.chain_tables import read_chain, unit_vector
+from monitor.readers.campaign.chain_tables import read_chain, unit_vector
 from monitor.readers.faults import one_of, quoted
 from monitor.readers.toml_table import Table
 from monitor.records import VOLUMETRIC, AxisSettings, ChainAxis, Machine

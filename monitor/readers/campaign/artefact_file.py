@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from monitor.readers.axes import FARTHEST_MM
+from monitor.readers.campaign.l_shape_file import read_l_shape
+from monitor.readers.campaign.self_calibration_file import read_self_calibration
 from monitor.readers.faults import one_of, quoted
-from monitor.readers.l_shape_file import read_l_shape
-from monitor.readers.self_calibration_file import read_self_calibration
 from monitor.readers.setups.agreement import SCALE, check_one_statement
 from monitor.readers.setups.known_key import read_known
 from monitor.readers.setups.scale_key import read_scale_uncertainty

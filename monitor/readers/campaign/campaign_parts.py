@@ -8,15 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from monitor.exceptions import did_you_mean
-from monitor.readers import probings_file, runs_file
-from monitor.readers.artefact_file import read_artefact, read_probe
-from monitor.readers.csv_table import CsvTable
+from monitor.readers.campaign import probings_file, runs_file
+from monitor.readers.campaign.artefact_file import read_artefact, read_probe
+from monitor.readers.campaign.machine_file import MachinePart, read_machine
 from monitor.readers.faults import Faults, one_of, quoted
-from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import method_rules
 from monitor.readers.setups.file import probe_of, read_setups
 from monitor.readers.sources_file import read_sources
+from monitor.readers.tables.csv_table import CsvTable
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Campaign, Probe, SourceFile
 from monitor.sources import Source

@@ -15,7 +15,7 @@ from itertools import combinations, permutations
 import numpy as np
 import numpy.typing as npt
 
-from monitor.readers.unit_doubts import (
+from monitor.readers.doubts.unit_doubts import (
     DISTANCE_TOLERANCE,
     TELLING_SHARE,
     ZERO_RAD,

@@ -11,9 +11,9 @@ from itertools import islice
 import numpy as np
 import numpy.typing as npt
 
-from monitor.readers.csv_table import CsvTable
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.packed_cells import CELLS_AT_ONCE
+from monitor.readers.tables.csv_table import CsvTable
+from monitor.readers.tables.packed_cells import CELLS_AT_ONCE
 
 Mask = npt.NDArray[np.bool_]
 

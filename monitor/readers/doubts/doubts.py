@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from monitor.readers.axes_doubts import mistaken_axes
-from monitor.readers.repeated_rows import repeated_rows
-from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
+from monitor.readers.doubts.axes_doubts import mistaken_axes
+from monitor.readers.doubts.repeated_rows import repeated_rows
+from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.records import Array, Campaign, Run
 from monitor.row_files import runs_in
 from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar

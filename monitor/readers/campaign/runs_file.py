@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from monitor.readers.csv_table import CsvTable, refuse_missing
-from monitor.readers.csv_values import Numbers, Wholes, numbers, wholes
+from monitor.readers.campaign.recorded_columns import recorded_columns
 from monitor.readers.faults import Faults, quoted
-from monitor.readers.recorded_columns import recorded_columns
+from monitor.readers.tables.csv_table import CsvTable, refuse_missing
+from monitor.readers.tables.csv_values import Numbers, Wholes, numbers, wholes
 from monitor.records import Run
 
 FILE = "runs.csv"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from monitor.exceptions import did_you_mean
-from monitor.readers.csv_table import CsvTable
 from monitor.readers.faults import Faults, quoted
+from monitor.readers.tables.csv_table import CsvTable
 from monitor.units import CONDITION_SUFFIXES, column_unit
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from monitor.exceptions import Fault
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.files import LARGEST_CSV, decode, read_bytes
-from monitor.readers.workbook import UNREADABLE, listed, read_sheet
+from monitor.readers.tables.workbook import UNREADABLE, listed, read_sheet
 from monitor.records import SourceFile
 
 #: Instead of NAME.csv: a workbook of that table, or one workbook with a sheet of its name for every table.

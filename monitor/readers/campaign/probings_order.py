@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from monitor.readers.csv_table import CsvTable
-from monitor.readers.csv_values import Mask, Numbers, Wholes
 from monitor.readers.faults import Faults
+from monitor.readers.tables.csv_table import CsvTable
+from monitor.readers.tables.csv_values import Mask, Numbers, Wholes
 
 
 def refuse_disorder(

@@ -10,10 +10,16 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from monitor.readers.csv_table import CsvTable
-from monitor.readers.csv_values import numbers
-from monitor.readers.curve_cells import are_dates, days_of, refuse_copies, refuse_dates, refuse_enormous
+from monitor.readers.campaign.curve_cells import (
+    are_dates,
+    days_of,
+    refuse_copies,
+    refuse_dates,
+    refuse_enormous,
+)
 from monitor.readers.faults import Faults, quoted
+from monitor.readers.tables.csv_table import CsvTable
+from monitor.readers.tables.csv_values import numbers
 from monitor.records import Array
 
 DATA = "data.csv"

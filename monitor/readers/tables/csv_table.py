@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from monitor.exceptions import closest
-from monitor.readers.cut_files import CUT, is_cut
-from monitor.readers.delimited import is_number
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import foreign_unit
-from monitor.readers.packed_cells import CELLS_AT_ONCE, PackedCells
-from monitor.readers.spreadsheet import plain_csv
+from monitor.readers.tables.cut_files import CUT, is_cut
+from monitor.readers.tables.delimited import is_number
+from monitor.readers.tables.packed_cells import CELLS_AT_ONCE, PackedCells
+from monitor.readers.tables.spreadsheet import plain_csv
 
 #: Lines at the top of a file among which the head may stand under a title.
 LOOKED_AT = 8

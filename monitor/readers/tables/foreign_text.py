@@ -5,9 +5,9 @@ from __future__ import annotations
 import codecs
 import re
 
-from monitor.readers.csv_table import LONGEST_LINE, MOST_LINES
-from monitor.readers.cut_files import CUT, is_cut
 from monitor.readers.faults import Faults
+from monitor.readers.tables.csv_table import LONGEST_LINE, MOST_LINES
+from monitor.readers.tables.cut_files import CUT, is_cut
 
 #: Control characters that no text has; tab, line ends, form feed, the end-of-file mark of DOS and the separators 0x0F
 #: and 0x14 of Q-DAS are let through.

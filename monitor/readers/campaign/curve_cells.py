@@ -8,8 +8,8 @@ from datetime import datetime
 
 import numpy as np
 
-from monitor.readers.csv_table import CsvTable
 from monitor.readers.faults import Faults, quoted
+from monitor.readers.tables.csv_table import CsvTable
 from monitor.records import Array
 
 #: No instrument shows more than this in the units of a column; powers of larger numbers leave double precision.

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.readers.axes import FARTHEST_DEG, FARTHEST_MM, Axis
-from monitor.readers.csv_table import CsvTable, refuse_missing
-from monitor.readers.csv_values import Mask, Numbers, Wholes, numbers, wholes
+from monitor.readers.campaign.probings_order import refuse_disorder
+from monitor.readers.campaign.recorded_columns import recorded_columns
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.method_rules import MethodRules
-from monitor.readers.probings_order import refuse_disorder
-from monitor.readers.recorded_columns import recorded_columns
+from monitor.readers.tables.csv_table import CsvTable, refuse_missing
+from monitor.readers.tables.csv_values import Mask, Numbers, Wholes, numbers, wholes
 from monitor.records import Probings
 
 FILE = "probings.csv"
