@@ -277,6 +277,16 @@ def test_a_temperature_of_its_own_makes_no_other_measurement(
     assert campaign_notes(db, "three") == ()
 
 
+def test_campaigns_of_short_runs_are_no_copies_of_each_other(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    for number, name in enumerate(("one", "two")):
+        short = make_campaign(name)
+        moved = {axis: values + 0.01 * number for axis, values in short.probings.readings.items()}
+        import_campaign(db, replace(short, probings=replace(short.probings, readings=moved)))
+        assert campaign_notes(db, name) == ()
+
+
 def test_campaigns_from_before_the_hashes_are_compared_too(
     db: Database, make_campaign: Callable[..., Campaign]
 ) -> None:
