@@ -59,6 +59,10 @@ class TooManyRowsError(DataError):
     """Rows that need more memory at once than there is: no mistake of the readings is to be looked for."""
 
 
+class TooFewReadingsError(DataError):
+    """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for."""
+
+
 class NotConvergedError(DataError):
     """An adjustment that found no minimum: the readings contradict the file that describes the machine."""
 

@@ -55,3 +55,9 @@ def quoted(value: object) -> str:
 def one_of(names: Iterable[str]) -> str:
     """Return names in a row, for the end of a message."""
     return ", ".join(names) or "none"
+
+
+def and_of(names: Iterable[str]) -> str:
+    """Return names with commas, the last two joined by ``and``."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last

@@ -130,6 +130,18 @@ def test_radians_of_a_robot(altered: Callable[..., Path]) -> None:
     assert "j1_deg, j2_deg, j3_deg, j4_deg, j5_deg and j6_deg never exceed" in told
 
 
+def test_an_angle_that_begins_anew_at_180_degrees(altered: Callable[..., Path]) -> None:
+    """A log of a mount prints -177.9 for 182.1: another way that the axis turned, and another answer."""
+    (told,) = of(altered("mount-gem-28", {"dec_deg": lambda angle: angle - 360.0 * (angle > 180.0)}))
+    assert "dec_deg goes from 178.694 to -179.616" in told
+    assert "if the axis went on past 180 there, its angles span 206.3 degrees and not 359.7" in told
+    assert "add 360 to those below -12.09" in told
+
+
+def test_an_axis_that_turned_to_and_fro_over_a_turn_did_not_begin_anew(altered: Callable[..., Path]) -> None:
+    assert of(altered("mount-gem-28", {"ha_deg": lambda angle: 2.0 * angle - 180.0})) == ()
+
+
 def test_a_tracker_in_metres(altered: Callable[..., Path]) -> None:
     (told,) = of(altered("tracked-robot", dict.fromkeys([f"tracker_{k}_mm" for k in "xyz"], metres)))
     assert "tracker_x_mm, tracker_y_mm and tracker_z_mm span" in told

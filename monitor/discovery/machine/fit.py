@@ -13,7 +13,7 @@ from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign
 from monitor.discovery.machine.noise.plan_cells import plan_cells
 from monitor.discovery.machine.noise.rows import neighbours_of
 from monitor.effects import Basis, Effect
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, TooFewReadingsError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
 from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
 from monitor.methods.chain.problem import ChainProblem, solve_problem
@@ -178,7 +178,15 @@ class Fit:
 
     @property
     def scale(self) -> float:
-        """Residual standard deviation as a multiple of the stated standard uncertainty."""
+        """Residual standard deviation as a multiple of the stated standard uncertainty.
+
+        Raises TooFewReadingsError where the model takes as many numbers as there are.
+        """
+        if self.degrees_of_freedom < 1:
+            raise TooFewReadingsError(
+                f"the model takes as many unknowns from the {self.readings} readings as they determine: nothing is "
+                "left over to judge it by; measure more poses"
+            )
         return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, TooFewReadingsError
 from monitor.machine import Chain
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.free_form.assembly import NAME, problem_of
@@ -64,7 +64,7 @@ def _refuse_too_little(problem: FreeFormProblem) -> None:
         readings, unknowns = int(rows.sum()), points + tables + 1 + 3 * len(degrees)
         name = problem.plane.table.name
         if readings <= unknowns:
-            raise DataError(
+            raise TooFewReadingsError(
                 f"run {run}: {points} points at {len(degrees)} angles of {name} give {readings} readings for "
                 f"{unknowns} unknowns (Eq. 6); probe at more angles, or choose fewer nodes"
             )

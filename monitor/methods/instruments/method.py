@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.exceptions import DataError
+from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Chain
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
@@ -39,13 +39,13 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """DataError where a run has fewer numbers than unknowns: what nothing was read of is no number."""
+    """TooFewReadingsError where a run has fewer numbers than unknowns: what nothing was read of is no number."""
     for run in problem.runs:
         rows = problem.context.run == run
         numbers = int(np.isfinite(problem.sigma[rows]).sum()) + len(problem.extra_names)
         unknowns = len(problem.local_names)
         if numbers < unknowns:
-            raise DataError(
+            raise TooFewReadingsError(
                 f"run {run} of campaign {campaign.name} has {numbers} readings for {unknowns} unknowns; "
                 "measure more poses"
             )

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.effects import ChainEffect, context_of
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, TooFewReadingsError
 from monitor.machine import refuse_untouchable
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.chain.problem import ChainProblem
@@ -117,12 +117,12 @@ def _gains(problem: ChainProblem) -> set[str]:
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """DataError where a run has fewer readings than its unknowns need."""
+    """TooFewReadingsError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
         readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
         unknowns = unknowns_of_run(problem, run)
         if readings < unknowns:
-            raise DataError(
+            raise TooFewReadingsError(
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "probe more balls or indexations"
             )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.exceptions import DataError
+from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.identification import AsStated
@@ -41,12 +41,12 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """DataError where a run has fewer readings than its unknowns need."""
+    """TooFewReadingsError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
         readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
         unknowns = unknowns_of_run(problem, run)
         if readings < unknowns:
-            raise DataError(
+            raise TooFewReadingsError(
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "measure more poses"
             )

@@ -13,19 +13,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
+from monitor.readers.faults import and_of
 from monitor.records import Array, Campaign, Run
 from monitor.row_files import runs_in
-from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar
+from monitor.units import MICROMETRE, UNIT_WORDS, nearness_to_bar
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
 SHORTEST_TRAVEL = 5.0
-#: A full turn in radians, with room for the last printed digit.
-FULL_TURN = 6.3
-#: People index at multiples of 5 degrees; radians of three decimals come back to them within 0.03 degrees.
-INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
 #: Standard uncertainties of length standards: a millionth of the length is good, a thousandth is no calibration.
 LARGEST_SHARE = 1e-3
 #: mm between the calibrated length of a bar and the declared distance of its balls. They are places on one artefact,
@@ -53,7 +51,8 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
         for check in (
             _short_runs,
             _travel,
-            _angles,
+            radians,
+            angles_begun_anew,
             _places,
             exchanged_columns,
             _units_of_runs,
@@ -72,7 +71,7 @@ def column_doubts(campaign: Campaign) -> tuple[str, ...]:
     """The sentences on columns exchanged, of the other sign or in another unit, each of which refutes a fit."""
     return tuple(
         sentence
-        for check in (_travel, _angles, _places, exchanged_columns, _units_of_runs)
+        for check in (_travel, radians, _places, exchanged_columns, _units_of_runs)
         for sentence in check(campaign)
     )
 
@@ -113,33 +112,7 @@ def _travel(campaign: Campaign) -> Iterator[str]:
         largest = max(spans.values(), default=0.0)
         if 0.0 < largest < SHORTEST_TRAVEL:
             yield (
-                f"{_and(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
-            )
-
-
-def _angles(campaign: Campaign) -> Iterator[str]:
-    """Radians in columns of degrees."""
-    turning = {
-        axis: np.unique(values / DEGREE.factor)
-        for axis, values in campaign.probings.readings.items()
-        if not campaign.machine.is_linear(axis)
-    }
-    moving = {axis: values for axis, values in turning.items() if len(values) > 1}
-    largest = {axis: float(np.abs(values).max()) for axis, values in moving.items()}
-    if len(moving) > 2 and max(largest.values()) <= FULL_TURN:
-        columns = _and([f"{axis.lower()}_deg" for axis in moving])
-        yield f"{columns} never exceed {max(largest.values()):.3g}: is the unit degree? Radians look like this"
-        return
-    for axis, values in moving.items():
-        used = values[np.abs(values) > 1e-9]
-        as_degrees = used / DEGREE.factor
-        off_index = np.abs(as_degrees - INDEX_DEG * np.round(as_degrees / INDEX_DEG))
-        off_grid = np.abs(used - np.round(used, 2))
-        if largest[axis] <= FULL_TURN and np.all(off_index < INDEX_TOLERANCE_DEG) and np.any(off_grid > 1e-4):
-            shown = used[int(np.argmax(np.abs(used)))]
-            yield (
-                f"{axis.lower()}_deg never exceeds {largest[axis]:.4g}, and taken as radians its values are round "
-                f"angles ({shown:.6g} rad are {shown / DEGREE.factor:.0f}°): is the unit degree?"
+                f"{and_of(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
             )
 
 
@@ -158,7 +131,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
             "the names of the targets and the units"
         )
         return
-    columns = _and([f"{axis.lower()}_mm" for axis in off.axes])
+    columns = and_of([f"{axis.lower()}_mm" for axis in off.axes])
     yield (
         f"{head}: it looks as if {columns} {'were' if len(off.axes) > 1 else 'was'} {UNIT_WORDS[off.unit]}"
         + (", or the declared places in another unit than mm" if len(off.axes) > 1 else "")
@@ -170,7 +143,7 @@ def exchanged_columns(campaign: Campaign) -> Iterator[str]:
     mistaken = mistaken_axes(campaign)
     if mistaken is None:
         return
-    columns = _and([f"{axis.lower()}_mm" for axis in mistaken.axes])
+    columns = and_of([f"{axis.lower()}_mm" for axis in mistaken.axes])
     yield (
         f"at the pose with all rotary axes at zero the {mistaken.count} steps between {mistaken.noun} "
         f"{mistaken.holds} only with "
@@ -187,7 +160,7 @@ def _units_of_runs(campaign: Campaign) -> Iterator[str]:
     """Single runs in another unit than the others."""
     for odd in runs_in_units(campaign):
         yield (
-            f"run {odd.run}: {_and(list(odd.columns))} {'span' if len(odd.columns) > 1 else 'spans'} {odd.ratio:.4g} "
+            f"run {odd.run}: {and_of(list(odd.columns))} {'span' if len(odd.columns) > 1 else 'spans'} {odd.ratio:.4g} "
             f"times the span in the other runs, as if {'they were' if len(odd.columns) > 1 else 'it was'} "
             f"{UNIT_WORDS[odd.unit]} there; lengths are in mm"
         )
@@ -316,8 +289,3 @@ def bar_difference(campaign: Campaign) -> float | None:
         return None
     first, second = (np.array(balls[name].nominal) for name in bar.balls)
     return bar.length - float(np.linalg.norm(first - second))
-
-
-def _and(names: Iterator[str] | list[str] | dict[str, float]) -> str:
-    listed = list(names)
-    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from monitor.exceptions import DataError, MistakenUnitError, TooManyRowsError
+from monitor.exceptions import DataError, MistakenUnitError, TooFewReadingsError, TooManyRowsError
 from monitor.methods.chain.parts import parts_of
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.suspects import with_suspects
@@ -16,7 +16,7 @@ def refusal_of(
     refusal: DataError, campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
 ) -> DataError:
     """The refusal of a fit in the words of ``identify``: what is suspected, and the mistake of the file behind it."""
-    if isinstance(refusal, TooManyRowsError):
+    if isinstance(refusal, TooFewReadingsError | TooManyRowsError):
         return refusal
     try:
         problem = problem_of(campaign)
@@ -34,7 +34,7 @@ def with_mistake(
     which takes up to half a minute; where none does, what else the import noticed of the columns is said. Where the
     refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
-    if isinstance(refusal, MistakenUnitError | TooManyRowsError):
+    if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
         return refusal
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:

@@ -20,8 +20,9 @@ from monitor.discovery.machine.suspects.anomalies import BadPoint
 NEAR_PART = 0.01
 # Two points are off alike where they differ by less than this part of the one.
 PART_ALIKE = 0.5
-# More of all rows than this, which nothing checks, are an error that the model lacks rather than mistakes.
-MOST_UNCHECKED = 0.01
+# More of all rows than this, and at least so many, which nothing checks, are an error that the model lacks rather than
+# mistakes: one or two readings go wrong in the shortest campaign.
+MOST_UNCHECKED, FEWEST_UNCHECKED = 0.01, 3
 
 
 def _fellows(fit: Fit, row: int) -> npt.NDArray[np.int64]:
@@ -65,4 +66,4 @@ def recurring(fit: Fit, points: Sequence[BadPoint]) -> frozenset[int]:
 def are_unchecked(fit: Fit, points: Sequence[BadPoint]) -> bool:
     """Whether more of the points than mistakes account for lie where no other run read."""
     rows = [row for point in points for row in point.all_rows if not len(_fellows(fit, point.row))]
-    return len(rows) > MOST_UNCHECKED * len(fit.problem.context)
+    return len(rows) >= FEWEST_UNCHECKED and len(rows) > MOST_UNCHECKED * len(fit.problem.context)
