@@ -75,9 +75,9 @@ def p_value_by_flips(
         return 1.0
     ends = np.searchsorted(run, np.arange(runs + 1))
     overlap = pool.overlap(beside)
-    scores = np.empty((len(pool.rows), runs))
+    scores = np.empty((len(pool.lengths), runs))
     for index, (start, end) in enumerate(pairwise(ends)):
-        scores[:, index] = pool.rows[:, start:end] @ residual[start:end]
+        scores[:, index] = pool.products(residual[start:end], slice(start, end))
         scores[:, index] -= overlap @ (basis[start:end].T @ residual[start:end])
     flips = signs(runs)
     flipped = (scores / pool.lengths[:, None]) @ flips
