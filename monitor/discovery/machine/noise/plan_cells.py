@@ -65,8 +65,8 @@ def plan_cells(problem: ChainProblem) -> npt.NDArray[np.int64]:
     context = problem.context
     angles = np.round(context.positions[:, _posed(problem)], 6) + 0.0
     target = np.unique(context.target, return_inverse=True)[1]
-    place = _numbered(np.column_stack([target, angles]))
-    return _numbered(np.column_stack([place, _occurrences(np.column_stack([context.run, place]))]))
+    touch = _numbered(np.column_stack([target, angles]))
+    return _numbered(np.column_stack([touch, _occurrences(np.column_stack([context.run, touch]))]))
 
 
 def _numbered(rows: Array) -> npt.NDArray[np.int64]:
