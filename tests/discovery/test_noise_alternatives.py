@@ -14,8 +14,9 @@ from monitor.discovery.machine.evidence.noise_doubt import (
     SMALLEST_WEIGHT,
     NoiseDoubt,
 )
-from monitor.discovery.machine.noise.correlation import GRID, Correlation, NoiseDesign, Whitening
+from monitor.discovery.machine.noise.correlation import GRID, Correlation, NoiseDesign
 from monitor.discovery.machine.noise.rows import Rows
+from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.discovery.machine.rounds import ChainSearch
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of

@@ -10,7 +10,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
 from monitor.discovery.machine.joints.robot_search import (
     MOST_EFFECTS as MOST_BESIDE_CURVES,
@@ -239,9 +238,6 @@ def most_cautious(
 
 
 def correlation_under(under: Fit, shared: bool = False) -> Correlation | None:
-    """The correlation of neighbours under a model, of what runs do not share or of all of it; None where readings share
-    their poses and are counted by these."""
-    if poses_of_rows(under) is not None:
-        return None
+    """The correlation of neighbours under a model, of what runs do not share or of all of it."""
     design = under.whole_noise_design if shared else under.noise_design
     return design.correlation(under.solution.last.residual)
