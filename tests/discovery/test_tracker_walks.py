@@ -16,6 +16,7 @@ from monitor.discovery import Fit, fit
 from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.noise.rows import WITHIN_A_POSE, Rows, from_pose_to_pose
 from monitor.discovery.machine.noise.whitening import Whitening
+from monitor.discovery.machine.rounds import correlation_under
 from monitor.methods.tracker.method import METHOD
 from monitor.readers import read_campaign
 from tests.simulator import robot_campaign as robots
@@ -27,10 +28,11 @@ def trial() -> ModuleType:
     return load("trial_tracker_walks", path)
 
 
-def robot_fit(folder: Path, trial: ModuleType, step_um: float, seed: int = 3) -> Fit:
-    """Two runs of 35 poses each, of poses of their own, by a tracker that walks so far from row to row."""
-    rng = np.random.default_rng(seed)
-    track = robots.track(rng, poses=70, fixed_every=10, noise_um=0.0)
+def robot_fit(folder: Path, trial: ModuleType, step_um: float, rest_urad: float = 0.0) -> Fit:
+    """Two runs of 35 poses each, of poses of their own, by a tracker that walks so far from row to row; joints come to
+    rest within ``rest_urad``."""
+    rng = np.random.default_rng(3)
+    track = robots.track(rng, poses=70, fixed_every=10, noise_um=0.0, repeatability_urad=rest_urad)
     count = len(track.points)
     seen = track.points + trial.NOISE_MM * rng.normal(size=(count, 3))
     seen += np.cumsum(1e-3 * step_um * rng.normal(size=(count, 3)), axis=0)
@@ -49,7 +51,16 @@ def test_a_walk_is_estimated_where_no_pose_comes_twice(tmp_path: Path, trial: Mo
     gained = 2.0 * correlation.share * (1.0 - correlation.rho) / (1.0 - correlation.share)
     expected = 3.2 * (2.0 / 16.0) ** 2
     assert expected / 3.0 < gained < 3.0 * expected
-    assert walked.with_correlation(correlation).white.shape == walked.white.shape
+    assert correlation_under(walked) == correlation
+
+
+def test_how_joints_come_to_rest_is_no_walk(tmp_path: Path, trial: ModuleType) -> None:
+    """What the readings of a pose share and the next pose does not is left to the poses."""
+    rests = robot_fit(tmp_path, trial, 0.0, rest_urad=40.0)
+    correlation = rests.correlation()
+    assert correlation is not None
+    assert correlation.share > 0.3
+    assert correlation_under(rests) is None
 
 
 def test_white_noise_of_a_robot_stays_white(tmp_path: Path, trial: ModuleType) -> None:

@@ -87,8 +87,8 @@ class Whitening:
 
 
 def _followed(retained: Array, columns: Array, taken: Array) -> Array:
-    """States (k, M) that keep the parts ``retained`` (M - 1,) of what was before and take the parts ``taken`` (M - 1,) of
-    what stands before in columns (k, M)."""
+    """States (k, M) that keep the parts ``retained`` (M - 1,) of what was before, and take the parts ``taken`` (M - 1,)
+    of what stands before in columns (k, M)."""
     entered = np.zeros_like(columns)
     np.multiply(columns[:, :-1], taken, out=entered[:, 1:])
     # With no column at all the wrapper of LAPACK writes outside of it.
