@@ -218,12 +218,13 @@ class Contrast:
 
 @dataclass(frozen=True)
 class SetupScatter:
-    """The readings of a ``setup``, fitted by themselves, scatter ``times`` what it states; chance alone leaves ``p`` as
-    little."""
+    """The readings of a ``setup``, fitted by themselves, scatter ``times`` what it states, by so many ``numbers`` more
+    than unknowns; chance alone leaves ``p`` as little."""
 
     setup: str
     times: float
     p: float
+    numbers: float
 
 
 @dataclass(frozen=True)
@@ -246,11 +247,13 @@ class SetupDrift:
 @dataclass(frozen=True)
 class Instruments(Able):
     """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``contrasts`` what
-    each setup says against all others, ``scatters`` what its readings scatter, ``drifts`` which setups run off with the
-    time, ``misread`` which ones read something else than they are set up for, without a fit."""
+    each setup says against all others and ``contrast`` what one of them does, by its name, ``scatters`` what its
+    readings scatter, ``drifts`` which setups run off with the time, ``misread`` which ones read something else than
+    they are set up for, without a fit."""
 
     shares: SharesOf
     contrasts: Callable[[ChainProblem, Solution, int], tuple[Contrast, ...]]
+    contrast: Callable[[ChainProblem, Solution, int, str], Contrast | None]
     scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]
     misread: Callable[[ChainProblem], tuple[str, ...]]

@@ -15,8 +15,9 @@ from by_path import load
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
-from monitor.discovery.machine.noise.correlation import Correlation, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, Filters
 from monitor.discovery.machine.noise.rows import Rows
+from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.evidence import Pool, weigh_beside
@@ -39,10 +40,11 @@ def test_the_filter_is_the_inverse_of_the_triangle_of_cholesky():
     covariance = 0.6 * 0.8**lag + 0.4 * np.eye(9)
     inside = np.ix_(weighted[0], weighted[0])
     expected = np.linalg.inv(np.linalg.cholesky(covariance[inside]))
-    triangle, determinant = Whitening(Rows(weighted, 1, None), correlation).factors
-    np.testing.assert_allclose(triangle[0][inside], expected, atol=1e-12)
-    assert not triangle[0][4].any()
-    assert determinant[0] == pytest.approx(np.linalg.slogdet(covariance[inside])[1])
+    triangle = Whitening(Rows(weighted, 1, None), correlation)(np.eye(9)[:, None])[:, 0].T
+    np.testing.assert_allclose(triangle[inside], expected, atol=1e-12)
+    assert not triangle[4].any()
+    logarithm = Filters((correlation,), weighted).logarithm(1)
+    assert logarithm[0, 0] == pytest.approx(np.linalg.slogdet(covariance[inside])[1])
 
 
 def test_touches_follow_those_of_their_own_direction():
@@ -69,7 +71,8 @@ def test_touches_follow_those_of_their_own_direction():
     whitening = Whitening(rows, correlation)
     filtered = np.array([whitening(unit[None])[0] for unit in np.eye(14)]).T
     np.testing.assert_allclose(filtered @ covariance @ filtered.T, np.eye(14), atol=1e-12)
-    assert whitening.factors[1][0] == pytest.approx(np.linalg.slogdet(covariance)[1])
+    filters = Filters((correlation,), rows.weighted, rows.begins, rows.steps)
+    assert filters.logarithm(1)[0, 0] == pytest.approx(np.linalg.slogdet(covariance)[1])
     numbers = rng.normal(size=(1, 14))
     np.testing.assert_allclose(whitening.undone(whitening(numbers)), numbers, atol=1e-12)
 

@@ -14,8 +14,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.noise.correlation import Correlation, Filters, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, Filters
 from monitor.discovery.machine.noise.rows import Rows, rows_of
+from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign
@@ -79,17 +80,20 @@ def test_readings_resemble_those_of_their_own_setup_alone() -> None:
     begins = np.zeros((1, 9), dtype=bool)
     begins[0, [0, 5]] = True
     weighted = np.ones((1, 9), dtype=bool)
-    whole, logarithm = Whitening(Rows(weighted, 1, None, begins, np.ones((1, 9))), correlation).factors
-    first, of_first = Whitening(Rows(weighted[:, :5], 1, None), correlation).factors
-    second, of_second = Whitening(Rows(weighted[:, 5:], 1, None), correlation).factors
-    np.testing.assert_allclose(whole[0, :5, :5], first[0], atol=1e-14)
-    np.testing.assert_allclose(whole[0, 5:, 5:], second[0], atol=1e-14)
-    assert not whole[0, 5:, :5].any()
-    assert logarithm[0] == pytest.approx(of_first[0] + of_second[0])
+
+    def triangle(rows: Rows) -> np.ndarray:
+        return Whitening(rows, correlation)(np.eye(rows.count)[:, None])[:, 0].T
+
+    whole = triangle(Rows(weighted, 1, None, begins, np.ones((1, 9))))
+    np.testing.assert_allclose(whole[:5, :5], triangle(Rows(weighted[:, :5], 1, None)), atol=1e-14)
+    np.testing.assert_allclose(whole[5:, 5:], triangle(Rows(weighted[:, 5:], 1, None)), atol=1e-14)
+    assert not whole[5:, :5].any()
     filters = Filters((correlation,), weighted, begins)
+    apart = (Filters((correlation,), weighted[:, part]) for part in (slice(5), slice(5, None)))
+    assert filters.logarithm(1)[0] == pytest.approx(sum(each.logarithm(1)[0] for each in apart))
     numbers = np.random.default_rng(1).normal(size=(1, 9, 2))
     back = filters.apply_transposed(numbers[None])[0, 0]
-    np.testing.assert_allclose(back, whole[0].T @ numbers[0], atol=1e-12)
+    np.testing.assert_allclose(back, whole.T @ numbers[0], atol=1e-12)
 
 
 def test_rows_with_fewer_numbers_keep_their_weight_beside_correlated_noise(empty: Campaign) -> None:

@@ -14,8 +14,9 @@ from monitor.discovery.machine.evidence.noise_doubt import (
     SMALLEST_WEIGHT,
     NoiseDoubt,
 )
-from monitor.discovery.machine.noise.correlation import GRID, Correlation, NoiseDesign, Whitening
+from monitor.discovery.machine.noise.correlation import GRID, Correlation, NoiseDesign
 from monitor.discovery.machine.noise.rows import Rows
+from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.discovery.machine.rounds import ChainSearch
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
@@ -215,11 +216,12 @@ def test_more_effects_have_to_be_likelier_by_the_odds_of_the_rate(
 ):
     """Whichever of the two searches finds them."""
     rounds = {
-        None: SimpleNamespace(refined=white, families=frozenset(white), cost=0.0),
+        None: SimpleNamespace(refined=white, effects=white, families=frozenset(white), cost=0.0),
         SLOW: SimpleNamespace(refined=walking, families=frozenset(walking), cost=-cheaper),
     }
     module = "monitor.discovery.machine.rounds"
     monkeypatch.setattr(f"{module}.correlation_under", lambda first, shared: SLOW)
+    monkeypatch.setattr(f"{module}.poses_of_rows", lambda first: None)
     monkeypatch.setattr(f"{module}.replace", lambda latest, limits: latest)
     monkeypatch.setattr(ChainSearch, "_settled", lambda search, first, beside, noise: (rounds[noise], True))
     monkeypatch.setattr(ChainSearch, "_cost", lambda search, first, latest: latest.cost)

@@ -35,11 +35,9 @@ def named(folder: Path, seed: int, moved: str) -> list[str]:
 
 
 def test_a_tracker_that_walks_is_no_drift_of_the_robot(tmp_path: Path) -> None:
-    """Seed 8 was told EX0J1@warmup when three of twenty such robots were."""
+    """Seed 8 was told EX0J1@warmup when three of twenty such robots were, then a drift of the tracker; it is noise."""
     for seed in (8, 14):
-        effects = named(tmp_path, seed, "tracker")
-        assert effects
-        assert all(effect.startswith("tracker:") for effect in effects)
+        assert named(tmp_path, seed, "tracker") == []
 
 
 def test_a_base_that_drifts_beside_resting_reflectors_is_no_drift_of_the_tracker(tmp_path: Path) -> None:

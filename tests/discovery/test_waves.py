@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from by_path import simulator
+
+from monitor.discovery import fit
+from monitor.discovery.machine.missing import standing_out
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.search.amplitudes import amplitudes, length_of
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.scan import ScanResult, findings_of
+from monitor.effects import parse_effect
+from monitor.methods.samba.method import problem_of
 
 
 def test_a_fifth_wave_is_told_as_one_with_its_size(virtual_campaigns, explained):
@@ -35,3 +45,41 @@ def test_a_wave_beside_a_play_that_builds_up_is_told_by_its_name(virtual_campaig
         named = [effect.effect for effect in explained(campaign).missing]
         assert "ECC:harmonic2" in named
         assert all(name.startswith("ECC:") for name in named)
+
+
+# Seeds of which `explain` told nothing, `ECB:harmonic3`, nothing and `ECB:free(7)`.
+LOST_WAVES = (2712, 2713, 2717, 1202)
+
+
+def eighth_harmonic(virtual_campaigns, seed):
+    hidden = simulator().Effect("ECC:curve", peak_um=3.0, curve=lambda q, t, now: np.cos(8.0 * q + 0.4))
+    return virtual_campaigns.virtual(seed, [hidden], days=2)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", LOST_WAVES)
+def test_a_slight_wave_of_many_periods_is_told(virtual_campaigns, explained, seed):
+    """What stood in its way: a size that is uncertain though the wave is not, a wave of another axis that the catalogue
+    has, and, of all things, that all poses together show lack of fit."""
+    (missing,) = explained(eighth_harmonic(virtual_campaigns, seed)).missing
+    assert missing.effect == "ECC:harmonic8"
+    assert missing.held_out_after < missing.held_out_before
+    assert missing.held_out_poses_after < missing.held_out_poses_before
+
+
+def test_a_wave_that_is_found_alone_may_have_a_size_that_is_uncertain(virtual_campaigns):
+    """Cosine and sine are certain together (F by dense least squares); the plan sees one of them badly."""
+    fitted = fit(problem_of(eighth_harmonic(virtual_campaigns, 2712)).for_search())
+    wave = Variant("ECC:harmonic8", parse_effect("ECC:harmonic8", fitted.problem.context.chain))
+    scene = scene_of(fitted, [wave])
+    (candidate,) = scene.candidates
+    sizes = amplitudes(scene, [candidate])
+    length, u = length_of(sizes.estimate, sizes.covariance)
+    assert length < 2.0 * u
+    estimate, rest, *_ = np.linalg.lstsq(candidate.columns, scene.residual, rcond=None)
+    freedom = scene.degrees_of_freedom - 2
+    explained = float(scene.residual @ scene.residual - rest[0])
+    assert scipy.stats.f.sf(explained / 2.0 / (rest[0] / freedom), 2, freedom) < 1e-4
+    assert np.allclose(-estimate, sizes.estimate)
+    result = ScanResult(findings_of(scene, [candidate]))
+    assert standing_out(scene, result).candidates == [candidate]

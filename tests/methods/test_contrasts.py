@@ -11,7 +11,7 @@ import scipy
 
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.instruments.contrasts import contrasts, contrasts_of, scatters
+from monitor.methods.instruments.contrasts import contrast, contrasts, contrasts_of, scatters
 from monitor.methods.instruments.run_rows import RunRows, run_rows
 from monitor.methods.method import Contrast, ContrastKind
 from monitor.readers import read_campaign
@@ -66,6 +66,18 @@ def test_chow_1960_the_joint_fit_leaves_more_than_two_fits(rows: RunRows) -> Non
     assert contrast.size**2 * contrast.directions == pytest.approx(square, rel=1e-6)
     assert contrast.freedom == np.inf
     assert contrast.p == pytest.approx(scipy.stats.chi2.sf(square, contrast.directions), rel=1e-6)
+
+
+def test_what_one_says_alone_is_what_it_says_among_all(tmp_path: Path) -> None:
+    rng = np.random.default_rng(63)
+    campaign = read_campaign(centre.campaign(tmp_path / "shop", rng, centre.truth_of(rng)))
+    problem = campaign_method(campaign).problem_of(campaign)
+    solution = solve_problem(problem)
+    every = contrasts(problem, solution, 1)
+    assert len(every) > 3
+    for each in every:
+        assert contrast(problem, solution, 1, each.name) == replace(each, others_left=None, others_p=None)
+    assert contrast(problem, solution, 1, "no such setup") is None
 
 
 def _drawn(rows: RunRows, rng: np.random.Generator, times: float, of: str) -> RunRows:

@@ -9,13 +9,15 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign
 from monitor.discovery.machine.noise.plan_cells import plan_cells
-from monitor.discovery.machine.noise.rows import neighbours_of
+from monitor.discovery.machine.noise.rows import Rows, from_pose_to_pose, neighbours_of
+from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError, TooFewReadingsError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
 from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
+from monitor.methods.chain.poses import shared_poses
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Array
 
@@ -121,6 +123,14 @@ class Fit:
         sigma = self.problem.padded(np.where(self.has_weight, self.problem.sigma, 0.0)[:, :, None])[..., 0]
         return float(np.sqrt(np.sum((numbers[:, : sigma.shape[1]] * sigma) ** 2) / self.readings))
 
+    @cached_property
+    def rows(self) -> Rows:
+        """How the whitened numbers follow each other: reading by reading, or where several are read at a pose from pose
+        to pose, of which one part of the noise is common to all of them."""
+        rows = neighbours_of(self.problem, self.by_error)
+        pose = shared_poses(self.problem, self.solution)
+        return rows if pose is None else from_pose_to_pose(rows, pose)
+
     def correlation(self) -> Correlation | None:
         """The correlation of neighbours that the residuals show; None where they show none.
 
@@ -130,16 +140,19 @@ class Fit:
 
     @cached_property
     def noise_design(self) -> NoiseDesign:
-        """What the estimate of that correlation needs besides the residuals."""
-        return self._noise_design(shared=len(self.problem.runs) == 1)
+        """What the estimate of that correlation needs besides the residuals; runs of which each has poses of its own
+        share nothing that would not be noise."""
+        cells = plan_cells(self.problem)
+        repeated = np.bincount(cells)[cells] > 1
+        return self._noise_design(shared=2 * int(repeated.sum()) < len(cells))
 
     @cached_property
     def whole_noise_design(self) -> NoiseDesign:
         """The same where what all runs share is noise too, as of one run."""
-        return self._noise_design(shared=True) if len(self.problem.runs) > 1 else self.noise_design
+        return self.noise_design if self.noise_design.shared else self._noise_design(shared=True)
 
     def _noise_design(self, shared: bool) -> NoiseDesign:
-        rows = neighbours_of(self.problem, self.by_error)
+        rows = self.rows
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )
@@ -152,8 +165,7 @@ class Fit:
         """The fit with the noise of neighbours correlated as said."""
         if correlation is None:
             return replace(self, whitening=None)
-        rows = neighbours_of(self.problem, self.by_error)
-        return replace(self, whitening=Whitening(rows, correlation))
+        return replace(self, whitening=Whitening(self.rows, correlation))
 
     @cached_property
     def degrees_of_freedom(self) -> int:

@@ -147,11 +147,12 @@ def _parts(candidates: Sequence[ChainCandidate]) -> Iterator[slice]:
 
 
 def standing_out(scene: ChainScene, result: ChainScan) -> ChainScan:
-    """The findings whose size, fitted together with the others, exceeds its standard uncertainty by a factor of two.
+    """The findings whose size, fitted together with others, exceeds its standard uncertainty by a factor of two.
 
     Two effects that can hardly be separated may each stand the scan and be fitted with sizes that cancel, within their
     uncertainty or hundreds of times as large as what they take away; the weaker one is taken out, and the other's size
-    is determined again.
+    is determined again. Nothing cancels a finding that is alone: a cosine and a sine of which the plan sees one badly
+    are certain together where the length of both is not.
     """
     return reduced(result, lambda findings: _too_small(scene, findings))
 
@@ -164,7 +165,7 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
     for index, part in enumerate(_parts(candidates)):
         # Of what differs from run to run the sizes, not their spread: two runs say little of that of all runs.
         size, u = length_of(sizes.estimate[part], sizes.covariance[part, part])
-        is_small = u > 0 and abs(size) / u < SMALLEST_RATIO
+        is_small = len(findings) > 1 and u > 0 and abs(size) / u < SMALLEST_RATIO
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
         peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
         cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)

@@ -20,6 +20,9 @@ from monitor.records import Array
 
 #: A unit of a coefficient (1 mm, 1 rad) that moves the tip by less than this, in mm, is a sine of 180 degrees.
 ROUNDING = 1e-9
+#: Effects of an error whose columns are made together: thousands of pitches of a long axis would stand in memory three
+#: times, and in no cache.
+AT_ONCE = 100
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,14 @@ def columns_of(fit: Fit, bases: Sequence[Basis]) -> list[EffectColumns]:
 
 
 def _of_one_term(bases: Sequence[Basis]) -> Iterator[list[int]]:
-    """The effects that share what the machine does with their error, by their places in the list; others alone."""
+    """The effects that share what the machine does with their error, by their places in the list, so many at once;
+    others alone."""
     terms: dict[object, list[int]] = {}
     for index, basis in enumerate(bases):
         terms.setdefault(basis.term if isinstance(basis, ChainBasis) else index, []).append(index)
-    yield from terms.values()
+    for members in terms.values():
+        for start in range(0, len(members), AT_ONCE):
+            yield members[start : start + AT_ONCE]
 
 
 def _block(layout: _Layout, bases: Mapping[int, Basis]) -> dict[int, EffectColumns]:

@@ -20,6 +20,7 @@ from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.remainder import Remainder
 from monitor.discovery.search.scene import CandidateT, Scene
+from monitor.discovery.search.together import together
 from monitor.records import Array
 
 # A direction of which the selected effects leave less than this part (squared) has nothing to say.
@@ -68,9 +69,18 @@ class Pool(Generic[CandidateT]):
     _products: dict[int, tuple[object, Array]] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
+    def blocks(self) -> tuple[Array, ...]:
+        """All columns in blocks (k, M), one row each, of which few are copies."""
+        return together([candidate.columns.T for candidate in self.candidates])
+
+    @cached_property
     def rows(self) -> Array:
         """All columns (K, M), one row each."""
-        return np.concatenate([candidate.columns.T for candidate in self.candidates])
+        return np.concatenate(self.blocks)
+
+    def products(self, columns: Array, numbers: slice = slice(None)) -> Array:
+        """The products (K, ...) of some ``numbers`` of all columns with those of others (m, ...)."""
+        return np.concatenate([block[:, numbers] @ columns for block in self.blocks])
 
     def overlap(self, beside: Remainder) -> Array:
         """The products (K, r) of all columns with the basis of what selected effects span."""
@@ -86,10 +96,10 @@ class Pool(Generic[CandidateT]):
         """The products of all columns with those of an owner."""
         product = self._products.get(id(owner))
         if product is None:
-            if len(self._products) * len(self.rows) > MOST_PRODUCTS:
+            if len(self._products) * len(self.lengths) > MOST_PRODUCTS:
                 self._products.clear()
             # The owner is kept too: an identity is only that of an object that exists.
-            product = self._products[id(owner)] = owner, self.rows @ columns
+            product = self._products[id(owner)] = owner, self.products(columns)
         return product[1]
 
     @cached_property
@@ -105,19 +115,18 @@ class Pool(Generic[CandidateT]):
     @cached_property
     def lengths(self) -> Array:
         """Length (K,) of every column; 1 where there is nothing."""
-        length = np.sqrt(np.einsum("km,km->k", self.rows, self.rows))
+        length = np.sqrt(np.concatenate([np.einsum("km,km->k", block, block) for block in self.blocks]))
         return np.where(length == 0, 1.0, length)
 
     @cached_property
     def grams(self) -> dict[int, Array]:
         """By number of coefficients: products (n, k, k) of the columns scaled to unit length."""
         grams = {}
-        for size, (_, rows) in self.by_size.items():
+        for size, (members, rows) in self.by_size.items():
             grams[size] = np.empty((len(rows), size, size))
             # Candidate by candidate: all columns once more would be fetched from the system page by page.
-            for gram, first in zip(grams[size], rows[:, 0], strict=True):
-                columns = slice(first, first + size)
-                part = self.rows[columns] / self.lengths[columns, None]
+            for gram, member, of_member in zip(grams[size], members, rows, strict=True):
+                part = self.candidates[member].columns.T / self.lengths[of_member, None]
                 gram[...] = part @ part.T
         return grams
 
@@ -177,7 +186,7 @@ def weigh(
     basis = orthonormal(selected)
     remainder = without(basis, residual[:, None])[:, 0]
     squares = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
-    return _weighed(pool, pool.rows @ basis, pool.rows @ remainder, squares)
+    return _weighed(pool, pool.products(basis), pool.products(remainder), squares)
 
 
 def _weighed(
@@ -217,7 +226,7 @@ def weigh_beside(
     pool = Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    return _weighed(pool, pool.rows @ beside.basis, pool.rows @ beside.residual, squares)
+    return _weighed(pool, pool.products(beside.basis), pool.products(beside.residual), squares)
 
 
 def explained_by(

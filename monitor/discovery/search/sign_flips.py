@@ -10,7 +10,7 @@ that was looked at, searched pitches and time constants too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -31,6 +31,8 @@ FLIPS = 999
 FEWEST, ROUNDING = 7.0, 1e-6
 # Up to so many runs all flips are made.
 ALL_FLIPS_UP_TO = 10
+# Candidates that are flipped together: 8 MB a coefficient.
+AT_ONCE = 1000
 # Draws the flips, always the same.
 SEED = 20261122
 
@@ -75,16 +77,16 @@ def p_value_by_flips(
         return 1.0
     ends = np.searchsorted(run, np.arange(runs + 1))
     overlap = pool.overlap(beside)
-    scores = np.empty((len(pool.rows), runs))
+    scores = np.empty((len(pool.lengths), runs))
     for index, (start, end) in enumerate(pairwise(ends)):
-        scores[:, index] = pool.rows[:, start:end] @ residual[start:end]
+        scores[:, index] = pool.products(residual[start:end], slice(start, end))
         scores[:, index] -= overlap @ (basis[start:end].T @ residual[start:end])
+    scores /= pool.lengths[:, None]
     flips = signs(runs)
-    flipped = (scores / pool.lengths[:, None]) @ flips
     beaten = np.zeros(flips.shape[1], dtype=bool)
-    for size, (members, rows) in pool.by_size.items():
+    for members, rows, grams in _some_at_once(pool):
         part = overlap[rows] / pool.lengths[rows][..., None]
-        gram = pool.grams[size] - part @ np.swapaxes(part, -1, -2)
+        gram = grams - part @ np.swapaxes(part, -1, -2)
         values, vectors = np.linalg.eigh(gram)
         keep = values > pool.least[members][:, None]
         price = keep.sum(axis=-1) * np.log(max(dof, 1)) + 2.0 * np.log(
@@ -96,6 +98,17 @@ def p_value_by_flips(
             np.swapaxes(vectors, -1, -2)
             * np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)[..., None]
         )
-        explained = np.sum((scaled @ flipped[rows]) ** 2, axis=1)
+        flipped = (scores[rows].reshape(-1, runs) @ flips).reshape(*rows.shape, -1)
+        explained = np.sum((scaled @ flipped) ** 2, axis=1)
         beaten |= np.any(explained >= needed[:, None], axis=0)
     return float((1 + int(beaten.sum())) / (1 + flips.shape[1]))
+
+
+def _some_at_once(
+    pool: Pool[CandidateT],
+) -> Iterator[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array]]:
+    """Candidates (n,) of one size, their rows (n, k) and products (n, k, k): under all flips they are many numbers."""
+    for size, (members, rows) in pool.by_size.items():
+        for start in range(0, len(members), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            yield members[some], rows[some], pool.grams[size][some]

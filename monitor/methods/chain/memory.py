@@ -14,21 +14,21 @@ from monitor.progress import saying
 #: So many times what the derivatives of all rows take: of 29 990 touches on six joints `compare` took 0.3 GB more than
 #: to load them, 4 times their derivatives, and `explain` 4.9 GB when it was stopped, 65 times (26 November 2026).
 TIMES_OF_FIT, TIMES_OF_SEARCH = 5, 70
+#: Columns of a search (pitches of long axes) stand in memory once, and now and then beside what is made of them.
+TIMES_OF_COLUMNS = 1.5
 #: Less is taken without a word, in bytes.
 SMALL = 2e9
 _MEMORY, _OWN_GROUPS, _GROUPS = map(Path, ("/proc/meminfo", "/proc/self/cgroup", "/sys/fs/cgroup"))
 
 
 @contextmanager
-def within_memory(problem: ChainProblem, times: int) -> Iterator[None]:
-    """Look at all rows of a problem at once in the block, which takes ``times`` what their derivatives take.
+def within_memory(problem: ChainProblem, times: int, columns: int = 0) -> Iterator[None]:
+    """Look at all rows of a problem at once in the block, which takes ``times`` what their derivatives take, and so
+    many ``columns`` besides.
 
     Raises TooManyRowsError where more memory is needed than is free; says how much is, where it is much.
     """
-    derivatives = len(problem.components) * (
-        12 * len(problem.context.chain.joints) + len(problem.local_names) + 1
-    )
-    needed, rows = 8.0 * times * derivatives * len(problem.context), len(problem.context)
+    needed, rows = bytes_needed(problem, times, columns), len(problem.context)
     if needed <= SMALL:
         yield
         return
@@ -41,6 +41,13 @@ def within_memory(problem: ChainProblem, times: int) -> Iterator[None]:
         )
     with saying(f"{rows} rows at once, some {needed / 1e9:.0f} GB of memory"):
         yield
+
+
+def bytes_needed(problem: ChainProblem, times: int, columns: int = 0) -> float:
+    """Return how many bytes ``times`` the derivatives of all rows of a problem and so many ``columns`` besides take."""
+    derivatives = 12 * len(problem.context.chain.joints) + len(problem.local_names) + 1
+    numbers = len(problem.components) * len(problem.context)
+    return 8.0 * numbers * (times * derivatives + TIMES_OF_COLUMNS * columns)
 
 
 def free_memory() -> float | None:

@@ -14,35 +14,22 @@ and is known beforehand (the length of a bar) may be the wrong one as well: with
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
 from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.run_rows import RunRows, instruments_of, run_rows
 from monitor.methods.instruments.shares import scatter_of
+from monitor.methods.instruments.sides import Block, Sides, basis_of
 from monitor.methods.method import Contrast, ContrastKind, SetupScatter
 from monitor.records import Array
 
 #: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
 ASKED = 0.1
-
-
-@dataclass(frozen=True)
-class _Block:
-    """The ``rows`` of one setup, what is ``remaining`` of the sum of squares of its readings when they are fitted by
-    themselves, with so many ``numbers`` more than unknowns; the ``deviation`` by which they count, and the degrees of
-    ``freedom`` of that, infinite where it is as stated."""
-
-    rows: npt.NDArray[np.int64]
-    remaining: float
-    numbers: float
-    deviation: float
-    freedom: float
 
 
 def contrasts(problem: ChainProblem, solution: Solution, run: int) -> tuple[Contrast, ...]:
@@ -52,29 +39,37 @@ def contrasts(problem: ChainProblem, solution: Solution, run: int) -> tuple[Cont
 
 def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
     """What every setup and every instrument of several setups says against all others."""
-    blocks = _blocks(at)
-    units = _units(at, blocks)
-    return tuple(_judged(at, blocks, units, frozenset(blocks)))
+    sides = Sides(at, _blocks(at))
+    return tuple(_judged(sides, _units(at, sides.blocks), frozenset(sides.blocks)))
+
+
+def contrast(problem: ChainProblem, solution: Solution, run: int, name: str) -> Contrast | None:
+    """What the setup or instrument ``name`` says against all others in a run, without who else contradicts; None where
+    they share nothing."""
+    at = run_rows(problem, solution, run)
+    sides = Sides(at, _blocks(at))
+    mine, every = _units(at, sides.blocks).get(name, frozenset()), frozenset(sides.blocks)
+    return _apart(sides, name, mine, every - mine) if mine and mine < every else None
 
 
 def scatters(problem: ChainProblem, solution: Solution, run: int) -> tuple[SetupScatter, ...]:
     """What the readings of every setup of a run scatter, fitted by themselves, over what it states."""
     at = run_rows(problem, solution, run)
     return tuple(
-        SetupScatter(setup, float(np.sqrt(block.remaining / block.numbers)), _least(block))
+        SetupScatter(setup, float(np.sqrt(block.remaining / block.numbers)), _least(block), block.numbers)
         for setup, block in _blocks(at).items()
         if block.numbers >= 1.0
     )
 
 
-def _least(block: _Block) -> float:
+def _least(block: Block) -> float:
     """How often chance alone leaves so little of readings that scatter as stated."""
     return float(scipy.special.chdtr(block.numbers, block.remaining))
 
 
-def _blocks(at: RunRows) -> dict[str, _Block]:
+def _blocks(at: RunRows) -> dict[str, Block]:
     """The setups that read something in the run, and what several of them have in common that is known beforehand."""
-    blocks: dict[str, _Block] = {}
+    blocks: dict[str, Block] = {}
     shared = {
         name: rows
         for name, (rows, setups) in at.shared_beforehand().items()
@@ -88,21 +83,21 @@ def _blocks(at: RunRows) -> dict[str, _Block]:
             continue
         prior = at.known_of((part.id,))
         rows = np.concatenate([read, prior[~np.isin(prior, apart)]])
-        basis = _basis(at, rows, np.ones(len(rows)))
+        basis = basis_of(at.jacobian[rows], *at.separated(rows)[::2])
         remaining = at.residual[rows] - basis @ (basis.T @ at.residual[rows])
         numbers = len(read) - float(np.sum(basis[: len(read)] ** 2))
         square, freedom = scatter_of(remaining[: len(read)], numbers)
-        blocks[part.id] = _Block(
+        blocks[part.id] = Block(
             rows,
             float(remaining[: len(read)] @ remaining[: len(read)]),
             numbers,
             float(np.sqrt(square)),
             freedom,
         )
-    return blocks | {name: _Block(rows, 0.0, 0.0, 1.0, float("inf")) for name, rows in shared.items()}
+    return blocks | {name: Block(rows, 0.0, 0.0, 1.0, float("inf")) for name, rows in shared.items()}
 
 
-def _units(at: RunRows, blocks: dict[str, _Block]) -> dict[str, frozenset[str]]:
+def _units(at: RunRows, blocks: Mapping[str, Block]) -> dict[str, frozenset[str]]:
     """What may be wrong together, by name: every setup, every instrument that has several, what is known beforehand."""
     units = {name: frozenset({name}) for name in blocks}
     shared = at.shared_beforehand()
@@ -114,18 +109,16 @@ def _units(at: RunRows, blocks: dict[str, _Block]) -> dict[str, frozenset[str]]:
     return units
 
 
-def _judged(
-    at: RunRows, blocks: dict[str, _Block], units: dict[str, frozenset[str]], among: frozenset[str]
-) -> Iterator[Contrast]:
+def _judged(sides: Sides, units: dict[str, frozenset[str]], among: frozenset[str]) -> Iterator[Contrast]:
     """Every unit against the others ``among`` setups, where they share something."""
     for name, mine in units.items():
         if not mine < among:
             continue
-        contrast = _apart(at, blocks, name, mine, among - mine)
+        contrast = _apart(sides, name, mine, among - mine)
         if contrast is None:
             continue
-        if contrast.p < ASKED and among == frozenset(blocks):
-            within = tuple(_judged(at, blocks, units, among - mine))
+        if contrast.p < ASKED and among == frozenset(sides.blocks):
+            within = tuple(_judged(sides, units, among - mine))
             count = comparisons_of(within)
             # Others that share nothing cannot contradict each other.
             least = min((count * other.p for other in within), default=1.0)
@@ -139,22 +132,17 @@ def comparisons_of(every: Sequence[Contrast]) -> int:
     return len({frozenset({each.members, whole - each.members}) for each in every})
 
 
-def _apart(
-    at: RunRows, blocks: dict[str, _Block], name: str, mine: frozenset[str], others: frozenset[str]
-) -> Contrast | None:
+def _apart(sides: Sides, name: str, mine: frozenset[str], others: frozenset[str]) -> Contrast | None:
     """What the unit ``name`` says against others; None where they share nothing."""
-    sides = [[setup for setup in blocks if setup in side] for side in (mine, others)]
-    ordered = [blocks[setup] for side in sides for setup in side]
-    rows = np.concatenate([block.rows for block in ordered])
-    deviation = np.concatenate([np.full(len(block.rows), block.deviation) for block in ordered])
-    residual = at.residual[rows] / deviation
     # What the whole run separates these rows may show by products of errors alone: no direction of a common fit.
-    projector, _, _ = at.separated(rows)
-    jacobian = at.jacobian[rows] @ projector / deviation[:, None]
-    split = sum(len(blocks[setup].rows) for setup in sides[0])
-    first = _basis(at, rows[:split], deviation[:split])
-    second = _basis(at, rows[split:], deviation[split:])
-    within = np.vstack([first.T @ jacobian[:split], second.T @ jacobian[split:]])
+    projector, _ = sides.separated(mine | others)
+    bases = [sides.basis(side) for side in (mine, others)]
+    within = np.vstack(
+        [
+            basis.T @ (sides.jacobian(side) @ projector)
+            for side, basis in zip((mine, others), bases, strict=True)
+        ]
+    )
     length = np.linalg.norm(within, axis=0)
     vectors, strength, _ = np.linalg.svd(within / np.where(length > 0.0, length, 1.0))
     rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
@@ -162,10 +150,13 @@ def _apart(
     directions = differ.shape[1]
     if directions == 0:
         return None
+    first, second = bases
     moved = np.vstack([first @ differ[: first.shape[1]], second @ differ[first.shape[1] :]])
-    square, freedom = float(np.sum((moved.T @ residual) ** 2)), _freedom(ordered, moved)
+    residual = np.concatenate([sides.residual(mine), sides.residual(others)])
+    freedom = _freedom([*sides.counts(mine), *sides.counts(others)], moved)
+    square = float(np.sum((moved.T @ residual) ** 2))
     size, p = float(np.sqrt(square / directions)), _p(square, directions, freedom)
-    stated = at.shared_beforehand()
+    stated = sides.at.shared_beforehand()
     setups = sorted(
         setup for member in mine for setup in (stated[member][1] if member in stated else {member})
     )
@@ -175,15 +166,16 @@ def _apart(
     return Contrast(name, kind, tuple(dict.fromkeys(setups)), mine, directions, size, freedom, p)
 
 
-def _freedom(ordered: list[_Block], moved: Array) -> float:
-    """The degrees of freedom of a distance whose parts (q, q) of the covariance, together 1, are by own scatter."""
+def _freedom(ordered: Sequence[tuple[int, float]], moved: Array) -> float:
+    """The degrees of freedom of a distance whose parts (q, q) of the covariance, together 1, are by own scatter;
+    ``ordered`` are the rows of each block and the degrees of freedom of its scatter."""
     directions, inverse, first = moved.shape[1], 0.0, 0
-    for block in ordered:
-        share = moved[first : first + len(block.rows)]
-        first += len(block.rows)
-        if np.isfinite(block.freedom):
+    for rows, freedom in ordered:
+        share = moved[first : first + rows]
+        first += rows
+        if np.isfinite(freedom):
             part = share.T @ share
-            inverse += (float(np.sum(part**2)) + float(np.trace(part)) ** 2) / block.freedom
+            inverse += (float(np.sum(part**2)) + float(np.trace(part)) ** 2) / freedom
     return (directions + directions**2) / inverse if inverse > 0.0 else float("inf")
 
 
@@ -197,12 +189,3 @@ def _p(square: float, directions: int, freedom: float) -> float:
         if rest <= 0.0
         else float(scipy.special.fdtrc(directions, rest, square * rest / (freedom * directions)))
     )
-
-
-def _basis(at: RunRows, rows: npt.NDArray[np.int64], deviation: Array) -> Array:
-    """An orthonormal basis (m, r) of what the unknowns that rows (m,) separate do to them, over their ``deviation``."""
-    projector, _, rank = at.separated(rows)
-    columns = at.jacobian[rows] @ projector / deviation[:, None]
-    length = np.linalg.norm(columns, axis=0)
-    vectors, strength, _ = np.linalg.svd(columns / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    return vectors[:, :rank][:, strength[:rank] > RANK_TOLERANCE * strength.max(initial=0.0)]

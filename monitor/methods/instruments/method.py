@@ -13,7 +13,7 @@ from monitor.methods.instruments.as_stated import as_stated
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
 from monitor.methods.instruments.contradiction import other_travels
-from monitor.methods.instruments.contrasts import contrasts, scatters
+from monitor.methods.instruments.contrasts import contrast, contrasts, scatters
 from monitor.methods.instruments.drifts import drifts
 from monitor.methods.instruments.forecast import InstrumentForecast
 from monitor.methods.instruments.problem import InstrumentProblem
@@ -77,7 +77,7 @@ METHOD = ChainMethod(
     trial_rows=150,
     taken_up=without_numbers,
     as_stated=as_stated,
-    instruments=Instruments(shares, contrasts, scatters, drifts, misread),
+    instruments=Instruments(shares, contrasts, contrast, scatters, drifts, misread),
     standards=StandardTests(standard_tests),
     plan=InstrumentPlan(InstrumentForecast),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),

@@ -80,23 +80,31 @@ class RunRows:
                 setups[name] = frozenset(part.id for part in parts)
         return {name: (np.array(of_name), setups[name]) for name, of_name in rows.items()}
 
-    def separated(self, rows: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        """The projector (p, p) on the unknowns that rows (m,) separate, which unknowns (p,) these are, and the rank.
+    @cached_property
+    def sizes(self) -> Array:
+        """The lengths (p,) of the derivatives by all rows on a machine without errors."""
+        return np.asarray(np.linalg.norm(self.nominal, axis=0))
 
-        What is small beside the derivatives by all rows is rounding.
-        """
-        size = np.linalg.norm(self.nominal, axis=0)
-        mine = self.nominal[rows]
-        matrix = np.where(np.linalg.norm(mine, axis=0) < ROUNDING * size, 0.0, mine)
-        scale = np.linalg.norm(matrix, axis=0)
-        scale[scale == 0.0] = 1.0
-        _, strength, vectors = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"))
-        rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
-        left_open = vectors[rank:]
-        projector = np.eye(len(scale)) - left_open.T @ left_open
-        projector *= np.linalg.norm(projector, axis=0) > ROUNDING
-        determined = np.abs(left_open).max(axis=0, initial=0.0) < MEMBER_SHARE
-        return projector * scale[None, :] / scale[:, None], determined, rank
+    def separated(self, rows: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.bool_], int]:
+        """The projector (p, p) on the unknowns that rows (m,) separate, which unknowns (p,) these are, and the rank."""
+        return separated_by(self.nominal[rows], self.sizes)
+
+
+def separated_by(nominal: Array, sizes: Array) -> tuple[Array, npt.NDArray[np.bool_], int]:
+    """The projector (p, p) on the unknowns that derivatives (m, p) separate, which (p,) these are, and the rank.
+
+    What is small beside the ``sizes`` (p,) of the derivatives by all rows is rounding.
+    """
+    matrix = np.where(np.linalg.norm(nominal, axis=0) < ROUNDING * sizes, 0.0, nominal)
+    scale = np.linalg.norm(matrix, axis=0)
+    scale[scale == 0.0] = 1.0
+    _, strength, vectors = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"))
+    rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
+    left_open = vectors[rank:]
+    projector = np.eye(len(scale)) - left_open.T @ left_open
+    projector *= np.linalg.norm(projector, axis=0) > ROUNDING
+    determined = np.abs(left_open).max(axis=0, initial=0.0) < MEMBER_SHARE
+    return projector * scale[None, :] / scale[:, None], determined, rank
 
 
 def run_rows(problem: ChainProblem, solution: Solution, run: int, *, knows_others: bool = False) -> RunRows:

@@ -27,6 +27,7 @@ from monitor.discovery import (
 )
 from monitor.discovery.curve.explain import explain_curve
 from monitor.discovery.machine.mistakes.cures import Maker
+from monitor.discovery.machine.shapes.variants import columns_of_pitches
 from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
@@ -58,7 +59,8 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
     """
     with explained_refusals(campaign, model):
         problem = machine_problem(campaign, model)
-        with within_memory(problem, times):
+        columns = columns_of_pitches(problem.context) if times == TIMES_OF_SEARCH else 0
+        with within_memory(problem, times, columns):
             return robust_fit(problem)
 
 
@@ -92,7 +94,7 @@ def explanation_of(
         )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
-    with within_memory(first.problem, TIMES_OF_SEARCH):
+    with within_memory(first.problem, TIMES_OF_SEARCH, columns_of_pitches(first.problem.context)):
         explanation = search(
             campaign, first.problem, label(model), rate=rate, rng=rng, first=first, gross=robust.points
         )

@@ -13,21 +13,17 @@ them, and follows that of the pose before by the correlation (docs/trials-robots
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.discovery import Fit
-from monitor.discovery.machine.noise.correlation import Correlation, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.noise.rows import Rows
 from monitor.methods.chain.poses import shared_poses
 from monitor.records import Array
 from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.runs.touched_run import TouchedRun
-
-#: A step from row to row of one pose, of a step from pose to pose: rows of nothing but shared noise stay different.
-WITHIN_A_POSE = 0.02
 
 
 @dataclass(frozen=True)
@@ -50,15 +46,11 @@ class Resemblance:
 
 def resemblance_of(fit: Fit, run: MeasuredRun) -> Resemblance | None:
     """The resemblance of the readings of one ``run`` of a fit; None where its residuals show none."""
-    pose = shared_poses(fit.problem, fit.solution)
-    design = fit.noise_design
-    if pose is not None:
-        design = replace(design, rows=_from_pose_to_pose(design.rows, pose))
-    correlation = design.correlation(fit.solution.last.residual)
+    correlation = fit.correlation()
     if correlation is None:
         return None
-    rows = design.rows
-    white = replace(fit, whitening=Whitening(rows, correlation)).white
+    rows, of_poses = fit.rows, shared_poses(fit.problem, fit.solution) is not None
+    white = fit.with_correlation(correlation).white
     scale = float(np.sum(white**2)) / max(fit.degrees_of_freedom, 1)
     index = int(np.flatnonzero(fit.problem.runs == run.problem.runs[0])[0])
     touches = rows.correlated(index, correlation.rho, correlation.share)
@@ -73,15 +65,7 @@ def resemblance_of(fit: Fit, run: MeasuredRun) -> Resemblance | None:
     size = np.where(size > 0.0, size, 1.0)
     matrix /= size
     matrix /= size[:, None]
-    return Resemblance(matrix, correlation, float(np.sqrt(scale)), pose is not None)
-
-
-def _from_pose_to_pose(rows: Rows, pose: npt.NDArray[np.int64]) -> Rows:
-    """Rows that follow each other from ``pose`` (M,) of every whitened number to pose."""
-    of_touch = pose.reshape(len(rows.weighted), -1)[:, : rows.count : rows.numbers]
-    stays = np.diff(rows.by_neighbours(of_touch), axis=1, prepend=-2) == 0
-    steps = np.ones(stays.shape) if rows.steps is None else rows.steps
-    return replace(rows, steps=np.where(stays, WITHIN_A_POSE, steps))
+    return Resemblance(matrix, correlation, float(np.sqrt(scale)), of_poses)
 
 
 def _of_numbers(touches: Array, rows: Rows, index: int) -> Array:

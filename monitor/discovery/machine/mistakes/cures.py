@@ -42,11 +42,20 @@ def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:
     try:
         with np.errstate(all="ignore"):
             problem = problem_of(campaign)
-            solution = solve_problem(problem, most=MOST_STEPS)
-            return Fit(problem, solution, np.zeros(len(problem.context), dtype=bool))
     except (MonitorError, np.linalg.LinAlgError):
         # This is no machine of that file either.
         return None
+    return fitted_problem(problem)
+
+
+def fitted_problem(problem: ChainProblem) -> Fit | None:
+    """The fit of the problem of a corrected campaign; None where it does not converge within few steps."""
+    try:
+        with np.errstate(all="ignore"):
+            solution = solve_problem(problem, most=MOST_STEPS)
+    except (MonitorError, np.linalg.LinAlgError):
+        return None
+    return Fit(problem, solution, np.zeros(len(problem.context), dtype=bool))
 
 
 def without_gross(campaign: Campaign, first: Fit) -> Campaign:

@@ -32,11 +32,19 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     turned_axes,
     unit_mistakes,
 )
-from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms, fitted, without_gross
+from monitor.discovery.machine.mistakes.cures import (
+    Maker,
+    Mistake,
+    cured_rms,
+    fitted,
+    fitted_problem,
+    without_gross,
+)
 from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
+from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, ContrastKind, Instruments, SetupScatter
 from monitor.records import Array, Branch, Campaign, Probings
@@ -51,9 +59,11 @@ SCATTERS, TOO_STILL, IN_ORDER = 3.0, 0.01, (0.5, 1.3)
 QUIET, QUIETS = 0.3, 0.05
 #: Mistakes that do the same leave sums of squares that differ by less: odds of a thousand to one.
 AS_WELL = 13.8
+#: What cures a setup that contradicts itself takes away what that scatters beyond; one step foresees half of it.
+FORESEEN = 0.5
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
-#: So many of those that contradict are tried where none is a suspect alone.
+#: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
 MOST_TRIED = 3
 #: A mistake explains the readings where chance leaves so much, or where it leaves less than this part of the excess
 #: over what is stated: beside it a machine still has its effects. Else it comes nearest.
@@ -73,6 +83,7 @@ class _Doubted:
     setups: tuple[str, ...]
     size: float = 0.0
     directions: int = 0
+    excess: float = 0.0
     is_still: bool = False
     is_quiet: bool = False
 
@@ -161,20 +172,25 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
             each.setups,
             each.size,
             each.directions,
-            still.issuperset(each.setups),
-            quiet.issuperset(each.setups),
+            is_still=still.issuperset(each.setups),
+            is_quiet=quiet.issuperset(each.setups),
         )
         for each in against[:MOST_TRIED]
         if each.kind is not ContrastKind.STATED
     ]
     tried = {setup for each in doubted for setup in each.setups}
+    rest = [each for each in scatters if each.setup not in tried]
+    too_still = [
+        _Doubted(each.setup, (each.setup,), is_still=True) for each in rest if each.times <= TOO_STILL
+    ]
     scattering = [
-        each for each in scatters if not TOO_STILL < each.times < SCATTERS and each.setup not in tried
+        _Doubted(each.setup, (each.setup,), excess=each.numbers * (each.times**2 - IN_ORDER[1] ** 2))
+        for each in rest
+        if each.times >= SCATTERS
     ]
-    return [
-        *doubted,
-        *(_Doubted(each.setup, (each.setup,), is_still=each.times < 1.0) for each in scattering),
-    ]
+    # Where many do, it is the machine that the model does not describe: a mistake would be the largest.
+    scattering.sort(key=lambda each: -each.excess)
+    return [*doubted, *too_still, *scattering[:MOST_TRIED]]
 
 
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
@@ -191,15 +207,14 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     # The axes of several setups of one instrument are those of the machine, which all others move too.
     of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
     count = len(of_readings) + len(of_axes)
-    limit = np.inf if doubted.is_still else first.sum_of_squares
-    for trials, margin in ((of_readings, 1.0), (of_axes, OF_AXES)):
+    total = first.sum_of_squares
+    of_one_step = total - FORESEEN * doubted.excess, OF_AXES * total
+    for trials, limit in zip((of_readings, of_axes), of_one_step, strict=True):
         cures = []
         for what, undo in trials:
             undone_in = partial(_undone, setups=doubted.setups, undo=undo)
-            undone = undone_in(campaign)
-            if not _sum_of_one_step(undone, problem_of) <= margin * limit:
-                continue
-            fit = fitted(undone, problem_of)
+            problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
+            fit = None if problem is None else fitted_problem(problem)
             if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
                 what = f"{what.split(' (`')[0]} {doubted.in_words}"
                 explains = doubted.is_still or _explains(
@@ -211,14 +226,14 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     return []
 
 
-def _sum_of_one_step(undone: Campaign, problem_of: Maker) -> float:
-    """The sum of squares that one step of a fit foresees: of what is worse than before the fit is spared."""
+def _worth_fitting(undone: Campaign, problem_of: Maker, limit: float) -> ChainProblem | None:
+    """The problem of a campaign; None where one step of a fit foresees a sum of squares above a limit."""
     try:
         with np.errstate(all="ignore"):
             problem = problem_of(undone)
             at = problem.linearise(problem.start, problem.common_start)
     except (MonitorError, np.linalg.LinAlgError):
-        return float("inf")
+        return None
     total = 0.0
     for residual, local, common in zip(at.residual, at.local, at.common, strict=True):
         columns = np.hstack([local, common])
@@ -226,7 +241,7 @@ def _sum_of_one_step(undone: Campaign, problem_of: Maker) -> float:
         columns = columns / np.where(size > 0.0, size, 1.0)
         rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=RANK_TOLERANCE)[0]
         total += float(rest @ rest)
-    return total
+    return problem if total <= limit else None
 
 
 def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
@@ -235,8 +250,7 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
         return False
     ability = campaign_method(campaign).instruments
     assert isinstance(ability, Instruments)
-    every = ability.contrasts(fit.problem, fit.solution, run)
-    contrast = next((each for each in every if each.name == doubted.name), None)
+    contrast = ability.contrast(fit.problem, fit.solution, run, doubted.name)
     is_in_order = _is_in_order(ability.scatters(fit.problem, fit.solution, run), doubted)
     if not doubted.directions or doubted.is_still:
         return is_in_order and (contrast is None or contrast.p > DOUBTFUL)

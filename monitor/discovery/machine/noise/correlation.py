@@ -8,7 +8,6 @@ independent.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,8 +32,8 @@ FAR = 8
 # Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
 LIKELIER = 4.6
-# Numbers that are filtered in one piece (32 MB).
-PIECE = 4_000_000
+# Numbers that are filtered in one piece (128 MB).
+PIECE = 16_000_000
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
 
@@ -68,7 +67,7 @@ class Filters:
     steps: Array | None = None
 
     @cached_property
-    def _rho(self) -> Array:
+    def rho(self) -> Array:
         """What every touch has of its neighbour before (C, R, T), so many ``steps`` ago: nothing where it has none."""
         rho = np.array([correlation.rho for correlation in self.correlations])[:, None, None]
         if self.steps is not None:
@@ -77,7 +76,7 @@ class Filters:
         return np.asarray(rho * goes_on)
 
     @cached_property
-    def _recursion(self) -> tuple[Array, Array, Array]:
+    def recursion(self) -> tuple[Array, Array, Array]:
         """Gains and reciprocal standard deviations of the innovations, (C, R, T) each and zero where nothing was read,
         and the logarithms (C, R, T) of their variances."""
         share = np.array([correlation.share for correlation in self.correlations])[:, None]
@@ -86,7 +85,7 @@ class Filters:
         predicted = np.broadcast_to(share, gain.shape[:2])
         for touch, present in enumerate(self.weighted.T):
             if touch:
-                rho = self._rho[..., touch]
+                rho = self.rho[..., touch]
                 predicted = rho**2 * predicted + share * (1.0 - rho**2)
             total = predicted + (1.0 - share)
             gain[..., touch] = np.where(present, predicted / total, 0.0)
@@ -97,16 +96,18 @@ class Filters:
     def logarithm(self, numbers: int, read: Array | None = None) -> Array:
         """The logarithms (C, R) of the determinants of the noise covariances of so many ``numbers`` a touch, or of
         ``read`` (R, T)."""
-        variances = self._recursion[2]
+        variances = self.recursion[2]
         return np.asarray(np.sum(variances * (numbers if read is None else read), axis=2))
 
-    def apply(self, readings: Array) -> Array:
-        """Innovations (C, R, T, k) of readings (R, T, k), divided by their standard deviations."""
-        gain, reciprocal, _ = self._recursion
+    def apply(self, readings: Array, some: slice = slice(None)) -> Array:
+        """Innovations (C, R, T, k) of readings (R, T, k), divided by their standard deviations; under ``some`` of the
+        correlations alone."""
+        gain, reciprocal = (part[some] for part in self.recursion[:2])
+        rho = self.rho[some]
         white = np.empty((len(gain), *readings.shape))
         state = np.zeros((len(gain), len(readings), readings.shape[2]))
         for touch in range(readings.shape[1]):
-            predicted = self._rho[..., touch, None] * state
+            predicted = rho[..., touch, None] * state
             innovation = readings[None, :, touch] - predicted
             white[:, :, touch] = innovation * reciprocal[..., touch, None]
             state = predicted + innovation * gain[..., touch, None]
@@ -114,7 +115,7 @@ class Filters:
 
     def apply_transposed(self, white: Array) -> Array:
         """The transposed filters, (C, R, T, k), of white numbers (C, R, T, k)."""
-        gain, reciprocal, _ = self._recursion
+        gain, reciprocal, _ = self.recursion
         result = np.empty(white.shape)
         # What later innovations take of the state that a touch leaves.
         before = np.zeros((*white.shape[:2], white.shape[3]))
@@ -122,62 +123,8 @@ class Filters:
             scaled = white[:, :, touch] * reciprocal[..., touch, None]
             result[:, :, touch] = scaled + gain[..., touch, None] * before
             ahead = before - gain[..., touch, None] * before - scaled
-            before = self._rho[..., touch, None] * ahead
+            before = self.rho[..., touch, None] * ahead
         return result
-
-
-@dataclass(frozen=True)
-class Whitening:
-    """The filter that takes a correlation out of numbers (..., R, N) run by run, as a triangle of weights."""
-
-    rows: Rows
-    correlation: Correlation
-
-    @cached_property
-    def factors(self) -> tuple[Array, Array]:
-        """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
-        determinant of the noise covariance for unit variance."""
-        rows = self.rows
-        filters = Filters((self.correlation,), rows.by_neighbours(rows.weighted), rows.begins, rows.steps)
-        runs, touches = rows.weighted.shape
-        unit = np.broadcast_to(np.eye(touches), (runs, touches, touches))
-        read = None if rows.read is None else rows.by_neighbours(rows.read)
-        triangles, logarithm = filters.apply(unit)[0], filters.logarithm(rows.numbers, read)[0]
-        if rows.order is None:
-            return triangles, logarithm
-        back = np.argsort(rows.order, axis=1)
-        run = np.arange(runs)[:, None, None]
-        return triangles[run, back[:, :, None], back[:, None, :]], logarithm
-
-    def __call__(self, numbers: Array) -> Array:
-        """Independent numbers (..., R, N) of equal variance from correlated ones."""
-        rows = self.rows
-        touches = rows.weighted.shape[1]
-        readings = numbers[..., : rows.count].reshape(*numbers.shape[:-1], touches, rows.numbers)
-        if rows.turned is not None:
-            readings = (rows.turned @ readings[..., None])[..., 0]
-        # All columns of a run in one product: one by one each would read the whole triangle.
-        columns = np.moveaxis(readings.reshape(-1, *readings.shape[-3:]), 0, 2)
-        innovations = self.factors[0] @ columns.reshape(*columns.shape[:2], -1)
-        white = np.array(numbers)
-        white[..., : rows.count] = np.moveaxis(innovations.reshape(columns.shape), 2, 0).reshape(
-            *numbers.shape[:-1], rows.count
-        )
-        return white
-
-    def undone(self, white: Array) -> Array:
-        """The numbers (R, N) that were made independent; zero for touches without weight."""
-        rows = self.rows
-        touches = rows.weighted.shape[1]
-        # A touch without weight has a row of zeros in its triangle, and none of itself to give back.
-        triangles = self.factors[0] + np.eye(touches) * ~rows.weighted[:, :, None]
-        independent = white[:, : rows.count].reshape(len(white), touches, rows.numbers)
-        readings = np.linalg.solve(triangles, independent)
-        if rows.turned is not None:
-            readings = (np.swapaxes(rows.turned, -1, -2) @ readings[..., None])[..., 0]
-        numbers = np.array(white)
-        numbers[:, : rows.count] = readings.reshape(len(white), rows.count)
-        return numbers
 
 
 def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Array:
@@ -376,23 +323,25 @@ class NoiseDesign:
     @cached_property
     def _whites(self) -> _Whites:
         at_once = max(1, PIECE // max(self._own[0].size, 1))
-        products = [self._products(GRID[first : first + at_once]) for first in range(0, len(GRID), at_once)]
+        filters = self._filters
+        pieces = (slice(first, first + at_once) for first in range(0, len(GRID), at_once))
+        products = [self._products(filters, piece) for piece in pieces]
         values, vectors = np.linalg.eigh(np.concatenate(products))
         able = values > SMALLEST_EIGENVALUE
-        filters = self._filters(GRID)
         read = None if self.rows.read is None else self.rows.by_neighbours(self.rows.read)[self._runs]
         logarithm = filters.logarithm(self.rows.numbers, read).sum(axis=1)
         logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
         return _Whites(filters, values, vectors, logarithm)
 
-    def _filters(self, correlations: Sequence[Correlation]) -> Filters:
+    @property
+    def _filters(self) -> Filters:
         begins = None if self.rows.begins is None else self.rows.begins[self._runs]
         steps = None if self.rows.steps is None else self.rows.steps[self._runs]
-        return Filters(tuple(correlations), self._weighted, begins, steps)
+        return Filters(GRID, self._weighted, begins, steps)
 
-    def _products(self, correlations: Sequence[Correlation]) -> Array:
-        """The products (C, R, p, p) of the filtered span of what is unknown with itself."""
+    def _products(self, filters: Filters, some: slice) -> Array:
+        """The products (C, R, p, p) of the span of what is unknown, filtered under some correlations, with itself."""
         unknowns, rest = self._own
-        white = self._filters(correlations).apply(unknowns)
+        white = filters.apply(unknowns, some)
         span = white.reshape(*white.shape[:2], -1, rest.shape[-1])
         return np.asarray(np.swapaxes(span, 2, 3) @ span + np.swapaxes(rest, 1, 2) @ rest)

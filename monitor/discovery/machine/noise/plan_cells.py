@@ -7,6 +7,7 @@ import numpy.typing as npt
 import scipy
 
 from monitor.methods.chain.problem import ChainProblem
+from monitor.records import Array
 
 # A control that is sent to a pose again reads it back to some thousandths of a degree or mm. Over this much (10 µm,
 # 0.01 degrees) even the finest line of a gear, 320 periods a turn, changes by 5 % only.
@@ -63,12 +64,22 @@ def plan_cells(problem: ChainProblem) -> npt.NDArray[np.int64]:
     """The cell (n,) of the plan: the same number for the same target at the same pose, touch by touch."""
     context = problem.context
     angles = np.round(context.positions[:, _posed(problem)], 6) + 0.0
-    occurrences: dict[tuple[object, ...], int] = {}
-    numbers: dict[tuple[object, ...], int] = {}
-    cells = np.empty(len(context), dtype=np.int64)
-    for row in range(len(context)):
-        key = (str(context.target[row]), *angles[row])
-        in_run = (int(context.run[row]), *key)
-        occurrence = occurrences[in_run] = occurrences.get(in_run, -1) + 1
-        cells[row] = numbers.setdefault((*key, occurrence), len(numbers))
-    return cells
+    target = np.unique(context.target, return_inverse=True)[1]
+    touch = _numbered(np.column_stack([target, angles]))
+    return _numbered(np.column_stack([touch, _occurrences(np.column_stack([context.run, touch]))]))
+
+
+def _numbered(rows: Array) -> npt.NDArray[np.int64]:
+    """The number (n,) of every row (n, k) among the different ones, in the order in which they first occur."""
+    _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[index.reshape(-1)]
+
+
+def _occurrences(rows: Array) -> npt.NDArray[np.int64]:
+    """How many rows (n,) before each of (n, k) are the same."""
+    number = _numbered(rows)
+    order = np.argsort(number, kind="stable")
+    of_number = np.bincount(number)
+    before = np.empty(len(number), dtype=np.int64)
+    before[order] = np.arange(len(number)) - np.repeat(np.cumsum(of_number) - of_number, of_number)
+    return before

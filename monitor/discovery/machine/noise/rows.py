@@ -17,6 +17,9 @@ from monitor.machine import MOTION
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 
+# A step from row to row of one pose, of a step from pose to pose: rows of nothing but shared noise stay different.
+WITHIN_A_POSE = 0.02
+
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 
@@ -112,6 +115,14 @@ def neighbours_of(problem: ChainProblem, by_error: Array) -> Rows:
     steps = np.where(new, 1, np.diff(order, axis=1, prepend=0))
     sign = np.where(np.take_along_axis(shown, axis[..., None], axis=2) < 0.0, -1.0, 1.0)
     return replace(rows, turned=sign[..., None], begins=new, order=order, steps=steps.astype(np.float64))
+
+
+def from_pose_to_pose(rows: Rows, pose: npt.NDArray[np.int64]) -> Rows:
+    """Rows that follow each other from ``pose`` (M,) of every whitened number to pose."""
+    of_touch = pose.reshape(len(rows.weighted), -1)[:, : rows.count : rows.numbers]
+    stays = np.diff(rows.by_neighbours(of_touch), axis=1, prepend=-2) == 0
+    steps = np.ones(stays.shape) if rows.steps is None else rows.steps
+    return replace(rows, steps=np.where(stays, WITHIN_A_POSE, steps))
 
 
 def _directions(problem: ChainProblem, by_error: Array) -> Array:

@@ -20,6 +20,7 @@ import scipy
 
 from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.search.evidence import Evidence, weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.sign_flips import signs
 from monitor.effects import ChainEffect
@@ -81,14 +82,30 @@ def slight_wave(scene: ChainScene, waves: Sequence[ChainCandidate]) -> SlightSha
     columns: list[Array] = []
     for number, wave in enumerate(waves):
         remainder = without(beside.basis, wave.columns)
-        before = wave.raw_lengths / scene.fit.sigma
-        if np.linalg.svd(remainder / np.maximum(before, 1e-300), compute_uv=False).min() > SMALLEST_SHARE:
+        if _is_whole(scene, wave, remainder):
             able.append(number)
             columns.append(orthonormal(remainder).astype(np.float32))
     if not able:
         return None
     best = _most_certain(scene, np.stack(columns, axis=1), LEVEL_OF_WAVES)
     return None if best is None else SlightShape(waves[able[best[0]]].family, able[best[0]], best[1])
+
+
+def best_wave(
+    scene: ChainScene, waves: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> Evidence[ChainCandidate] | None:
+    """The wave that says most beside others, of those of which the data see cosine and sine; None where there is
+    none."""
+    basis = scene.remainders.beside(others).basis
+    able = [wave for wave in waves if _is_whole(scene, wave, without(basis, wave.columns))]
+    return next(iter(weigh_beside(scene, able, others)), None)
+
+
+def _is_whole(scene: ChainScene, wave: ChainCandidate, remainder: Array) -> bool:
+    """Whether the data see cosine and sine of a wave, of which they leave a remainder (M, 2)."""
+    before = wave.raw_lengths / scene.fit.sigma
+    shares = np.linalg.svd(remainder / np.maximum(before, 1e-300), compute_uv=False)
+    return bool(shares.min() > SMALLEST_SHARE)
 
 
 def slight_error(scene: ChainScene, wholes: Sequence[ChainVariant]) -> str | None:
@@ -108,9 +125,13 @@ def _p_value_of_position(scene: ChainScene, whole: ChainCandidate) -> float:
     them."""
     effect = whole.effect
     assert isinstance(effect, ChainEffect)
-    beside = scene.remainders.beside([])
-    count = parts_of_position(effect.joint.turns)
-    columns = orthonormal(without(beside.basis, whole.columns[:, :count]))
+    return p_value_of_all(scene, whole.columns[:, : parts_of_position(effect.joint.turns)], [])
+
+
+def p_value_of_all(scene: ChainScene, columns: Array, others: Sequence[ChainCandidate]) -> float:
+    """The p-value of all columns (M, k) together beside others; 1 where nothing is left of them."""
+    beside = scene.remainders.beside(others)
+    columns = orthonormal(without(beside.basis, columns))
     explained, size = float(np.sum((columns.T @ beside.residual) ** 2)), columns.shape[1]
     dof = beside.degrees_of_freedom - size
     rest = float(beside.residual @ beside.residual) - explained

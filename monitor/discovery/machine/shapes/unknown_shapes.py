@@ -13,20 +13,26 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
+from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
 from monitor.discovery.machine.shapes.cycles import cycle_instead
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.slight_shapes import slight_error, slight_shape, slight_wave
+from monitor.discovery.machine.shapes.slight_shapes import (
+    best_wave,
+    p_value_of_all,
+    slight_error,
+    slight_shape,
+    slight_wave,
+)
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.waves import waves_instead, worth_keeping
+from monitor.discovery.machine.shapes.waves import many_periods, waves_instead, worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import weigh_beside
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import (
     WORTH_EXCHANGING,
@@ -38,14 +44,12 @@ from monitor.discovery.search.scan import (
 from monitor.discovery.search.scene import family_count
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import Always
-from monitor.effects.shapes.free import HARMONICS, Free
+from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
 from monitor.records import Array
 
 # The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
 LEVEL = 1e-3
-# Waves of fewer periods a turn are in the catalogue, or are the motion itself.
-FEWEST_PERIODS = 4
 # More parts than this of one shape are beyond what a plan can separate.
 MOST_PARTS = 8
 # What bends the line of sight of every telescope.
@@ -71,10 +75,24 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     """The result with one effect of free shape instead of those of the catalogue, for every error whose shape they are
     not."""
     selected = result.candidates
-    if not selected and not _lacks_something(scene) and not _is_lost_sight(scene):
-        scene, selected = _slight(scene)
-        if not selected:
-            return scene, result
+    if selected or _lacks_something(scene) or _is_lost_sight(scene):
+        scene, selected = _in_any_shapes(scene, selected)
+    if not selected:
+        # What all poses together show may be one wave as well, which is little of a whole free shape.
+        scene, slight = _slight(scene)
+        scene, selected = _in_any_shapes(scene, slight) if slight else (scene, slight)
+    scene, selected = _rather_waves(scene, selected)
+    if len(selected) == len(result.findings) and all(
+        _is_among(shape, result.candidates) for shape in selected
+    ):
+        return scene, result
+    return scene, ScanResult(findings_of(scene, selected))
+
+
+def _in_any_shapes(
+    scene: ChainScene, selected: list[ChainCandidate]
+) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with free shapes, waves and cycles in place of those that say less at their price."""
     scene, selected = _with_free(scene, selected)
     margin = _margin(scene, selected)
     instead = [] if margin is None else _in_place(scene, selected, margin)
@@ -82,12 +100,28 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         new = [each for each in instead if _is_free(each) and not _is_among(each, selected)]
         selected = instead
         scene = replace(scene, candidates=(*scene.candidates, *new))
-    scene, selected = _with_waves(scene, selected)
-    if len(selected) == len(result.findings) and all(
-        _is_among(shape, result.candidates) for shape in selected
-    ):
-        return scene, result
-    return scene, ScanResult(findings_of(scene, selected))
+    return _with_waves(scene, selected)
+
+
+def _rather_waves(
+    scene: ChainScene, selected: list[ChainCandidate]
+) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with a wave of many periods a turn, of whatever error, in place of each that says less.
+
+    At few angles such a wave looks like one of another axis, or like a play, which the catalogue has. Where neighbours
+    resemble each other noise is an estimate, and nothing is exchanged.
+    """
+    if not selected or scene.fit.whitening is not None or poses_of_rows(scene.fit) is not None:
+        return scene, selected
+    waves = [wave for shapes in _shapes_by_error(scene).values() for wave in many_periods(scene, shapes)]
+    for effect in selected:
+        others = [other for other in selected if other is not effect]
+        score = _priced(scene, [effect], others) + WORTH_EXCHANGING
+        best = best_wave(scene, waves, others)
+        if best is not None and best.score > score and _predicts(scene, best.candidate, others):
+            selected = [*others, best.candidate]
+            scene = _with_candidate(scene, best.candidate)
+    return scene, selected
 
 
 def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
@@ -204,7 +238,7 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
         return scene, []
     wholes = [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()]
     part = slight_shape(scene, wholes)
-    waves = [wave for of in shapes.values() for wave in _waves(scene, of)]
+    waves = [wave for of in shapes.values() for wave in many_periods(scene, of)]
     wave = slight_wave(scene, waves)
     if wave is not None and (part is None or wave.p_value <= part.p_value):
         slight = waves[wave.number]
@@ -251,18 +285,6 @@ def _predicts_runs(scene: ChainScene, slight: ChainCandidate) -> bool:
     """Whether an effect alone lowers the error on runs left out; true with too few runs."""
     before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([slight]))
     return before is None or after is None or after < before
-
-
-def _waves(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[ChainCandidate, ...]:
-    """The waves of an error with more periods a turn than its ``shapes`` have, up to those of the flexible basis."""
-    effect = shapes[0].effect
-    if not isinstance(effect, ChainEffect) or not effect.joint.turns:
-        return ()
-    present = {shape.family for shape in shapes}
-    symbol, chain = error_of(shapes[0]), scene.fit.problem.context.chain
-    texts = [f"{symbol}:harmonic{order}" for order in range(FEWEST_PERIODS, HARMONICS + 1)]
-    variants = [Variant(text, parse_effect(text, chain)) for text in texts if text not in present]
-    return scene_of(scene.fit, variants).candidates
 
 
 def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: float) -> list[ChainCandidate]:
@@ -394,15 +416,7 @@ def _of_parts(
 
 def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[ChainCandidate]) -> bool:
     """Whether an error in any shape explains more than chance of what the selected effects leave."""
-    beside = scene.remainders.beside(selected)
-    basis, residual = beside.basis, beside.residual
-    columns = orthonormal(without(basis, whole.columns))
-    explained, size = float(np.sum((columns.T @ residual) ** 2)), columns.shape[1]
-    dof = scene.degrees_of_freedom - basis.shape[1] - size
-    rest = float(residual @ residual) - explained
-    if size == 0 or dof < 1 or rest <= 0.0:
-        return False
-    return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof))) < LEVEL
+    return p_value_of_all(scene, whole.columns, selected) < LEVEL
 
 
 def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:

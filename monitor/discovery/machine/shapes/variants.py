@@ -191,6 +191,11 @@ def _cycles_over(chain: Chain, travels: tuple[tuple[str, float], ...]) -> tuple[
     return tuple(variants)
 
 
+def columns_of_pitches(context: Context) -> int:
+    """How many columns the cycles of unknown pitch have that are searched: most of a search over long axes."""
+    return 2 * len(resolvable(cycles_of_unknown_pitch(context), context))
+
+
 def frequency_step(travel: float) -> float:
     """The step in 1/mm of the grid of pitches of an axis that travelled so many mm."""
     return 0.5 / max(travel, SHORT_TRAVEL_MM)

@@ -19,6 +19,8 @@ from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import HARMONICS, Free
 from monitor.records import Array
 
+#: Waves of fewer periods a turn are in the catalogue, or are the motion itself.
+FEWEST_PERIODS = 4
 #: A shape that takes more names than these has none: a wave that does not repeat each turn is three and a remainder.
 MOST_NAMES = 2
 #: The free shape with some parts, from 0, beside others; and the score of effects at their price beside others.
@@ -65,6 +67,18 @@ def _wave(scene: ChainScene, text: str) -> ChainCandidate:
     return scene_of(
         scene.fit, [Variant(text, parse_effect(text, scene.fit.problem.context.chain))]
     ).candidates[0]
+
+
+def many_periods(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[ChainCandidate, ...]:
+    """The waves of an error with more periods a turn than its ``shapes`` have, up to those of the flexible basis."""
+    effect = shapes[0].effect
+    if not isinstance(effect, ChainEffect) or not effect.joint.turns:
+        return ()
+    present = {shape.family for shape in shapes}
+    symbol, chain = error_of(shapes[0]), scene.fit.problem.context.chain
+    texts = [f"{symbol}:harmonic{order}" for order in range(FEWEST_PERIODS, HARMONICS + 1)]
+    variants = [Variant(text, parse_effect(text, chain)) for text in texts if text not in present]
+    return scene_of(scene.fit, variants).candidates
 
 
 def worth_keeping(

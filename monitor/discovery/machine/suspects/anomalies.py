@@ -106,11 +106,11 @@ def deviations_of(fit: Fit) -> Deviations:
     inflation = np.where(enough, 1.0 + 1.0 / np.where(enough, others, 1), 1.0)
     rows = tuple(np.flatnonzero(problem.context.run == run) for run in problem.runs)
     bases = eliminate(fit.solution.last.local).basis
-    parts = checked_parts(fit)
+    parts = checked_parts(fit, bases)
     # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
     # the others as a whole has no bad points for that.
     # Rows of several instruments differ in how many numbers they have.
-    usual = scipy.stats.chi2.median(np.maximum(np.isfinite(problem.sigma).sum(axis=1), 1))
+    usual = 2.0 * scipy.special.gammaincinv(np.maximum(np.isfinite(problem.sigma).sum(axis=1), 1) / 2.0, 0.5)
     squares = np.sum(vectors**2, axis=1) / inflation / usual
     share = max(fit.degrees_of_freedom / (fit.readings + 1e-300), 1e-6)
     scale = np.full(len(weighted), np.median(squares[weighted]) / share)
@@ -122,13 +122,14 @@ def deviations_of(fit: Fit) -> Deviations:
     return Deviations(vectors, inflation, rows, bases, parts, scale)
 
 
-def checked_parts(fit: Fit) -> Array:
-    """What every run's own unknowns leave (n, d, d) of the variance of each row's own residual."""
+def checked_parts(fit: Fit, bases: Array | None = None) -> Array:
+    """What every run's own unknowns leave (n, d, d) of the variance of each row's own residual; ``bases`` (R, N, p)
+    are their span where it is known."""
     problem = fit.problem
     is_read = np.isfinite(problem.sigma)
     rows, numbers = is_read.shape
     parts = np.zeros((rows, numbers, numbers))
-    bases = eliminate(fit.solution.last.local).basis
+    bases = eliminate(fit.solution.last.local).basis if bases is None else bases
     for number, run in enumerate(problem.runs):
         members = np.flatnonzero(problem.context.run == run)
         basis = bases[number, : numbers * len(members)].reshape(len(members), numbers, -1)
@@ -150,9 +151,10 @@ def statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], A
     )
 
 
-def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
-    """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
-    deviations = deviations_of(fit)
+def bad_points(fit: Fit, *, alpha: float = 0.01, deviations: Deviations | None = None) -> list[BadPoint]:
+    """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign;
+    ``deviations`` are those of the fit where they are known."""
+    deviations = deviations or deviations_of(fit)
     context = fit.problem.context
     tests = int((~fit.left_out).sum())
     points = []
@@ -189,9 +191,10 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     return points
 
 
-def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
-    """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
-    deviations = deviations_of(fit)
+def ball_moves(fit: Fit, *, alpha: float = 0.01, deviations: Deviations | None = None) -> list[BallMove]:
+    """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign;
+    ``deviations`` are those of the fit where they are known."""
+    deviations = deviations or deviations_of(fit)
     context = fit.problem.context
     weighted = ~fit.left_out
     tails = tails_of((deviations.vectors / np.sqrt(deviations.inflation)[:, None])[weighted])

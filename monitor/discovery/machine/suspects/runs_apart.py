@@ -18,6 +18,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.suspects.anomalies import checked_parts, statistic
 from monitor.discovery.search.projection import orthonormal
 from monitor.records import Array
+from monitor.statistics.tails import mean_ranks
 
 # Runs of a real machine differ by a third; what is less has not spoilt anything.
 LEAST_TIMES = 1.35
@@ -95,14 +96,14 @@ def _apart(scene: ChainScene, typical: Array, judged: npt.NDArray[np.bool_], num
 
 def _p_value(mine: Array, others: Array) -> float:
     """The probability by ranks that the touches of a run are so much larger by chance."""
-    ranks = scipy.stats.rankdata(np.concatenate([mine, others]))
+    ranks = mean_ranks(np.concatenate([mine, others])[:, None])[:, 0]
     of_run = ranks[: len(mine)]
     correlations = _correlations(of_run - of_run.mean())
     # Beyond the first touch that no longer goes along they are noise.
     share = 1.0 + 2.0 * float(correlations[: int(np.argmin([*(correlations > 0.0), False]))].sum())
     excess = float(np.sum(of_run) - len(mine) * (len(ranks) + 1) / 2.0)
     spread = np.sqrt(len(mine) * len(others) * (len(ranks) + 1) / 12.0 * share)
-    return float(scipy.stats.norm.sf(excess / spread))
+    return float(scipy.special.ndtr(-excess / spread))
 
 
 def _correlations(values: Array) -> Array:

@@ -26,7 +26,7 @@ from monitor.effects.drivers.settling import Settling
 
 # Readings before and after: six coefficients follow fewer.
 READINGS_EACH_SIDE = 8
-# So many moments of a run are tried, then those between the best one and its neighbours.
+# So many moments of a run are tried, then as many of those between the best one and its neighbours.
 MOMENTS = 40
 # A tripod is knocked more easily than a machine; resting targets outweigh that at once.
 ODDS_OF_BASE = 3.0
@@ -113,9 +113,12 @@ def _likeliest(
     of_runs = []
     for run, sequences in moments.items():
         step = max(len(sequences) // MOMENTS, 1)
-        coarse = best_of(run, sequences[::step])
-        if coarse is not None:
-            at = int(np.searchsorted(sequences, _change_of(coarse.candidate).sequence))
-            fine = best_of(run, sequences[max(at - step, 0) : at + step + 1])
-            of_runs.append(fine or coarse)
+        best = best_of(run, sequences[::step])
+        while best is not None and step > 1:
+            at = int(np.searchsorted(sequences, _change_of(best.candidate).sequence))
+            around = sequences[max(at - step, 0) : at + step + 1]
+            step = max(len(around) // MOMENTS, 1)
+            best = best_of(run, around[::step]) or best
+        if best is not None:
+            of_runs.append(best)
     return max(of_runs, key=lambda each: each.score, default=None)

@@ -19,7 +19,13 @@ from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect
 from monitor.discovery.machine.shapes.variants import each_run
-from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove, bad_points, ball_moves
+from monitor.discovery.machine.suspects.anomalies import (
+    BadPoint,
+    BallMove,
+    bad_points,
+    ball_moves,
+    deviations_of,
+)
 from monitor.discovery.machine.suspects.bad_poses import bad_poses
 from monitor.discovery.machine.suspects.piece_moves import piece_move
 from monitor.discovery.machine.suspects.scatter import Scatter, scattering, settled
@@ -201,10 +207,10 @@ def with_slip_of(
 
 def _with_most_certain(suspects: Suspects, current: Fit, look: _LooksForVarying) -> Suspects | None:
     """The suspects with what explains most of what a fit leaves; None where nothing does."""
-    slip = look.slip(current)
+    slip, deviations = look.slip(current), deviations_of(current)
     single: list[BadPoint | BallMove] = [
-        *bad_points(current),
-        *ball_moves(current),
+        *bad_points(current, deviations=deviations),
+        *ball_moves(current, deviations=deviations),
         *([slip] if slip else []),
     ]
     single.sort(key=lambda suspect: -suspect.chi_square)
