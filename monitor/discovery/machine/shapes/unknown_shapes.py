@@ -17,11 +17,12 @@ import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
-from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
+from monitor.discovery.machine.shapes.bends import bends_instead, foretells_poses, score_beside
 from monitor.discovery.machine.shapes.cycles import cycle_instead
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.slight_shapes import slight_error, slight_shape, slight_wave
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.teeth import teeth_of
 from monitor.discovery.machine.shapes.waves import waves_instead, worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
@@ -79,7 +80,7 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     margin = _margin(scene, selected)
     instead = [] if margin is None else _in_place(scene, selected, margin)
     if instead:
-        new = [each for each in instead if _is_free(each) and not _is_among(each, selected)]
+        new = [each for each in instead if not _is_among(each, [*selected, *scene.candidates])]
         selected = instead
         scene = replace(scene, candidates=(*scene.candidates, *new))
     scene, selected = _with_waves(scene, selected)
@@ -103,7 +104,9 @@ def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chai
         split = waves_instead(scene, free, taken, of_parts, score) or cycle_instead(
             scene, free, others, score
         )
-        if split and all(_predicts(scene, wave, [*others, *split[:at]]) for at, wave in enumerate(split)):
+        if split and all(
+            foretells_poses(scene, [wave], [*others, *split[:at]]) for at, wave in enumerate(split)
+        ):
             selected = [*others, *split]
             # The whole it came from is no rival of its parts.
             without_free = [
@@ -215,7 +218,7 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
     else:
         symbol = slight_error(scene, wholes)
         return (scene, []) if symbol is None else _in_several_parts(scene, symbol, shapes[symbol])
-    if not _predicts_runs(scene, slight) or not _predicts(scene, slight, []):
+    if not _predicts_runs(scene, slight) or not foretells_poses(scene, [slight], []):
         return scene, []
     return replace(scene, candidates=(*scene.candidates, *more)), [slight]
 
@@ -227,7 +230,7 @@ def _in_several_parts(
     with it; nothing where it foretells no poses."""
     parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
     free = _of_parts(scene, symbol, parts, shapes, []) if parts else None
-    if free is not None and not _predicts(scene, free, []):
+    if free is not None and not foretells_poses(scene, [free], []):
         free = None
     bends = bends_instead(scene, symbol, _priced(scene, [free]) if free else 0.0, [])
     if bends or free is None:
@@ -283,11 +286,16 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     }
     best: list[ChainCandidate] = []
     worth = max(_priced(scene, selected), _priced(scene, _bending_sight(scene))) + margin
-    for count in range(max(len(ordered), 1)):
-        leading, gone = ordered[:count], ordered[count:]
-        for symbol, (shapes, whole) in errors.items():
-            for new in _of_error(scene, symbol, shapes, whole, leading):
-                together = [*leading, *new, *_standing_beside(scene, [*leading, *new], gone)]
+    for symbol, (shapes, whole) in errors.items():
+        # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
+        teeth = teeth_of(scene, shapes[0])
+        for count in range(max(len(ordered), 1)):
+            leading, gone = ordered[:count], ordered[count:]
+            sawtooth = teeth.beside(leading) if teeth is not None else []
+            for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
+                # What rounded teeth leave is no other error.
+                beside = [*leading, *new, *([whole] if new is sawtooth else [])]
+                together = [*leading, *new, *_standing_beside(scene, beside, gone)]
                 score = _priced(scene, together)
                 if score > worth:
                     best, worth = together, score
@@ -316,7 +324,7 @@ def _of_error(
     if not parts:
         return []
     free = _of_parts(scene, symbol, parts, shapes, leading)
-    able = _predicts(scene, free, leading)
+    able = foretells_poses(scene, [free], leading)
     bends = bends_instead(scene, symbol, _priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]
 
@@ -362,7 +370,7 @@ def _free(
     free = _of_parts(scene, symbol, parts, mine, others)
     price = 2.0 * len(parts) * PRICE
     worth = score_beside(scene, [free], others) - price > score_beside(scene, mine, others) + WORTH_EXCHANGING
-    return free if worth and _predicts(scene, free, others) else None
+    return free if worth and foretells_poses(scene, [free], others) else None
 
 
 def _whole(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
@@ -427,10 +435,3 @@ def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandi
         residual = without(direction, residual[:, None])[:, 0]
         columns = without(direction, columns)
     return worth_keeping(without(basis, whole.columns), beside.residual, parts, dof, price)
-
-
-def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
-    """Whether a free shape beside others lowers the error at poses left out of every run; true with too few poses."""
-    before = scene.held_out_error_by_poses(scene.columns(others))
-    after = scene.held_out_error_by_poses(scene.columns([*others, free]))
-    return before is None or after is None or after < before
