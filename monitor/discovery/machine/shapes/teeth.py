@@ -17,11 +17,17 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.variants import SHORTEST_PITCH_MM
+from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.variants import (
+    FEWEST_PERIODS,
+    SHORTEST_PITCH_MM,
+    frequency_step,
+    resolvable,
+)
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Pool, weigh_beside
 from monitor.effects import ChainEffect
-from monitor.effects.shapes import Sawtooth
+from monitor.effects.shapes import Cyclic, Sawtooth
 from monitor.records import Array
 
 # Fewer teeth over the travel are a step, which free shapes have; of some fifty positions ten teeth have five each.
@@ -106,8 +112,9 @@ class TeethOfError:
         )
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
-        """The error as the sawtooth that says most beside others, alone; none where it is among them, where nothing is
-        seen of any, or where it foretells no poses."""
+        """The error as the sawtooth that says most beside others, or as the plain cycle of so many periods where that
+        says as much, alone; none where it is among them, where nothing is seen of any, or where it foretells no poses.
+        """
         if self.effect.term.symbol in map(error_of, others):
             return []
         weighed = self._weighed(self._grid, others)
@@ -117,8 +124,34 @@ class TeethOfError:
         around = [self._weighed(self._near(each.grid_point, wide), others) for each in weighed[:STARTS]]
         best = max(around, key=lambda some: some[0].score)[0]
         fine = self._weighed(self._near(best.grid_point, (wide[0] / FINER, wide[1] / FINER)), others)
-        found = _middle(fine).candidate
+        found = self._cycle_instead(_middle(fine), others)
         return [found] if foretells_poses(self.scene, [found], others) else []
+
+    def _cycle_instead(self, sawtooth: _Weighed, others: Sequence[ChainCandidate]) -> ChainCandidate:
+        """The plain cycle that says at least as much as a sawtooth beside others, else that."""
+        travel, symbol = self._range[1], self.effect.term.symbol
+        periods = np.arange(FEWEST_PERIODS, MOST_TEETH, travel * frequency_step(travel))
+        variants = [
+            Variant(
+                f"{symbol}:cyclic",
+                replace(
+                    self.effect, shape=Cyclic(travel / number), shape_text=f"cyclic{travel / number:.6g}mm"
+                ),
+                len(periods),
+            )
+            for number in periods.tolist()
+        ]
+        shown = resolvable(variants, self.scene.fit.problem.context)
+        cycles = [each for each in scene_of(self.scene.fit, shown).candidates if each.visible]
+        weighed = weigh_beside(self.scene, cycles, others)
+        if not weighed:
+            return sawtooth.candidate
+        cycle = refine(self.scene, [*others, weighed[0].candidate], len(others)).candidate
+        return (
+            cycle
+            if weigh_beside(self.scene, [cycle], others)[0].score >= sawtooth.score
+            else sawtooth.candidate
+        )
 
     def _near(self, grid_point: tuple[float, float], widths: tuple[float, float]) -> _Sawtooths:
         """The sawtooths about a number of teeth and a phase, as far as these widths."""

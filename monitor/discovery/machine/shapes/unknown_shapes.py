@@ -295,7 +295,10 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
             for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
                 # What rounded teeth leave is no other error.
                 beside = [*leading, *new, *([whole] if new is sawtooth else [])]
-                together = [*leading, *new, *_standing_beside(scene, beside, gone)]
+                of_others = [each for each in gone if error_of(each) != symbol]
+                # One goes in any case: where teeth take the place of their error's other shapes, these do.
+                may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
+                together = [*leading, *new, *_standing_beside(scene, beside, may_stay)]
                 score = _priced(scene, together)
                 if score > worth:
                     best, worth = together, score
@@ -332,9 +335,9 @@ def _of_error(
 def _standing_beside(
     scene: ChainScene, others: Sequence[ChainCandidate], effects: Sequence[ChainCandidate]
 ) -> list[ChainCandidate]:
-    """Those of some effects that stand out beside others; one of them, the last, goes in any case."""
+    """Those of some effects that stand out beside others."""
     standing: list[ChainCandidate] = []
-    for effect in effects[:-1]:
+    for effect in effects:
         (evidence,) = weigh_beside(scene, [effect], [*others, *standing])
         if evidence.p_value * family_count(scene) < LEVEL:
             standing.append(effect)
