@@ -124,8 +124,8 @@ class TeethOfError:
         around = [self._weighed(self._near(each.grid_point, wide), others) for each in weighed[:STARTS]]
         best = max(around, key=lambda some: some[0].score)[0]
         fine = self._weighed(self._near(best.grid_point, (wide[0] / FINER, wide[1] / FINER)), others)
-        found = self._cycle_instead(_middle(fine), others)
-        return [found] if foretells_poses(self.scene, [found], others) else []
+        simplest = self._cycle_instead(_middle(fine), others)
+        return [simplest] if foretells_poses(self.scene, [simplest], others) else []
 
     def _cycle_instead(self, sawtooth: _Weighed, others: Sequence[ChainCandidate]) -> ChainCandidate:
         """The plain cycle that says at least as much as a sawtooth beside others, else that."""
