@@ -36,6 +36,8 @@ FEWEST_TEETH, MOST_TEETH = 1.8, 10.0
 STEP_OF_TEETH, EDGES = 0.25, 12
 # About the best so many of the grid the best is looked for on a grid so many times finer, and once more about that.
 STARTS, FINER = 3, 5
+# An edge beyond this part of the travel is seen by hardly a position.
+WITHIN_TRAVEL = 0.9
 # Sawtooths whose scores differ by less are the same at all positions.
 SAME_SCORE = 0.1
 
@@ -106,10 +108,19 @@ class TeethOfError:
         grid_points = {
             self._variant(*grid_point): grid_point for grid_point in product(teeth.tolist(), phases.tolist())
         }
-        candidates = scene_of(self.scene.fit, [*grid_points]).candidates
+        candidates = scene_of(
+            self.scene.fit, [each for each in grid_points if self._falls_twice(each)]
+        ).candidates
         return _Sawtooths(
             Pool(tuple(candidate for candidate in candidates if candidate.visible)), grid_points
         )
+
+    def _falls_twice(self, variant: ChainVariant) -> bool:
+        """Whether a second edge of a sawtooth lies within the travel: one alone is a step, which free shapes have."""
+        low, travel = self._range
+        assert isinstance(variant.effect, ChainEffect)
+        assert isinstance(variant.effect.shape, Sawtooth)
+        return variant.effect.shape.edge + variant.effect.shape.pitch < low + WITHIN_TRAVEL * travel
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the sawtooth that says most beside others, or as the plain cycle of so many periods where that
