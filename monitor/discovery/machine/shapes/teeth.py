@@ -170,7 +170,9 @@ class TeethOfError:
         return self._of(grid_point[0] + widths[0] * steps, grid_point[1] + widths[1] * steps)
 
     def _weighed(self, sawtooths: _Sawtooths, others: Sequence[ChainCandidate]) -> list[_Weighed]:
-        """Sawtooths beside others, the most convincing first."""
+        """Sawtooths beside others, the most convincing first; none where the data see none."""
+        if not sawtooths.pool.candidates:
+            return []
         return [
             _Weighed(each.candidate, sawtooths.grid_points[each.candidate.variant], each.score)
             for each in weigh_beside(self.scene, sawtooths.pool, others)
