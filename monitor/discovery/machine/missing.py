@@ -259,7 +259,9 @@ def largest_deviation(columns: Array, coefficients: Array, covariance: Array) ->
 
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
-    searched = candidate.family.endswith((":cyclic", ":windup", ":harmonic", ":table", ":free", ":curve"))
+    searched = candidate.family.endswith(
+        (":cyclic", ":sawtooth", ":windup", ":harmonic", ":table", ":free", ":curve")
+    )
     return candidate.effect.text if searched else candidate.family
 
 

@@ -20,9 +20,9 @@ from monitor.discovery.machine.missing import told_apart
 from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
+from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.machine.suspects.suspects import (
     MOST_BAD_POINTS,
     SuspectNames,

@@ -13,6 +13,7 @@ from monitor.effects.shapes.harmonics import Harmonics, harmonics_text
 from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
 from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
+from monitor.effects.shapes.sawtooth import Sawtooth
 from monitor.effects.shapes.table import TABLE_NODES, Table
 from monitor.effects.shapes.windup import WindUp
 from monitor.exceptions import EffectError, did_you_mean
@@ -29,6 +30,7 @@ __all__ = [
     "Nodes",
     "Poly",
     "Reversal",
+    "Sawtooth",
     "Table",
     "WindUp",
     "harmonics_text",
@@ -40,8 +42,8 @@ __all__ = [
 
 #: What a mistyped shape is compared with.
 _EXAMPLES = (
-    "const", "poly1", "poly2", "poly3", "harmonic1", "harmonic2", "cyclic20mm", "reversal", "windup40mm", "lag",
-    "compliance", "table", "formula(...)",
+    "const", "poly1", "poly2", "poly3", "harmonic1", "harmonic2", "cyclic20mm", "sawtooth84mm(12)", "reversal",
+    "windup40mm", "lag", "compliance", "table", "formula(...)",
 )  # fmt: skip
 
 
@@ -53,8 +55,9 @@ def parse_shape(text: str) -> Shape:
         raise EffectError(
             f"there is no shape '{text}'; {hint}"
             "there are const, poly1 to poly9, harmonic1 to harmonic9999, "
-            "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), reversal, "
-            "windup40mm or windup40deg (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
+            "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), sawtooth84mm(12) (any pitch, and where it "
+            "falls), reversal, windup40mm or windup40deg (any width), lag, compliance, table (or table9 for nine "
+            "nodes, up to table99; "
             f"table(-100,0,100) for your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

@@ -13,7 +13,7 @@ from monitor.discovery import Explanation, Fit
 from monitor.effects import Basis, ChainEffect, ParsedEffect, parse_effect
 from monitor.effects.context import REFERENCE_TEMPERATURE_DEGC
 from monitor.effects.drivers import Channel, EachRun, LaggedTemperature, RunTime, Settling, WarmUp
-from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal, WindUp
+from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal, Sawtooth, WindUp
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.reporting.figures import driver_names
@@ -121,7 +121,7 @@ def _axis_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     if isinstance(effect.shape, Reversal | WindUp):
         travel = joint.sign * context.travel[:, effect.term.joint]
         return {driver_names.last_travel(joint.name): travel}
-    if isinstance(effect.shape, Cyclic):
+    if isinstance(effect.shape, Cyclic | Sawtooth):
         pitch = effect.shape.pitch
         return {driver_names.within_pitch(joint.name, pitch): reading % pitch}
     return {driver_names.reading(joint.name, turns=joint.turns): reading}

@@ -35,9 +35,16 @@ def bends_instead(
     best = max(together, key=lambda some: score_beside(scene, some, others))
     if score_beside(scene, best, others) < worth or _all_but_cancel(scene, best, others):
         return []
+    return best if foretells_poses(scene, best, others) else []
+
+
+def foretells_poses(
+    scene: ChainScene, effects: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> bool:
+    """Whether effects beside others lower the error at poses left out of every run; true with too few poses."""
     before = scene.held_out_error_by_poses(scene.columns(others))
-    after = scene.held_out_error_by_poses(scene.columns([*others, *best]))
-    return best if before is None or after is None or after < before else []
+    after = scene.held_out_error_by_poses(scene.columns([*others, *effects]))
+    return before is None or after is None or after < before
 
 
 def _all_but_cancel(

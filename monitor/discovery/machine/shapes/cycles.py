@@ -13,6 +13,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
     SHORTEST_PITCH_MM,
@@ -53,5 +54,7 @@ def cycle_instead(
     weighed = weigh_beside(scene, cycles, others)
     if not weighed:
         return []
-    best = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
-    return [best] if score([best]) >= score([free]) else []
+    plain = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
+    teeth = TeethOfError(scene, effect).beside(others)
+    best = max([[plain], *([teeth] if teeth else [])], key=score)
+    return best if score(best) >= score([free]) else []

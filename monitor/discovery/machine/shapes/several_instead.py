@@ -13,8 +13,8 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import MOST_EFFECTS

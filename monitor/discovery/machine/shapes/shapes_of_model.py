@@ -15,8 +15,8 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.unknown_shapes import price_of_parts
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without

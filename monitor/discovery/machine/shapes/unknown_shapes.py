@@ -1,9 +1,7 @@
 """An error whose shape the catalogue does not have: what was found of it becomes one effect of free shape.
 
-Where the flexible competitor of an error says more than its shapes of the catalogue, a few parts of it are selected,
-one after the other, at the price of each and of the choice (Schwarz's criterion extended for many candidates: Chen and
-Chen, Biometrika 95 (2008) 759). The free shape leads if it says more at its price and lowers the error
-at left-out poses.
+Where the flexible competitor of an error says more than its shapes of the catalogue, a few parts of it are selected
+(``free_parts``). The free shape leads if it says more at its price and lowers the error at left-out poses.
 """
 
 from __future__ import annotations
@@ -12,14 +10,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.evidence.poses import poses_of_rows
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
-from monitor.discovery.machine.shapes.bends import bends_instead, score_beside
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.bends import bends_instead, foretells_poses, score_beside
 from monitor.discovery.machine.shapes.cycles import cycle_instead
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import (
+    PRICE,
+    in_any_shape,
+    is_free,
+    of_parts,
+    parts_worth_keeping,
+    price_of_parts,
+    priced,
+    whole_basis,
+)
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -28,11 +34,10 @@ from monitor.discovery.machine.shapes.slight_shapes import (
     slight_wave,
 )
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.waves import many_periods, waves_instead, worth_keeping
-from monitor.discovery.search.candidate import Variant
+from monitor.discovery.machine.shapes.teeth import teeth_of
+from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import weigh_beside
-from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import (
     WORTH_EXCHANGING,
@@ -42,22 +47,17 @@ from monitor.discovery.search.scan import (
     findings_without_rivals,
 )
 from monitor.discovery.search.scene import family_count
-from monitor.effects import ChainEffect, parse_effect
+from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
-from monitor.records import Array
 
 # The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
 LEVEL = 1e-3
-# More parts than this of one shape are beyond what a plan can separate.
-MOST_PARTS = 8
 # What bends the line of sight of every telescope.
 BENDING_SIGHT = ("flexure:tool@gravity", "sight:up:formula(1/tan(elevation))")
 # So many times the stated noise is an error that is missing, not a statement that is wrong.
 FAR = 1.5
-# The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
-PRICE = float(np.log(45.0))
 
 
 def _is_of_shape(candidate: ChainCandidate) -> bool:
@@ -97,7 +97,7 @@ def _in_any_shapes(
     margin = _margin(scene, selected)
     instead = [] if margin is None else _in_place(scene, selected, margin)
     if instead:
-        new = [each for each in instead if _is_free(each) and not _is_among(each, selected)]
+        new = [each for each in instead if not _is_among(each, [*selected, *scene.candidates])]
         selected = instead
         scene = replace(scene, candidates=(*scene.candidates, *new))
     return _with_waves(scene, selected)
@@ -116,9 +116,9 @@ def _rather_waves(
     waves = [wave for shapes in _shapes_by_error(scene).values() for wave in many_periods(scene, shapes)]
     for effect in selected:
         others = [other for other in selected if other is not effect]
-        score = _priced(scene, [effect], others) + WORTH_EXCHANGING
+        score = priced(scene, [effect], others) + WORTH_EXCHANGING
         best = best_wave(scene, waves, others)
-        if best is not None and best.score > score and _predicts(scene, best.candidate, others):
+        if best is not None and best.score > score and foretells_poses(scene, [best.candidate], others):
             selected = [*others, best.candidate]
             scene = _with_candidate(scene, best.candidate)
     return scene, selected
@@ -132,12 +132,14 @@ def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chai
         if not shapes:
             continue
         score = partial(_named_or_free, scene, others)
-        of_parts = partial(_of_parts, scene, error_of(free), shapes=shapes, others=others)
+        in_parts = partial(of_parts, scene, error_of(free), shapes=shapes, others=others)
         taken = {other.family for other in others}
-        split = waves_instead(scene, free, taken, of_parts, score) or cycle_instead(
+        split = waves_instead(scene, free, taken, in_parts, score) or cycle_instead(
             scene, free, others, score
         )
-        if split and all(_predicts(scene, wave, [*others, *split[:at]]) for at, wave in enumerate(split)):
+        if split and all(
+            foretells_poses(scene, [wave], [*others, *split[:at]]) for at, wave in enumerate(split)
+        ):
             selected = [*others, *split]
             # The whole it came from is no rival of its parts.
             without_free = [
@@ -166,7 +168,7 @@ def _margin(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float | No
     """
     if not selected:
         return UNDECIDED
-    if any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
+    if any(is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         return WORTH_EXCHANGING
     # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing.
     if scene.fit.problem.needs_whole_periods and not _far_from_noise(scene, selected):
@@ -219,14 +221,9 @@ def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> 
     return bool(weighed) and weighed[0].p_value * family_count(scene) < LEVEL
 
 
-def _is_free(candidate: ChainCandidate) -> bool:
-    effect = candidate.effect
-    return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
-
-
 def _is_any_curve(candidate: ChainCandidate) -> bool:
     """Whether an effect follows any curve: a free shape or an error table."""
-    return _is_free(candidate) or candidate.family.endswith(":table")
+    return is_free(candidate) or candidate.family.endswith(":table")
 
 
 def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
@@ -236,7 +233,7 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
     shapes = _shapes_by_error(scene)
     if not shapes:
         return scene, []
-    wholes = [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()]
+    wholes = [in_any_shape(symbol, of[0]) for symbol, of in shapes.items()]
     part = slight_shape(scene, wholes)
     waves = [wave for of in shapes.values() for wave in many_periods(scene, of)]
     wave = slight_wave(scene, waves)
@@ -244,12 +241,12 @@ def _slight(scene: ChainScene) -> tuple[ChainScene, list[ChainCandidate]]:
         slight = waves[wave.number]
         more = [other for other in waves if error_of(other) == error_of(slight) and other.visible]
     elif part is not None:
-        slight = _of_parts(scene, part.family, [part.number], shapes[part.family], [])
+        slight = of_parts(scene, part.family, [part.number], shapes[part.family], [])
         more = [slight]
     else:
         symbol = slight_error(scene, wholes)
         return (scene, []) if symbol is None else _in_several_parts(scene, symbol, shapes[symbol])
-    if not _predicts_runs(scene, slight) or not _predicts(scene, slight, []):
+    if not _predicts_runs(scene, slight) or not foretells_poses(scene, [slight], []):
         return scene, []
     return replace(scene, candidates=(*scene.candidates, *more)), [slight]
 
@@ -259,11 +256,11 @@ def _in_several_parts(
 ) -> tuple[ChainScene, list[ChainCandidate]]:
     """An error as several powers of the position where these say as much as its free shape, else in that, and the scene
     with it; nothing where it foretells no poses."""
-    parts = _parts(scene, _whole(scene, symbol, shapes[0]), [])
-    free = _of_parts(scene, symbol, parts, shapes, []) if parts else None
-    if free is not None and not _predicts(scene, free, []):
+    parts = parts_worth_keeping(scene, whole_basis(scene, symbol, shapes[0]), [])
+    free = of_parts(scene, symbol, parts, shapes, []) if parts else None
+    if free is not None and not foretells_poses(scene, [free], []):
         free = None
-    bends = bends_instead(scene, symbol, _priced(scene, [free]) if free else 0.0, [])
+    bends = bends_instead(scene, symbol, priced(scene, [free]) if free else 0.0, [])
     if bends or free is None:
         return scene, bends
     return _with_candidate(scene, free), [free]
@@ -301,16 +298,24 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     for shape in filter(_is_of_shape, scene.candidates):
         shapes_by_error.setdefault(error_of(shape), []).append(shape)
     errors = {
-        symbol: (shapes, _whole(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
+        symbol: (shapes, whole_basis(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
     }
     best: list[ChainCandidate] = []
-    worth = max(_priced(scene, selected), _priced(scene, _bending_sight(scene))) + margin
-    for count in range(max(len(ordered), 1)):
-        leading, gone = ordered[:count], ordered[count:]
-        for symbol, (shapes, whole) in errors.items():
-            for new in _of_error(scene, symbol, shapes, whole, leading):
-                together = [*leading, *new, *_standing_beside(scene, [*leading, *new], gone)]
-                score = _priced(scene, together)
+    worth = max(priced(scene, selected), priced(scene, _bending_sight(scene))) + margin
+    for symbol, (shapes, whole) in errors.items():
+        # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
+        teeth = teeth_of(scene, shapes[0])
+        for count in range(max(len(ordered), 1)):
+            leading, gone = ordered[:count], ordered[count:]
+            sawtooth = teeth.beside(leading) if teeth is not None else []
+            for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
+                # What rounded teeth leave is no other error.
+                beside = [*leading, *new, *([whole] if new is sawtooth else [])]
+                of_others = [each for each in gone if error_of(each) != symbol]
+                # One goes in any case: where teeth take the place of their error's other shapes, these do.
+                may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
+                together = [*leading, *new, *_standing_beside(scene, beside, may_stay)]
+                score = priced(scene, together)
                 if score > worth:
                     best, worth = together, score
     return best
@@ -334,37 +339,25 @@ def _of_error(
     none where it is among them or foretells no poses."""
     if symbol in map(error_of, leading):
         return []
-    parts = _parts(scene, whole, leading)
+    parts = parts_worth_keeping(scene, whole, leading)
     if not parts:
         return []
-    free = _of_parts(scene, symbol, parts, shapes, leading)
-    able = _predicts(scene, free, leading)
-    bends = bends_instead(scene, symbol, _priced(scene, [free], leading) if able else 0.0, leading)
+    free = of_parts(scene, symbol, parts, shapes, leading)
+    able = foretells_poses(scene, [free], leading)
+    bends = bends_instead(scene, symbol, priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]
 
 
 def _standing_beside(
     scene: ChainScene, others: Sequence[ChainCandidate], effects: Sequence[ChainCandidate]
 ) -> list[ChainCandidate]:
-    """Those of some effects that stand out beside others; one of them, the last, goes in any case."""
+    """Those of some effects that stand out beside others."""
     standing: list[ChainCandidate] = []
-    for effect in effects[:-1]:
+    for effect in effects:
         (evidence,) = weigh_beside(scene, [effect], [*others, *standing])
         if evidence.p_value * family_count(scene) < LEVEL:
             standing.append(effect)
     return standing
-
-
-def _priced(
-    scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate] = ()
-) -> float:
-    """The score of effects together beside others, free shapes at the price of the choice of their parts."""
-    return score_beside(scene, selected, others) - sum(map(price_of_parts, selected))
-
-
-def price_of_parts(candidate: ChainCandidate) -> float:
-    """What the choice of its parts takes from the score of a free shape; nothing from other effects."""
-    return 2.0 * candidate.columns.shape[1] * PRICE if _is_free(candidate) else 0.0
 
 
 def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
@@ -375,76 +368,18 @@ def _free(
     scene: ChainScene, symbol: str, mine: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
 ) -> ChainCandidate | None:
     """The effect of free shape that says more than the shapes of one error beside others; None where none does."""
-    whole = _whole(scene, symbol, mine[0])
+    whole = whole_basis(scene, symbol, mine[0])
     if not _says_more(scene, whole, [*others, *mine]):
         return None
-    parts = _parts(scene, whole, others)
+    parts = parts_worth_keeping(scene, whole, others)
     if not parts:
         return None
-    free = _of_parts(scene, symbol, parts, mine, others)
+    free = of_parts(scene, symbol, parts, mine, others)
     price = 2.0 * len(parts) * PRICE
     worth = score_beside(scene, [free], others) - price > score_beside(scene, mine, others) + WORTH_EXCHANGING
-    return free if worth and _predicts(scene, free, others) else None
-
-
-def _whole(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
-    """The whole flexible basis of the error of which a candidate is a shape."""
-    return scene_of(scene.fit, [_in_any_shape(symbol, shape)]).candidates[0]
-
-
-def _in_any_shape(symbol: str, shape: ChainCandidate) -> ChainVariant:
-    """The error of which a candidate is a shape, in any shape, under its symbol."""
-    effect = shape.effect
-    assert isinstance(effect, ChainEffect)
-    return Variant(symbol, replace(effect, shape=Free(), shape_text="free"))
-
-
-def _of_parts(
-    scene: ChainScene,
-    symbol: str,
-    parts: Sequence[int],
-    shapes: Sequence[ChainCandidate],
-    others: Sequence[ChainCandidate],
-) -> ChainCandidate:
-    """The effect of some parts, from 0, of a flexible basis; nearest to it is the best of ``shapes``."""
-    name = f"{symbol}:free({','.join(str(part + 1) for part in sorted(parts))})"
-    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
-    effect = parse_effect(name, scene.fit.problem.context.chain)
-    variant = Variant(f"{symbol}:free", effect, 1, 1.0, nearest.family)
-    return scene_of(scene.fit, [variant]).candidates[0]
+    return free if worth and foretells_poses(scene, [free], others) else None
 
 
 def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[ChainCandidate]) -> bool:
     """Whether an error in any shape explains more than chance of what the selected effects leave."""
     return p_value_of_all(scene, whole.columns, selected) < LEVEL
-
-
-def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:
-    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other."""
-    beside = scene.remainders.beside(others)
-    basis, residual = beside.basis, beside.residual
-    columns = without(basis, whole.columns)
-    before: Array = np.linalg.norm(whole.columns, axis=0)
-    dof = scene.degrees_of_freedom - basis.shape[1]
-    price = float(np.log(dof)) + 2.0 * PRICE
-    parts: list[int] = []
-    while len(parts) < MOST_PARTS:
-        length = np.linalg.norm(columns, axis=0)
-        able = length > 1e-2 * np.maximum(before, 1e-300)
-        explained = np.where(able, (columns.T @ residual) ** 2 / np.where(able, length, 1.0) ** 2, 0.0)
-        best = int(np.argmax(explained))
-        total = float(residual @ residual)
-        if dof * np.log(total / max(total - float(explained[best]), 1e-300)) < price:
-            break
-        parts.append(best)
-        direction = (columns[:, best] / length[best])[:, None]
-        residual = without(direction, residual[:, None])[:, 0]
-        columns = without(direction, columns)
-    return worth_keeping(without(basis, whole.columns), beside.residual, parts, dof, price)
-
-
-def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
-    """Whether a free shape beside others lowers the error at poses left out of every run; true with too few poses."""
-    before = scene.held_out_error_by_poses(scene.columns(others))
-    after = scene.held_out_error_by_poses(scene.columns([*others, free]))
-    return before is None or after is None or after < before

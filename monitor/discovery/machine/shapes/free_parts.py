@@ -1,0 +1,97 @@
+"""The free shape of an error: its whole flexible basis, and the parts of it that are worth their price.
+
+A few parts are selected, one after the other, at the price of each and of the choice (Schwarz's criterion extended for
+many candidates: Chen and Chen, Biometrika 95 (2008) 759).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.shapes.bends import score_beside
+from monitor.discovery.machine.shapes.waves import worth_keeping
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.projection import without
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes.free import Free
+from monitor.records import Array
+
+# More parts than this of one shape are beyond what a plan can separate.
+MOST_PARTS = 8
+# The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
+PRICE = float(np.log(45.0))
+
+
+def is_free(candidate: ChainCandidate) -> bool:
+    effect = candidate.effect
+    return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
+
+
+def price_of_parts(candidate: ChainCandidate) -> float:
+    """What the choice of its parts takes from the score of a free shape; nothing from other effects."""
+    return 2.0 * candidate.columns.shape[1] * PRICE if is_free(candidate) else 0.0
+
+
+def priced(
+    scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate] = ()
+) -> float:
+    """The score of effects together beside others, free shapes at the price of the choice of their parts."""
+    return score_beside(scene, selected, others) - sum(map(price_of_parts, selected))
+
+
+def whole_basis(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
+    """The whole flexible basis of the error of which a candidate is a shape."""
+    return scene_of(scene.fit, [in_any_shape(symbol, shape)]).candidates[0]
+
+
+def in_any_shape(symbol: str, shape: ChainCandidate) -> ChainVariant:
+    """The error of which a candidate is a shape, in any shape, under its symbol."""
+    effect = shape.effect
+    assert isinstance(effect, ChainEffect)
+    return Variant(symbol, replace(effect, shape=Free(), shape_text="free"))
+
+
+def of_parts(
+    scene: ChainScene,
+    symbol: str,
+    parts: Sequence[int],
+    shapes: Sequence[ChainCandidate],
+    others: Sequence[ChainCandidate],
+) -> ChainCandidate:
+    """The effect of some parts, from 0, of a flexible basis; nearest to it is the best of ``shapes``."""
+    name = f"{symbol}:free({','.join(str(part + 1) for part in sorted(parts))})"
+    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    effect = parse_effect(name, scene.fit.problem.context.chain)
+    variant = Variant(f"{symbol}:free", effect, 1, 1.0, nearest.family)
+    return scene_of(scene.fit, [variant]).candidates[0]
+
+
+def parts_worth_keeping(
+    scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]
+) -> list[int]:
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other."""
+    beside = scene.remainders.beside(others)
+    basis, residual = beside.basis, beside.residual
+    columns = without(basis, whole.columns)
+    before: Array = np.linalg.norm(whole.columns, axis=0)
+    dof = scene.degrees_of_freedom - basis.shape[1]
+    price = float(np.log(dof)) + 2.0 * PRICE
+    parts: list[int] = []
+    while len(parts) < MOST_PARTS:
+        length = np.linalg.norm(columns, axis=0)
+        able = length > 1e-2 * np.maximum(before, 1e-300)
+        explained = np.where(able, (columns.T @ residual) ** 2 / np.where(able, length, 1.0) ** 2, 0.0)
+        best = int(np.argmax(explained))
+        total = float(residual @ residual)
+        if dof * np.log(total / max(total - float(explained[best]), 1e-300)) < price:
+            break
+        parts.append(best)
+        direction = (columns[:, best] / length[best])[:, None]
+        residual = without(direction, residual[:, None])[:, 0]
+        columns = without(direction, columns)
+    return worth_keeping(without(basis, whole.columns), beside.residual, parts, dof, price)
