@@ -133,7 +133,9 @@ def test_a_height_that_axes_measured_is_a_statement_and_one_they_were_told_is_no
 
 
 @pytest.mark.parametrize("jitter", [0.1e-3, 0.2e-3, 0.5e-3, 0.8e-3])
-def test_a_height_that_was_written_down_is_none_though_the_scale_of_z_jitters(tmp_path: Path, jitter: float) -> None:
+def test_a_height_that_was_written_down_is_none_though_the_scale_of_z_jitters(
+    tmp_path: Path, jitter: float
+) -> None:
     """Was: an error of Z (``EZZ:lag``) that nobody had touched."""
     for seed in range(5):
         assert unknowns_of(campaign_of(tmp_path, [LYING], seed, "0.00000", told=-200.0, jitter=jitter)) == 3
