@@ -138,6 +138,11 @@ def test_a_record_without_a_date_does_not_get_that_of_the_next(place: str) -> No
     assert _read(text, 2).started == ("2.3.2026" if place == "below" else None)
 
 
+def test_the_date_of_a_value_counts_before_that_of_the_head() -> None:
+    text = "K0004/0 1.3.2026\n" + _record(1, "2.3.2026", "below")
+    assert _read(text).started == "2.3.2026"
+
+
 def _marked(records: Sequence[tuple[str, ...]]) -> dict[int, str]:
     """The records of X that are read as invalid, of these K-fields of X a record; Y and Z have none."""
     lines = [f"{field.replace('/', '/1')}\n" for record in records for field in record]

@@ -176,7 +176,8 @@ def _dated(part: _Part) -> tuple[str, ...]:
     """Give the records the dates of K-fields; a sentence on those of which the file does not say whose they are."""
     sides = _sides(part, part.dates)
     unclear: list[int] = []
-    for number, dates in sorted(part.dates.items()):
+    # A value's own date counts before one of all values, as that of a head.
+    for number, dates in sorted(part.dates.items(), key=lambda of: (of[0] == 0, of[0])):
         records = _records_of(part, number, dates, sides)
         if records is None:
             unclear.append(dates[0].line)

@@ -34,7 +34,8 @@ def fewer_rows(probings: Probings) -> npt.NDArray[np.int64]:
     share = _share(counts.tolist())
     rng = np.random.default_rng(0)
     members = np.split(rows, np.cumsum(counts)[:-1])
-    return looked_at[np.sort(np.concatenate([_drawn(each, share, rng) for each in members]))]
+    drawn = np.concatenate([_drawn(each, share, rng) for each in members])
+    return np.asarray(looked_at[np.sort(drawn)])
 
 
 def _setups_of_runs(probings: Probings) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
