@@ -16,7 +16,8 @@ import scipy
 
 from monitor.records import Array
 
-#: Directions that are shorter than this part of the longest are rounding.
+#: Directions that are shorter than this part of the longest are rounding, and so are differences of that part of the
+#: largest jump: of jumps without any scatter these would be many times their u.
 NOTHING = 1e-9
 
 
@@ -62,7 +63,9 @@ def p_of_common_error(steps: Jumps, apart: Array, scale: Array) -> float:
     u = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", beyond, covariance, beyond), np.finfo(np.float64).tiny))
     # Of one contrast the rows are one question.
     questions = 1 if free == 1 else len(beyond)
-    p_beyond = questions * 2.0 * float(scipy.special.stdtr(steps.dof, -np.max(np.abs(beyond @ sizes) / u)))
+    differences = np.abs(beyond @ sizes)
+    differences[differences <= NOTHING * np.abs(sizes).max()] = 0.0
+    p_beyond = questions * 2.0 * float(scipy.special.stdtr(steps.dof, -np.max(differences / u)))
     return min(1.0, 2.0 * min(p_error, p_beyond))
 
 

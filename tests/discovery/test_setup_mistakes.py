@@ -17,7 +17,7 @@ from monitor.discovery.machine.mistakes.setup_mistakes import _explains
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
-from monitor.records import Campaign
+from monitor.records import Campaign, Probings
 from monitor.reporting.machine_finding import MistakeFound, mistake_sentence, what_to_do
 from tests.simulator import four_instruments as shop
 from tests.simulator.instrument_errors import week
@@ -182,6 +182,41 @@ def test_setups_share_the_rows_that_are_tried_and_their_poses_do(right: Campaign
     assert len(np.unique(x)) == len(
         np.unique(right.probings.readings["X"][right.probings.target == "laser-X"])
     )
+
+
+def _read_by(setup: np.ndarray, target: np.ndarray, run: np.ndarray) -> Probings:
+    """Rows of setups that read targets in runs, at poses that rise."""
+    count = len(setup)
+    place = np.arange(count)
+    channels = {"setup": setup.astype(np.float64)}
+    return Probings(run, place + 1, 6.0 * place, target, {"X": place.astype(np.float64)}, channels)
+
+
+def test_two_setups_that_read_one_target_have_their_rows_each() -> None:
+    setup = np.repeat([1, 2], [3000, 40])
+    rows = fewer_rows(_read_by(setup, np.full(3040, "T1"), np.ones(3040, dtype=np.int64)))
+    assert np.unique(setup[rows], return_counts=True)[1].tolist() == [460, 40]
+
+
+def test_targets_and_runs_do_not_make_the_rows_that_are_tried_many() -> None:
+    """Were 15 000 of 20 000."""
+    run, of_run = (each.ravel() for each in np.meshgrid(np.arange(1, 11), np.arange(2000), indexing="ij"))
+    target = np.array([f"T{number:02}" for number in range(50)])[of_run % 50]
+    rows = fewer_rows(_read_by(np.ones(20_000), target, run))
+    assert len(rows) == 500
+    assert np.unique(run[rows]).tolist() == list(range(1, 11))
+    # Every target is among those of a run.
+    assert all(len(np.unique(target[rows][run[rows] == number])) == 50 for number in range(1, 11))
+
+
+def test_of_many_runs_of_many_setups_the_last_ones_are_tried() -> None:
+    run, of_run = (each.ravel() for each in np.meshgrid(np.arange(1, 41), np.arange(400), indexing="ij"))
+    setup = 1 + of_run % 4
+    rows = fewer_rows(_read_by(setup, setup.astype(str), run))
+    assert len(rows) <= 600
+    assert np.unique(run[rows]).tolist() == [36, 37, 38, 39, 40]
+    few = of_run < 3
+    assert len(fewer_rows(_read_by(setup[few], setup[few].astype(str), run[few]))) == 120
 
 
 def test_the_other_frame_of_an_r_test_is_said(right: Campaign) -> None:

@@ -401,6 +401,18 @@ def test_runs_that_pass_the_targets_at_which_they_turn_once_are_whole(tmp_path):
     assert len(laser(tmp_path, f"Points: 5\nRuns: 4\n{COLUMNS}{rows}").campaign.probings) == 17
 
 
+def test_a_file_that_turns_twice_at_a_target_and_lacks_its_last_row_is_refused(tmp_path):
+    """Was read in silence: it has as many rows as two runs that pass the target at which they turn once."""
+    rows = passes(1).splitlines(keepends=True)[:9]
+    with pytest.raises(
+        CampaignError, match=r"5 are announced in 2 runs and the table has 9 rows: the file is cut"
+    ):
+        laser(tmp_path, "".join([f"Points: 5\nRuns: 2\n{COLUMNS}", *rows]))
+    once = [0, 100, 200, 300, 400, 300, 200, 100, 0]
+    rows = [f"{place}.0;{0.1 * row:.2f}\n" for row, place in enumerate(once)]
+    assert len(laser(tmp_path, "".join([f"Points: 5\nRuns: 2\n{COLUMNS}", *rows])).campaign.probings) == 9
+
+
 @pytest.mark.parametrize(("mark", "other"), [(",", "1,25"), (".", "0.5")])
 def test_three_decimals_beside_whole_numbers_are_decimals_where_another_cell_shows_the_mark(
     tmp_path, mark, other

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,7 @@ def test_a_record_that_there_is_not_is_refused(two_records: Path, keys: str, mes
         _mapped(two_records, keys)
 
 
-def _read(values: str, record: int | None = None) -> Export:
+def _read(values: str, record: int | str | None = None) -> Export:
     """What is read of a file with the coordinates of P1 and these values, ``a b c`` a line of K-fields each."""
     names = "".join(f"K2002/{number} P1.{letter}\n" for number, letter in enumerate("XYZ", start=1))
     faults = Faults([])
@@ -135,6 +136,67 @@ def test_a_record_without_a_date_does_not_get_that_of_the_next(place: str) -> No
     text = _record(1, None, place) + _record(2, "2.3.2026", place)
     assert _read(text, 1).started is None
     assert _read(text, 2).started == ("2.3.2026" if place == "below" else None)
+
+
+def test_the_date_of_a_value_counts_before_that_of_the_head() -> None:
+    text = "K0004/0 1.3.2026\n" + _record(1, "2.3.2026", "below")
+    assert _read(text).started == "2.3.2026"
+
+
+def _marked(records: Sequence[tuple[str, ...]]) -> dict[int, str]:
+    """The records of X that are read as invalid, of these K-fields of X a record; Y and Z have none."""
+    lines = [f"{field.replace('/', '/1')}\n" for record in records for field in record]
+    others = [f"K0001/{which} {number}.{which}00\n" for number in range(len(records)) for which in (2, 3)]
+    export = _read("".join([*lines, *others]), dfq.ONE_CLAMPING)
+    assert all(export.columns["x"][record] == "" for record in export.invalid.get("x", {}))
+    return dict(export.invalid.get("x", {}))
+
+
+VALUES = [f"K0001/ {number}.100" for number in (1, 2, 3)]
+DATES = [f"K0004/ {number}.3.2026" for number in (1, 2, 3)]
+GOOD, BAD = "K0002/ 0", "K0002/ 256"
+
+
+@pytest.mark.parametrize(
+    "records",
+    [
+        # Attributes of all values, above and below.
+        [(GOOD, VALUES[0]), (BAD, VALUES[1]), (GOOD, VALUES[2])],
+        [(VALUES[0], GOOD), (VALUES[1], BAD), (VALUES[2], GOOD)],
+        # Of some: one stands above the first value, or below the last.
+        [(GOOD, VALUES[0]), (BAD, VALUES[1]), (VALUES[2],)],
+        [(VALUES[0],), (VALUES[1], BAD), (VALUES[2], GOOD)],
+        # Of one: the dates say it, or the format.
+        [(DATES[0], VALUES[0]), (DATES[1], BAD, VALUES[1]), (DATES[2], VALUES[2])],
+        [(VALUES[0], DATES[0]), (VALUES[1], BAD, DATES[1]), (VALUES[2], DATES[2])],
+        [(VALUES[0],), (VALUES[1], BAD), (VALUES[2],)],
+    ],
+)
+def test_an_attribute_marks_its_own_value_wherever_it_stands(records: Sequence[tuple[str, ...]]) -> None:
+    """Was: that of the value below it took the valid one above it, and 256 counted as measured."""
+    (record,) = _marked(records)
+    assert record == 1
+
+
+def test_an_attribute_above_the_first_value_is_its_own() -> None:
+    assert list(_marked([(BAD, VALUES[0]), (VALUES[1],), (VALUES[2],)])) == [0]
+    assert list(_marked([(VALUES[0],), (VALUES[1],), (VALUES[2], BAD)])) == [2]
+
+
+@pytest.mark.parametrize(
+    "records",
+    [
+        # Dates above the values, and no date between the attribute and the value above it.
+        [(DATES[0], VALUES[0]), (BAD, DATES[1], VALUES[1]), (DATES[2], VALUES[2])],
+        # A date of which nobody knows either.
+        [(VALUES[0],), (DATES[1], BAD, VALUES[1]), (VALUES[2],)],
+        # Attributes on both sides.
+        [(GOOD, VALUES[0]), (BAD, VALUES[1]), (VALUES[2], GOOD), (GOOD, "K0001/ 4.100", GOOD)],
+    ],
+)
+def test_an_attribute_that_may_be_of_either_value_is_refused(records: Sequence[tuple[str, ...]]) -> None:
+    with pytest.raises(AssertionError, match=r"marks the value above it or that below it invalid"):
+        _marked(records)
 
 
 def test_a_point_whose_every_row_is_marked_invalid_is_said(two_records: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,11 @@ import pytest
 import scipy
 
 from monitor.statistics.common_error import jumps, p_of_common_error
+from monitor.store import MachineHistory
+from monitor.store.past.instruments import Calibrations
 from monitor.workflow.history.other_instruments import between_instruments
-from tests.benchmarks.trial_exchange import Case, denied, history, stepped
+from monitor.workflow.history.past import ParameterPast
+from tests.benchmarks.trial_exchange import LASER, Case, denied, history, stepped
 
 
 def denials(case: Case, histories: int) -> int:
@@ -56,6 +60,45 @@ def test_a_gain_that_changed_next_to_the_exchange_is_not_compared() -> None:
         ("P0", "P1", "P2")
     }
     assert all(each.may_be_all for each in between_instruments(measured, past, [t[6]]).values())
+
+
+def taking_turns(case: Case, turns: Sequence[str]) -> tuple[MachineHistory, dict[str, ParameterPast]]:
+    """A history in which the calibrations take turns, and the machine's own step in the middle of it."""
+    measured = history(case, np.random.default_rng(5))
+    certificates = {name: {LASER: turn} for name, turn in zip(measured.campaign.tolist(), turns, strict=True)}
+    common = {
+        quantity: np.where(np.array(turns) == quantity.certificate, 1.0, 0.0)[:, None]
+        * np.ones(measured.values.shape)
+        for quantity in measured.common_parts
+    }
+    measured = replace(measured, calibrations=Calibrations(certificates, {}), common_parts=common)
+    return measured, stepped(measured, case)
+
+
+@pytest.mark.parametrize("turns", ["AB" * 12, "AABB" * 6, "A" * 12 + "B" * 11 + "A"])
+def test_a_step_that_a_laser_shows_on_both_sides_is_no_exchange(turns: str) -> None:
+    measured, past = taking_turns(Case(12), list(turns))
+    assert between_instruments(measured, past) == {}
+
+
+@pytest.mark.parametrize("turns", ["AB" * 12, "A" * 12 + "B" * 11 + "A"])
+def test_a_laser_that_comes_back_behind_an_event_says_nothing_of_an_exchange(turns: str) -> None:
+    measured, past = taking_turns(Case(12), list(turns))
+    t = past["P0"].series.t
+    # Between both events the one before the step is A or B, the one behind it another.
+    judged = between_instruments(measured, past, [t[11] - 1.0, t[13] - 1.0])
+    assert {each.before for each in judged.values()} == {f"{LASER} ({turns[11]})"}
+
+
+def test_one_error_explains_equal_jumps_without_scatter() -> None:
+    after = np.arange(8) >= 4
+    scale = np.full(3, 0.3)
+    equal = jumps(np.where(after, 1.5, 0.1)[:, None] * np.ones(3), np.arange(8.0), after, line=True)
+    unlike = jumps(np.where(after, 1.5, 0.1)[:, None] * [1.0, 1.0, 1.1], np.arange(8.0), after, line=True)
+    assert equal is not None
+    assert unlike is not None
+    assert p_of_common_error(equal, np.ones((3, 1)), scale) > 0.1
+    assert p_of_common_error(unlike, np.ones((3, 1)), scale) < 1e-9
 
 
 def test_jumps_beside_a_line_are_those_of_least_squares() -> None:

@@ -12,8 +12,9 @@ clampings have no common frame: ``record`` says which record is read, or that al
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from monitor.readers.export import Export, ExportFile, ExportFormat, Fact
 from monitor.readers.faults import Faults, quoted
@@ -34,18 +35,32 @@ ONE_CLAMPING = "one clamping"
 _NAME, _NOMINAL, _UNIT, _VALUE, _ATTRIBUTE, _DATE = "2002", "2101", "2142", "0001", "0002", "0004"
 
 
+class _Beside(NamedTuple):
+    """A K-field that stands above its value or below it: how many ``values`` of its characteristic stand above it, its
+    ``text``, its ``line``."""
+
+    values: int
+    text: str
+    line: int
+
+
+#: Fields that stand beside values, by the number of their characteristic, 0 for all of them.
+_Besides = dict[int, list[_Beside]]
+
+
 @dataclass
 class _Part:
     """What has been read: fields of each characteristic by its number, its values with their lines, the records that
-    its attributes mark invalid, its dates with their lines and how many values stand above each, and of each line of
-    values how many fields every one of them has. ``started`` has the date of a record."""
+    its attributes mark invalid, its attributes and dates, and of each line of values how many fields every one of them
+    has. ``started`` has the date of a record."""
 
     fields: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
     values: dict[int, list[tuple[str, int]]] = field(default_factory=dict)
     facts: list[Fact] = field(default_factory=list)
     started: dict[int, str] = field(default_factory=dict)
     invalid: dict[int, dict[int, str]] = field(default_factory=dict)
-    dates: dict[int, list[tuple[int, str, int]]] = field(default_factory=dict)
+    attributes: _Besides = field(default_factory=dict)
+    dates: _Besides = field(default_factory=dict)
     lines: dict[int, list[int]] = field(default_factory=dict)
 
     def text(self, key: str, number: int) -> str | None:
@@ -60,6 +75,13 @@ class _Part:
     def mark(self, number: int, record: int, attribute: str) -> None:
         """Note that a record of a characteristic does not count."""
         self.invalid.setdefault(number, {})[record] = f"attribute K0002 = {attribute}"
+
+    def withdraw(self, number: int, record: int, attribute: str) -> None:
+        """Take a value back that an attribute of another line marks invalid, where there is one."""
+        values = self.values.get(number, [])
+        if 0 <= record < len(values):
+            values[record] = ("", values[record][1])
+            self.mark(number, record, attribute)
 
     def add(self, number: int, cells: list[str], line: int) -> str | None:
         """Note a value with its attribute and date; what is wrong with it."""
@@ -113,6 +135,7 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
         if len(faults) > before + 20:
             return None
     if len(faults) == before:
+        _mark(part, file.name, faults)
         _complete(part, file.name, faults)
     if len(faults) > before:
         return None
@@ -122,34 +145,92 @@ def read(file: ExportFile, record: int | str | None, faults: Faults) -> Export |
     return None if len(faults) > before else replace(export, notes=notes)
 
 
-def _dated(part: _Part) -> tuple[str, ...]:
-    """Give the records the dates of K-fields; a sentence on those of which the file does not say whose they are.
+class _Sides(NamedTuple):
+    """Whether some field stands above the first value of its characteristic, and some below the last."""
 
-    A date stands above its value or below it: as many dates as values are theirs in turn. Fewer are told apart where
-    some date stands above the first value of its characteristic or below the last.
+    above: bool
+    below: bool
+
+
+def _sides(part: _Part, fields: _Besides) -> _Sides:
+    ends = [(each[0].values, each[-1].values, part.records(number)) for number, each in fields.items()]
+    return _Sides(
+        any(first == 0 for first, _, records in ends if records),
+        any(last == records for _, last, records in ends if records),
+    )
+
+
+def _records_of(part: _Part, number: int, fields: list[_Beside], sides: _Sides) -> list[int] | None:
+    """Return the records of the fields of a characteristic, None where the file does not say whose they are.
+
+    As many fields as values are theirs in turn. Fewer are told apart where some field of the file stands above the
+    first value of its characteristic or below the last.
     """
-    ends = {number: (dates[0][0], dates[-1][0]) for number, dates in part.dates.items()}
-    is_above = any(first == 0 for first, _ in ends.values())
-    is_below = any(last == part.records(number) for number, (_, last) in ends.items())
+    above = [each.values for each in fields]
+    if len(set(above)) == part.records(number) == len(above):
+        return list(range(len(above)))
+    return [values - sides.below for values in above] if sides.above != sides.below else None
+
+
+def _dated(part: _Part) -> tuple[str, ...]:
+    """Give the records the dates of K-fields; a sentence on those of which the file does not say whose they are."""
+    sides = _sides(part, part.dates)
     unclear: list[int] = []
-    for number, dates in sorted(part.dates.items()):
-        above = [values for values, _, _ in dates]
-        if len(set(above)) == part.records(number) == len(dates):
-            records = list(range(len(dates)))
-        elif is_above != is_below:
-            records = [values - is_below for values in above]
-        else:
-            unclear.append(dates[0][2])
+    # A value's own date counts before one of all values, as that of a head.
+    for number, dates in sorted(part.dates.items(), key=lambda of: (of[0] == 0, of[0])):
+        records = _records_of(part, number, dates, sides)
+        if records is None:
+            unclear.append(dates[0].line)
             continue
-        for record, (_, date, _) in zip(records, dates, strict=True):
-            if date and record < part.records(number):
-                part.started.setdefault(record, date)
+        for record, date in zip(records, dates, strict=True):
+            if date.text and 0 <= record < part.records(number):
+                part.started.setdefault(record, date.text)
     if not unclear:
         return ()
     return (
         f"K0004 on line {min(unclear)} may be the date of the value above it or of that below it, and is taken for "
         "neither; write [[runs]] with started_at where no other date stands",
     )
+
+
+def _mark(part: _Part, name: str, faults: Faults) -> None:
+    """Mark the values that attributes of K-fields say are none; refuse an attribute of which the file does not say
+    whether it is of the value above it or of that below it."""
+    sides, of_dates = (_sides(part, fields) for fields in (part.attributes, part.dates))
+    for number, attributes in sorted(part.attributes.items()):
+        records: Sequence[int | None] | None = _records_of(part, number, attributes, sides)
+        if records is None and not sides.above:
+            records = _beside_dates(part, number, of_dates)
+        for index, attribute in enumerate(attributes):
+            if not is_invalid(attribute.text):
+                continue
+            record = None if records is None else records[index]
+            if record is None:
+                faults.add(
+                    name, attribute.line, f"K{_ATTRIBUTE}",
+                    "the attribute marks the value above it or that below it invalid, and the file does not say which; "
+                    "export attributes with every value, or in one line with them",
+                )  # fmt: skip
+                return
+            for which in [number] if number else part.values:
+                part.withdraw(which, record, attribute.text)
+
+
+def _beside_dates(part: _Part, number: int, sides: _Sides) -> Sequence[int | None] | None:
+    """Return the records of attributes whose places their like do not tell: where dates stand above their values, that
+    of the date above it, else that of the value above it, as the format has it; None where that is not sure."""
+    attributes = part.attributes[number]
+    if not part.dates or (sides.below and not sides.above):
+        return [attribute.values - 1 for attribute in attributes]
+    if sides.below or not sides.above:
+        return None
+    first: dict[int, int] = {}
+    for date in (*part.dates.get(number, ()), *part.dates.get(0, ())):
+        first[date.values] = min(date.line, first.get(date.values, date.line))
+    return [
+        attribute.values if first.get(attribute.values, attribute.line) < attribute.line else None
+        for attribute in attributes
+    ]
 
 
 def _unmeasured(part: _Part) -> tuple[str, ...]:
@@ -175,13 +256,10 @@ def _line(part: _Part, line: str, number: int) -> str | None:
     key, which, value = match[1], int(match[2] or 0), match[3] or ""
     if key == _VALUE:
         return part.add(which, [value], number)
-    if key == _ATTRIBUTE and part.values.get(which):
-        if is_invalid(value):
-            part.values[which][-1] = ("", part.values[which][-1][1])
-            part.mark(which, len(part.values[which]) - 1, value)
-        return None
-    if key == _DATE:
-        part.dates.setdefault(which, []).append((part.records(which), value.replace("/", " "), number))
+    if key in (_ATTRIBUTE, _DATE):
+        fields = part.attributes if key == _ATTRIBUTE else part.dates
+        text = value.replace("/", " ")
+        fields.setdefault(which, []).append(_Beside(part.records(which), text, number))
     elif key.startswith("1") and value:
         part.facts.append(Fact(f"K{key}", value, number))
     part.fields[key, which] = (value, number)

@@ -68,7 +68,7 @@ def compare(entry: Entry, file: str, export: Export, rows: Rows, wanted: Wanted)
             file, fact.line, fact.key,
             f'{wrong}; or write {OVERRULED} = ["{what}"] in [[exports]] where the file is wrong',
         )  # fmt: skip
-    yield from _announced(entry, file, export)
+    yield from _announced(entry, file, export, _turns_at_once(rows, wanted))
     yield from _last_pass(rows, wanted)
 
 
@@ -155,7 +155,15 @@ def _moving(rows: Rows, wanted: Wanted) -> list[str]:
     return moving
 
 
-def _announced(entry: Entry, file: str, export: Export) -> Iterator[str]:
+def _turns_at_once(rows: Rows, wanted: Wanted) -> bool:
+    """Whether no two rows that follow each other stand at one place: where an axis turns it is measured once."""
+    moving = _moving(rows, wanted)
+    columns = [axis.column for axis in wanted.axes if axis.name in moving]
+    steps = [np.abs(np.diff([float(cell) for cell in rows.cells[column]])) for column in columns]
+    return not steps or bool((np.max(steps, axis=0) > _STILL).all())
+
+
+def _announced(entry: Entry, file: str, export: Export, turns_at_once: bool) -> Iterator[str]:
     """Note fewer rows than the head announces; yield a sentence where they are no whole number of passes."""
     points, runs = (_count(export, keys) for keys in (_POINTS, _RUNS))
     if points is None:
@@ -163,7 +171,8 @@ def _announced(entry: Entry, file: str, export: Export) -> Iterator[str]:
     rows, asked, passes = len(export.lines), int(points.value), 1 if runs is None else int(runs.value)
     times = "" if runs is None else f" in {passes} runs"
     # Where the axis turns a target may be measured once for both ways.
-    if rows < asked * passes and rows != (asked - 1) * passes + 1:
+    is_whole = rows >= asked * passes or (turns_at_once and rows == (asked - 1) * passes + 1)
+    if not is_whole:
         if "points" in entry.overruled:
             yield f"the file announces {asked} {points.key}{times} and is overruled by the mapping"
             return

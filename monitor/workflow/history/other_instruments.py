@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.in_common import with_unstored
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
+from monitor.workflow.history.what_measured import what_measured
 
 #: Expanded uncertainties have this coverage factor; what is no larger may be all of a step.
 K = 2.0
@@ -106,14 +108,19 @@ class _Measuring:
         )
         return before, after
 
+    @cached_property
+    def combination(self) -> npt.NDArray[np.intp]:
+        """The number (n,) of what measured each run, with every certificate."""
+        return what_measured(self.history)[1]
+
     def _certificates(self, run: int) -> Mapping[str, str]:
         return self.history.calibrations.certificates.get(str(self.history.campaign[run]), {})
 
     def alike(self, run: int) -> npt.NDArray[np.bool_]:
         """The runs (n,) that were measured by the same as one of them."""
-        campaigns, firsts, index = np.unique(self.history.campaign, return_index=True, return_inverse=True)
+        _, firsts, index = np.unique(self.history.campaign, return_index=True, return_inverse=True)
         same = [self.by(run, int(first)) is None for first in firsts]
-        return np.asarray(np.array(same)[index.ravel()] & (len(campaigns) > 0))
+        return np.array(same)[index.ravel()]
 
     def apart(self, name: str, last: int, first: int) -> Array:
         """What the difference of a parameter in two runs has of each quantity (q,)."""
@@ -130,7 +137,8 @@ class _Measuring:
 def between_instruments(
     history: MachineHistory, past: Mapping[str, ParameterPast], events: Sequence[float] = ()
 ) -> dict[Change, OtherInstruments]:
-    """Return what changed in the measuring at the steps of all parameters; nothing of those where nothing did.
+    """Return what changed in the measuring at the steps of all parameters; nothing of those where nothing did, and of
+    those that one instrument shows on both sides by itself.
 
     ``events`` (days since 1970) may have changed the machine: what is beyond them says nothing of a step."""
     by_quantity = with_unstored(history)[0]
@@ -140,7 +148,7 @@ def between_instruments(
     for parameter in past.values():
         for step in _steps(parameter):
             names = measuring.by(step.last, step.first)
-            if names is not None:
+            if names is not None and not _is_of_one(measuring, step, events):
                 exchanges.setdefault(names, []).append(step)
     judged = {}
     for names, steps in exchanges.items():
@@ -159,6 +167,16 @@ def _steps(past: ParameterPast) -> Iterator[_Step]:
         before, after = runs[t <= change.interval[0]], runs[t >= change.interval[1]]
         if change.kind == "step" and len(before) and len(after):
             yield _Step(past, change, int(before[-1]), int(after[0]))
+
+
+def _is_of_one(measuring: _Measuring, step: _Step, events: Sequence[float]) -> bool:
+    """Whether some that measured before a step measured after it, too, up to the changes and events nearest to it: they
+    show it, for what those who take turns are off by was left free (``interleaved_columns``)."""
+    t = measuring.history.seconds / SECONDS_PER_DAY
+    begins, ends = _bounds(measuring, [step], step.last, step.first, events)
+    runs = _steady(step.past) & (t >= begins) & (t < ends)
+    before, after = runs & (t <= t[step.last]), runs & (t >= t[step.first])
+    return bool(np.isin(measuring.combination[before], measuring.combination[after]).any())
 
 
 def _at_once(steps: Sequence[_Step]) -> list[list[_Step]]:
@@ -239,13 +257,21 @@ def _piece(
     measuring: _Measuring, steps: Sequence[_Step], last: int, first: int, events: Sequence[float]
 ) -> _Piece:
     t = measuring.history.seconds / SECONDS_PER_DAY
+    begins, ends = _bounds(measuring, steps, last, first, events)
+    before, after = (measuring.alike(run) for run in (last, first))
+    return _Piece(before & (t >= begins) & (t <= t[last]), after & (t < ends) & (t >= t[first]), begins, ends)
+
+
+def _bounds(
+    measuring: _Measuring, steps: Sequence[_Step], last: int, first: int, events: Sequence[float]
+) -> tuple[float, float]:
+    """The last event or other change before the run ``last``, and the next behind ``first`` (days since 1970)."""
+    t = measuring.history.seconds / SECONDS_PER_DAY
     of_exchange = {step.change for step in steps}
     changes = (change for step in steps for change in step.past.search.changes if change not in of_exchange)
     bounds = [*events, *(change.at for change in changes)]
     begins = max((at for at in bounds if at <= t[last]), default=-np.inf)
-    ends = min((at for at in bounds if at > t[first]), default=np.inf)
-    before, after = (measuring.alike(run) for run in (last, first))
-    return _Piece(before & (t >= begins) & (t <= t[last]), after & (t < ends) & (t >= t[first]), begins, ends)
+    return begins, min((at for at in bounds if at > t[first]), default=np.inf)
 
 
 def _steady(parameter: ParameterPast) -> npt.NDArray[np.bool_]:

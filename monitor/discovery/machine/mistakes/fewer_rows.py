@@ -13,22 +13,36 @@ from monitor.records import Probings
 #: So many rows of all are looked at, and at least so many of each setup in a run, by which its scatter is known to a
 #: sixth.
 MOST_ROWS, FEWEST_OF_SETUP = 500, 30
+#: Runs that are asked, the last ones.
+MOST_RUNS = 5
 
 
 def fewer_rows(probings: Probings) -> npt.NDArray[np.int64]:
-    """The places of at most ``MOST_ROWS`` rows, in order: every target of every run has as many, or all of its rows.
+    """The places of some rows, in order: every setup of every run has as many, or all of its rows.
 
-    One row is drawn of every so many that follow each other in the order of their poses, always the same ones: each
-    n-th in the order of time would be the same pass of a plan that goes to and fro.
+    They are at most ``MOST_ROWS``, or, where these are fewer than ``FEWEST_OF_SETUP`` of each, so many of each in the
+    last ``MOST_RUNS`` runs. One row is drawn of every so many that follow each other in the order of their targets and
+    poses, always the same ones: each n-th in the order of time would be the same pass of a plan that goes to and fro.
     """
-    _, target = np.unique(probings.target, return_inverse=True)
-    _, group = np.unique(np.column_stack([probings.run, target]), axis=0, return_inverse=True)
-    group = group.reshape(-1)
-    rows = np.lexsort([*probings.readings.values(), group])
-    members = np.split(rows, np.cumsum(np.bincount(group))[:-1])
-    share = _share([len(each) for each in members])
+    looked_at = np.arange(len(probings))
+    counts = _setups_of_runs(probings)[1]
+    if np.minimum(counts, FEWEST_OF_SETUP).sum() > MOST_ROWS:
+        looked_at = np.flatnonzero(np.isin(probings.run, np.unique(probings.run)[-MOST_RUNS:]))
+    some = probings.rows(looked_at)
+    group, counts = _setups_of_runs(some)
+    rows = np.lexsort([*some.readings.values(), some.target, group])
+    share = _share(counts.tolist())
     rng = np.random.default_rng(0)
-    return np.sort(np.concatenate([_drawn(each, share, rng) for each in members]))
+    members = np.split(rows, np.cumsum(counts)[:-1])
+    drawn = np.concatenate([_drawn(each, share, rng) for each in members])
+    return np.asarray(looked_at[np.sort(drawn)])
+
+
+def _setups_of_runs(probings: Probings) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The number (n,) of the setup and run of each row, and how many rows each of these has."""
+    pairs = np.column_stack([probings.run, probings.channels["setup"]])
+    _, group, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    return group.reshape(-1), counts
 
 
 def _share(counts: list[int]) -> int:

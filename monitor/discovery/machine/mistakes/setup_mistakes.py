@@ -40,7 +40,7 @@ from monitor.discovery.machine.mistakes.cures import (
     fitted_problem,
     without_gross,
 )
-from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
+from monitor.discovery.machine.mistakes.fewer_rows import MOST_RUNS, fewer_rows
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
@@ -69,8 +69,6 @@ MOST_TRIED = 3
 #: over what is stated: beside it a machine still has its effects. Else it comes nearest.
 BY_EFFECTS, MOST_LEFT = 1e-6, 0.1
 OTHER_FRAME: dict[Branch, Branch] = {"work": "tool", "tool": "work"}
-#: Runs that are asked, the last one first.
-MOST_RUNS = 5
 
 
 @dataclass(frozen=True)

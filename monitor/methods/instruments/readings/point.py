@@ -24,8 +24,9 @@ from monitor.records import Array, Setup
 from monitor.sources import SCALE
 
 # A third number that is the same in all rows says that a plate is flat where the axes measured its points: those lie in
-# a plane nearly, and off it by more than so many mm. Nearer than that axes lie where they are told to go.
-PROGRAMMED = 5e-5
+# a plane nearly, and off it by more than so many stated standard uncertainties. Nearer than that the axes may lie where
+# they were told to go, off it by what their scales jitter, and nobody may have touched in that direction.
+MEASURED = 2.0
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,11 @@ def _without_constant(rows: Rows, setup: Setup) -> Array:
 
 
 def _is_flat(rows: Rows, setup: Setup) -> bool:
-    """Whether in some run the axes found the points in a plane as nearly as they measure, and not exactly."""
+    """Whether in some run the axes found the points in a plane nearly, and off it by more than the jitter of axes that
+    stand still; never where the rows state uncertainties of their own."""
+    u = setup.standard_uncertainty
+    if u is None:
+        return False
     count = len(rows)
     none = np.zeros((count, len(rows.chain.joints), 2, 6))
     targets = np.unique(rows.target)
@@ -152,7 +157,7 @@ def _is_flat(rows: Rows, setup: Setup) -> bool:
     for run in np.unique(rows.run):
         arms = points[rows.run == run]
         spread = np.linalg.svd(arms - arms.mean(axis=0), compute_uv=False) / np.sqrt(len(arms))
-        if len(spread) == 3 and PROGRAMMED < spread[2] < FLAT * spread[1]:
+        if len(spread) == 3 and MEASURED * u < spread[2] < FLAT * spread[1]:
             return True
     return False
 
