@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from monitor.discovery import fit
-from monitor.exceptions import CampaignError
+from monitor.exceptions import CampaignError, DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
+from monitor.readers.doubts.doubts import doubts
+from monitor.records import Array
 from monitor.store.record_json import artefact_json, artefact_record
 from tests.simulator.robot import frames, point
 from tests.simulator.robot_campaign import ELBOW, JOINTS, errors_of_robot, lever_arms
@@ -114,3 +117,38 @@ def test_a_quaternion_has_length_one(tmp_path: Path) -> None:
     (folder / "probings.csv").write_text("\n".join(rows))
     with pytest.raises(CampaignError, match=r"the quaternion has length .*; a quaternion has length 1"):
         read_campaign(folder)
+
+
+@pytest.mark.parametrize("reading", ["pose", "point"])
+def test_points_in_metres_are_refused_as_of_a_tracker(tmp_path: Path, reading: str) -> None:
+    """The fit followed them by a robot that is shrunk to a point, and said so with numbers and u."""
+    edits = {"pose": ("", ""), "point": ("standard_uncertainty_urad = 60.0\n", "")}
+    second = ('reading = "pose"', f'reading = "{reading}"')
+    folder = six_numbers(tmp_path / "six", 8, poses=40, edit=edits[reading], second=second)
+    _altered(folder, lambda rows, _: rows / 1e3)
+    campaign = read_campaign(folder)
+    assert any("point_x_mm, point_y_mm and point_z_mm span" in told for told in doubts(campaign))
+    with pytest.raises(DataError, match=r"99\d times as large .* units of point_x_mm, .* of setup probe"):
+        campaign_method(campaign).problem_of(campaign)
+
+
+def test_points_of_other_poses_do_not_belong_to_the_joints(tmp_path: Path) -> None:
+    folder = six_numbers(tmp_path / "six", 9, poses=60)
+    _altered(folder, lambda rows, rng: rng.permutation(rows))
+    campaign = read_campaign(folder)
+    assert doubts(campaign) == ()
+    with pytest.raises(
+        DataError, match=r"do not belong together row by row: .* of setup probe stands beside"
+    ):
+        campaign_method(campaign).problem_of(campaign)
+
+
+def _altered(folder: Path, alter: Callable[[Array, np.random.Generator], Array]) -> None:
+    """Put what ``alter`` makes of the points (n, 3) of a folder in their place."""
+    head, *lines = (folder / "probings.csv").read_text().splitlines()
+    cells = np.array([line.split(",") for line in lines], dtype=object)
+    first = head.split(",").index("point_x_mm")
+    cells[:, first : first + 3] = alter(
+        cells[:, first : first + 3].astype(float), np.random.default_rng(10)
+    ).astype(str)
+    (folder / "probings.csv").write_text("\n".join([head, *(",".join(row) for row in cells)]) + "\n")

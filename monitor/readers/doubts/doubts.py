@@ -107,6 +107,7 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             if machine.is_linear(axis)
         },
         {name: values for name, values in probings.channels.items() if name.startswith("tracker_")},
+        *_points_of_setups(campaign),
     )
     for columns in groups:
         spans = _spans(columns)
@@ -115,6 +116,19 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             yield (
                 f"{_and(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
             )
+
+
+def _points_of_setups(campaign: Campaign) -> Iterator[dict[str, Array]]:
+    """The columns of points that each setup read, of its own rows."""
+    channels = campaign.probings.channels
+    for index, setup in enumerate(campaign.artefact.setups if "setup" in channels else ()):
+        if setup.reading in ("point", "pose"):
+            of_setup = {
+                name: values[channels["setup"] == index + 1]
+                for name, values in channels.items()
+                if name.startswith("point_")
+            }
+            yield {name: values[np.isfinite(values)] for name, values in of_setup.items()}
 
 
 def _angles(campaign: Campaign) -> Iterator[str]:
