@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from monitor.discovery import fit
+from monitor.discovery.machine.suspects.bad_poses import bad_poses
 from monitor.exceptions import CampaignError, DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
@@ -141,6 +142,18 @@ def test_points_of_other_poses_do_not_belong_to_the_joints(tmp_path: Path) -> No
         DataError, match=r"do not belong together row by row: .* of setup probe stands beside"
     ):
         campaign_method(campaign).problem_of(campaign)
+
+
+def test_a_bad_pose_says_its_place_and_its_turn_apart(tmp_path: Path) -> None:
+    """2 mm and nothing else: the norm over all six numbers was told as what the place is off by."""
+    folder = six_numbers(tmp_path / "six", 11, poses=60)
+    _altered(folder, lambda rows, _: rows + 2.0 * (np.arange(len(rows)) == 17)[:, None] * [0.0, 0.6, 0.8])
+    campaign = read_campaign(folder)
+    (bad,) = bad_poses(fit(campaign_method(campaign).problem_of(campaign)))
+    assert (bad.sequence, bad.axis) == (18, "its place")
+    assert bad.turn is not None
+    assert 1.0 < bad.size < 2.2
+    assert bad.turn < 8.0 * U_URAD * 1e-6
 
 
 def _altered(folder: Path, alter: Callable[[Array, np.random.Generator], Array]) -> None:

@@ -26,17 +26,22 @@ OPEN = 1e-6
 
 
 def refuse_other_size(
-    rotation: Array, origin: Array, points: Array, at: npt.NDArray[np.int64], left: float, columns: str
+    rotation: Array,
+    origin: Array,
+    points: Array,
+    at: npt.NDArray[np.int64],
+    rms_of_guess: float,
+    columns: str,
 ) -> None:
     """DataError where points are of another size than the chain, or not of these poses.
 
-    ``rotation`` (m, 3, 3) and ``origin`` (m, 3) mm carry points of the tool by the nominal chain, ``points`` (m, 3) mm
-    were measured, of the targets ``at`` (m,); a guess at the size as measured leaves ``left`` mm. ``columns`` says in
-    words where the points stand.
+    ``rotation`` (m, 3, 3) and ``origin`` (m, 3) mm carry points of the tool by the nominal chain, ``points`` (m, 3)
+    mm were measured, of the targets ``at`` (m,); a guess at the size as measured leaves ``rms_of_guess`` mm.
+    ``columns`` says in words where the points stand.
     """
     arm = points - points.mean(axis=0)
     size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
-    if left <= max(LEFT * size, LEAST_LEFT) or all_axes_meet(origin, size):
+    if rms_of_guess <= max(LEFT * size, LEAST_LEFT) or all_axes_meet(origin, size):
         return
     kinds = int(at.max()) + 1
     places = np.zeros((kinds, 3))
@@ -48,8 +53,8 @@ def refuse_other_size(
     if not times or 1.0 / OTHER_UNIT < times < OTHER_UNIT:
         return
     guess = best_frame(rotation, origin, times * points, at, places, False)
-    left_then, spread = left_of(guess, rotation, origin, times * points, at), times * float(arm.std())
-    if _is_ratio_of_units(times) or left_then <= LEFT * spread:
+    rms_at_size, spread = left_of(guess, rotation, origin, times * points, at), times * float(arm.std())
+    if _is_ratio_of_units(times) or rms_at_size <= LEFT * spread:
         raise DataError(
             f"the measured points would have to be {times:.3g} times as large to come from this chain: check the units "
             f"of {columns} (mm) and of offset_mm"

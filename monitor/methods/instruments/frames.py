@@ -54,8 +54,8 @@ def refuse_other_sizes(rows: Rows, places: Array, setup: str) -> None:
     for run in np.unique(rows.run[is_whole]):
         whole = np.flatnonzero((rows.run == run) & is_whole)
         at = np.unique(rows.target[whole], return_inverse=True)[1].reshape(-1)
-        left = float(np.sqrt(np.mean(off[whole] ** 2)))
-        refuse_other_size(pose.by_tip[whole], pose.residual[whole], measured[whole], at, left, columns)
+        rms = float(np.sqrt(np.mean(off[whole] ** 2)))
+        refuse_other_size(pose.by_tip[whole], pose.residual[whole], measured[whole], at, rms, columns)
 
 
 def seen_points(rows: Rows, frames: Array, places: Array) -> Array:

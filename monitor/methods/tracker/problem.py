@@ -268,8 +268,8 @@ def _frame(
         return linear
     # Axes that nearly meet, or a geometry that is far off: which guess is better shows in what it leaves.
     guesses = (linear, best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False))
-    left, best = min(
+    rms, best = min(
         (left_of(guess, rotation, origin, points, at), number) for number, guess in enumerate(guesses)
     )
-    refuse_other_size(rotation, origin, points, at, left, "the tracker's columns")
+    refuse_other_size(rotation, origin, points, at, rms, "the tracker's columns")
     return guesses[best]
