@@ -14,7 +14,7 @@ from monitor.discovery.machine.suspects.bad_poses import bad_poses
 from monitor.exceptions import CampaignError, DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from monitor.readers.doubts.doubts import doubts
+from monitor.readers.doubts.doubts import column_doubts, doubts
 from monitor.records import Array
 from monitor.store.record_json import artefact_json, artefact_record
 from tests.simulator.robot import frames, point
@@ -154,6 +154,20 @@ def test_a_bad_pose_says_its_place_and_its_turn_apart(tmp_path: Path) -> None:
     assert bad.turn is not None
     assert 1.0 < bad.size < 2.2
     assert bad.turn < 8.0 * U_URAD * 1e-6
+
+
+def test_points_at_zero_are_named_by_their_rows(tmp_path: Path) -> None:
+    """A refusal named nothing but the signs of the axes."""
+    folder = six_numbers(tmp_path / "six", 12, poses=40)
+    is_zero = np.isin(np.arange(40), [10, 11, 12])
+    _altered(folder, lambda rows, _: np.where(is_zero[:, None], 0.0, rows))
+    (told,) = column_doubts(read_campaign(folder))
+    assert told.startswith(
+        "setup probe: 3 rows have the point 0, 0, 0 at different poses (run 1, sequence 11, 12, 13)"
+    )
+    once = six_numbers(tmp_path / "once", 12, poses=40)
+    _altered(once, lambda rows, _: np.where((np.arange(40) == 10)[:, None], 0.0, rows))
+    assert column_doubts(read_campaign(once)) == ()
 
 
 def _altered(folder: Path, alter: Callable[[Array, np.random.Generator], Array]) -> None:

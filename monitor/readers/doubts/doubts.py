@@ -16,6 +16,7 @@ import numpy as np
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
+from monitor.readers.doubts.zero_rows import zero_rows
 from monitor.records import Array, Campaign, Run
 from monitor.row_files import runs_in
 from monitor.units import DEGREE, MICROMETRE, UNIT_WORDS, nearness_to_bar
@@ -63,16 +64,17 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _days,
             _to_come,
             repeated_rows,
+            zero_rows,
         )
         for sentence in check(campaign)
     )
 
 
 def column_doubts(campaign: Campaign) -> tuple[str, ...]:
-    """The sentences on columns exchanged, of the other sign or in another unit, each of which refutes a fit."""
+    """The sentences on columns exchanged, of other sign or unit, or of zeros, each of which refutes a fit."""
     return tuple(
         sentence
-        for check in (_travel, _angles, _places, exchanged_columns, _units_of_runs)
+        for check in (_travel, _angles, _places, exchanged_columns, _units_of_runs, zero_rows)
         for sentence in check(campaign)
     )
 
