@@ -135,14 +135,19 @@ def _add(what: str, effects: Sequence[str], to: str) -> None:
 def _bad_probing(reading: BadProbing, target_word: str) -> None:
     output.say(
         f"bad point: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: {reading.axis} is "
-        f"off by {reading.size_um:.1f} µm; it was left out"
+        f"off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
     )
+
+
+def _turn(reading: BadProbing) -> str:
+    """By how much a whole pose is turned, beside its place."""
+    return "" if reading.turn_urad is None else f" and its turn by {reading.turn_urad:.0f} µrad"
 
 
 def _recurring_probing(reading: BadProbing, target_word: str) -> None:
     output.say(
         f"recurs in most runs: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: "
-        f"{reading.axis} is off by {reading.size_um:.1f} µm; it was left out"
+        f"{reading.axis} is off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
     )
 
 
@@ -222,8 +227,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
     if effect.travelled_periods is not None:
         output.say(
-            f"   the axis turned {effect.travelled_periods:.2f} of its period: over a part of a turn an offset, a "
-            "tilt or flexure looks alike"
+            f"   the axis turned {effect.travelled_periods:.2f} of its period: over less than 1.5 it is a smooth bend, "
+            "and an offset, a tilt, flexure or another order looks alike"
         )
     if effect.within_its_shape:
         symbol = effect.effect.partition(":")[0]

@@ -5,11 +5,14 @@ The meaning is put together from the term, its shape and its driver; the most sp
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from monitor.effects.description import Description, Explanation, described
 from monitor.effects.driver import DescribedDriver
-from monitor.effects.effect import ArtefactEffect, InstrumentEffect, ParsedEffect, TurnEffect
+from monitor.effects.effect import ArtefactEffect, ChainEffect, InstrumentEffect, ParsedEffect, TurnEffect
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
+from monitor.effects.shapes.harmonic import Harmonic
 
 
 def describe(effect: ParsedEffect) -> Description:
@@ -26,6 +29,21 @@ def describe(effect: ParsedEffect) -> Description:
         explanations.append(effect.driver.explanation(error))
     explanation = max(filter(None, explanations), key=lambda explanation: explanation.specificity)
     return described(error.meaning + phrase + _driver_phrase(effect), explanation)
+
+
+def describe_bend(effect: ParsedEffect) -> Description:
+    """Describe an effect of whose periods its axis turned so few that it is a smooth bend of any cause."""
+    described_alone = describe(effect)
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Harmonic):
+        return described_alone
+    name = effect.joint.name
+    return replace(
+        described_alone,
+        cause=f"over this part of a turn no more than a smooth bend of {name}: flexure under gravity, an offset or a "
+        f"tilt of axis or encoder; or {described_alone.cause}",
+        remedy=f"measure over more of the turn of {name} before anything is mended; then, where it comes back, "
+        f"{described_alone.remedy}",
+    )
 
 
 def _driver_phrase(effect: ParsedEffect) -> str:

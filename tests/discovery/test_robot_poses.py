@@ -120,6 +120,31 @@ def test_points_in_metres_are_refused(robots, tmp_path):
         tracker.problem_of(found)
 
 
+def test_points_in_another_order_than_the_joints_are_not_put_down_to_a_unit(robots, tmp_path):
+    """A chain shrunk to nothing follows them best: 0.02 is no ratio of two units."""
+    made = robots.track(np.random.default_rng(12), poses=80)
+    # Every reflector keeps its own points; only the poses are another's.
+    shuffled = made.points.copy()
+    for name in np.unique(made.target):
+        rows = np.flatnonzero(np.array(made.target) == name)
+        shuffled[rows] = made.points[np.random.default_rng(13).permutation(rows)]
+    made = type(made)(made.target, made.readings, shuffled, made.location)
+    found = read_campaign(robots.write_tracked(tmp_path / "robot", made))
+    with pytest.raises(DataError, match="do not belong together row by row: in no frame and at no size"):
+        tracker.problem_of(found)
+
+
+@pytest.mark.parametrize(("factor", "told"), [(25.4, "25.[0-9]"), (0.1, "0.(1|09..)"), (100.0, "(100|99..)")])
+def test_points_in_any_unit_are_told_as_a_unit(robots, tmp_path, factor, told):
+    made = robots.track(np.random.default_rng(14), poses=40)
+    made = type(made)(made.target, made.readings, made.points / factor, made.location)
+    found = read_campaign(robots.write_tracked(tmp_path / "robot", made))
+    with pytest.raises(
+        DataError, match=rf"{told} times as large .* check the units of the tracker's columns"
+    ):
+        tracker.problem_of(found)
+
+
 def test_rows_that_are_there_twice_are_refused(robots, tmp_path):
     made = robots.track(np.random.default_rng(11), poses=40)
     made = type(made)(

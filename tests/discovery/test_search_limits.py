@@ -13,7 +13,7 @@ from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.rounds import Limit, most_cautious
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.refine import refine_all
-from monitor.discovery.machine.shapes.variants import part_of_period, variants_of
+from monitor.discovery.machine.shapes.variants import part_of_bend, part_of_period, variants_of
 from monitor.discovery.search.candidate import Candidate, Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.remainder import Remainders
@@ -165,7 +165,34 @@ def test_a_part_of_a_turn_names_a_slope_as_rival(virtual_campaigns):
     answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(3))
     leader = answer.missing[0]
     assert (leader.effect, leader.travelled_periods) == ("EBB:harmonic1", pytest.approx(0.25))
-    assert "EBB:poly1" in {rival.effect for rival in leader.rivals}
+    # Over 90 degrees harmonic5 has 1.25 periods, and harmonic6 no fewer than 1.5.
+    names = {rival.effect for rival in leader.rivals}
+    assert {"EBB:poly1", "EBB:harmonic2"} <= names
+    assert not {"EBB:harmonic6", "EBB:harmonic7"} & names
+    assert leader.description.cause.startswith(
+        "over this part of a turn no more than a smooth bend of B: flexure"
+    )
+
+
+@pytest.mark.parametrize(
+    ("order", "degrees", "bend"),
+    [
+        (6, 58.2, 0.97),
+        (6, 88.0, 1.4667),
+        (6, 92.0, None),
+        (2, 200.0, 1.1111),
+        (1, 350.0, None),
+        (3, 240.0, None),
+    ],
+)
+def test_fewer_than_one_and_a_half_periods_over_a_part_of_a_turn_are_a_bend(drifting, order, degrees, bend):
+    """harmonic6 of an elevation over 58.2 degrees was told as a gear of six errors a turn, with no other cause."""
+    context = drifting.problem.context
+    effect = parse_effect(f"EBB:harmonic{order}", context.chain)
+    positions = context.positions.copy()
+    positions[:, effect.term.joint] = np.deg2rad(np.linspace(0.0, degrees, len(positions)))
+    part = part_of_bend(effect, replace(context, positions=positions))
+    assert part == (None if bend is None else pytest.approx(bend, abs=1e-4))
 
 
 def test_a_combination_that_only_products_of_errors_determine_is_held():

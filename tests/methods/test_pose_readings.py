@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from monitor.discovery import fit
-from monitor.exceptions import CampaignError
+from monitor.discovery.machine.suspects.bad_poses import bad_poses
+from monitor.exceptions import CampaignError, DataError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
+from monitor.readers.doubts.doubts import column_doubts, doubts
+from monitor.records import Array
 from monitor.store.record_json import artefact_json, artefact_record
 from tests.simulator.robot import frames, point
 from tests.simulator.robot_campaign import ELBOW, JOINTS, errors_of_robot, lever_arms
@@ -114,3 +118,64 @@ def test_a_quaternion_has_length_one(tmp_path: Path) -> None:
     (folder / "probings.csv").write_text("\n".join(rows))
     with pytest.raises(CampaignError, match=r"the quaternion has length .*; a quaternion has length 1"):
         read_campaign(folder)
+
+
+@pytest.mark.parametrize("reading", ["pose", "point"])
+def test_points_in_metres_are_refused_as_of_a_tracker(tmp_path: Path, reading: str) -> None:
+    """The fit followed them by a robot that is shrunk to a point, and said so with numbers and u."""
+    edits = {"pose": ("", ""), "point": ("standard_uncertainty_urad = 60.0\n", "")}
+    second = ('reading = "pose"', f'reading = "{reading}"')
+    folder = six_numbers(tmp_path / "six", 8, poses=40, edit=edits[reading], second=second)
+    _altered(folder, lambda rows, _: rows / 1e3)
+    campaign = read_campaign(folder)
+    assert any("point_x_mm, point_y_mm and point_z_mm span" in told for told in doubts(campaign))
+    with pytest.raises(DataError, match=r"99\d times as large .* units of point_x_mm, .* of setup probe"):
+        campaign_method(campaign).problem_of(campaign)
+
+
+def test_points_of_other_poses_do_not_belong_to_the_joints(tmp_path: Path) -> None:
+    folder = six_numbers(tmp_path / "six", 9, poses=60)
+    _altered(folder, lambda rows, rng: rng.permutation(rows))
+    campaign = read_campaign(folder)
+    assert doubts(campaign) == ()
+    with pytest.raises(
+        DataError, match=r"do not belong together row by row: .* of setup probe stands beside"
+    ):
+        campaign_method(campaign).problem_of(campaign)
+
+
+def test_a_bad_pose_says_its_place_and_its_turn_apart(tmp_path: Path) -> None:
+    """2 mm and nothing else: the norm over all six numbers was told as what the place is off by."""
+    folder = six_numbers(tmp_path / "six", 11, poses=60)
+    _altered(folder, lambda rows, _: rows + 2.0 * (np.arange(len(rows)) == 17)[:, None] * [0.0, 0.6, 0.8])
+    campaign = read_campaign(folder)
+    (bad,) = bad_poses(fit(campaign_method(campaign).problem_of(campaign)))
+    assert (bad.sequence, bad.axis) == (18, "its place")
+    assert bad.turn is not None
+    assert 1.0 < bad.size < 2.2
+    assert bad.turn < 8.0 * U_URAD * 1e-6
+
+
+def test_points_at_zero_are_named_by_their_rows(tmp_path: Path) -> None:
+    """A refusal named nothing but the signs of the axes."""
+    folder = six_numbers(tmp_path / "six", 12, poses=40)
+    is_zero = np.isin(np.arange(40), [10, 11, 12])
+    _altered(folder, lambda rows, _: np.where(is_zero[:, None], 0.0, rows))
+    (told,) = column_doubts(read_campaign(folder))
+    assert told.startswith(
+        "setup probe: 3 rows have the point 0, 0, 0 at different poses (run 1, sequence 11, 12, 13)"
+    )
+    once = six_numbers(tmp_path / "once", 12, poses=40)
+    _altered(once, lambda rows, _: np.where((np.arange(40) == 10)[:, None], 0.0, rows))
+    assert column_doubts(read_campaign(once)) == ()
+
+
+def _altered(folder: Path, alter: Callable[[Array, np.random.Generator], Array]) -> None:
+    """Put what ``alter`` makes of the points (n, 3) of a folder in their place."""
+    head, *lines = (folder / "probings.csv").read_text().splitlines()
+    cells = np.array([line.split(",") for line in lines], dtype=object)
+    first = head.split(",").index("point_x_mm")
+    cells[:, first : first + 3] = alter(
+        cells[:, first : first + 3].astype(float), np.random.default_rng(10)
+    ).astype(str)
+    (folder / "probings.csv").write_text("\n".join([head, *(",".join(row) for row in cells)]) + "\n")

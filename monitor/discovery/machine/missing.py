@@ -18,7 +18,7 @@ from monitor.discovery.machine.separation.separate import Separation, separating
 from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.variants import each_run, part_of_period
+from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -31,7 +31,7 @@ from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
 from monitor.effects.shapes import Harmonics
 from monitor.effects.weight import LinkWeights
-from monitor.effects.words import describe
+from monitor.effects.words import describe, describe_bend
 from monitor.records import Array
 from monitor.units import Unit
 
@@ -47,7 +47,8 @@ class ChainMissing(Missing):
     of days None with fewer than three days, those of poses are of poses left out of every run. ``separation`` holds the
     poses that would separate the rivals; ``varies`` says that the effect has another size in every run. Where the
     catalogue does not have its shape, ``nearest`` is the entry that comes closest, and ``curve`` the shape.
-    ``travelled_periods`` of a harmonic are less than one where the axis did not turn through its period (else None);
+    ``travelled_periods`` of a harmonic are those through which the axis turned, where they are so few over a part of a
+    turn that it is a smooth bend (else None);
     ``unit`` is that of ``amplitude`` where it is not that of the coefficients: the weights of many links are one angle,
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
@@ -306,10 +307,11 @@ def _missing(
             for pair in search.rivals(index, least_likelihood(finding.evidence), coefficients)
             if _name(pair[0]) != _name(candidate)
         ]
+    travelled_periods = part_of_bend(effect, scene.fit.problem.context)
     return ChainMissing(
         rank=index + 1,
         effect=_name(candidate),
-        description=describe(effect),
+        description=describe(effect) if travelled_periods is None else describe_bend(effect),
         parameters=effect.parameters(scene.fit.problem.context),
         units=(effect.unit,) * len(coefficients),
         coefficients=coefficients,
@@ -334,7 +336,7 @@ def _missing(
         ),
         varies=isinstance(effect.driver, EachRun),
         within_runs=_shows_within_runs_alone(scene, effect),
-        travelled_periods=part_of_period(effect, scene.fit.problem.context),
+        travelled_periods=travelled_periods,
         unit=unit,
         nearest=candidate.variant.nearest,
         curve=curve,

@@ -19,11 +19,13 @@ from monitor.effects import (
 from monitor.exceptions import DataError, EffectError
 from monitor.machine import Chain, evaluate, orientation
 from monitor.methods.instruments.base import instrument_base
+from monitor.methods.instruments.frames import refuse_other_sizes
 from monitor.methods.instruments.part import Part, scale_id_of, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
+from monitor.methods.instruments.readings.point import Point
 from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign, Setup
 from monitor.sources import SCALE
@@ -109,6 +111,8 @@ def _parts(
         if isinstance(reading, Direction) and "frame" not in setup.known:
             floating = any(isinstance(part.reading, Direction) for part in parts)
             reading = replace(reading, floating=floating)
+        if isinstance(reading, Point) and not reading.plane:
+            refuse_other_sizes(rows, np.array(reading.places), setup.id)
         drift = setup.drift_uncertainty
         if drift is not None:
             _refuse_one_moment(campaign, setup, rows)

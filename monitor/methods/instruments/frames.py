@@ -6,6 +6,7 @@ import numpy as np
 
 from monitor.machine import evaluate
 from monitor.methods.chain.first_frame import best_frame
+from monitor.methods.chain.size_of_points import refuse_other_size
 from monitor.methods.instruments.reading import Rows
 from monitor.records import Array
 
@@ -39,6 +40,22 @@ def first_frame(rows: Rows, places: Array, *, held: bool) -> tuple[Array, Array]
         times[of_run] += 1.0
     mean = sums / np.maximum(times, 1.0)[:, None]
     return guesses, places if held else np.where(times[:, None] > 0.0, mean, places)
+
+
+def refuse_other_sizes(rows: Rows, places: Array, setup: str) -> None:
+    """DataError where the points of a run are of another size than the chain, or not of its poses; ``places`` (T, 3)
+    mm and ``rows.guess`` are the first guess."""
+    count, measured = len(rows), rows.measured[:, :3]
+    none = np.zeros((count, len(rows.chain.joints), 2, 6))
+    pose = evaluate(rows.chain, rows.positions, none, np.zeros((count, 3)), np.zeros(3))
+    off = seen_points(rows, rows.guess[:, :12], places) - measured
+    is_whole = np.isfinite(measured).all(axis=1)
+    columns = f"point_x_mm, point_y_mm and point_z_mm of setup {setup}"
+    for run in np.unique(rows.run[is_whole]):
+        whole = np.flatnonzero((rows.run == run) & is_whole)
+        at = np.unique(rows.target[whole], return_inverse=True)[1].reshape(-1)
+        rms = float(np.sqrt(np.mean(off[whole] ** 2)))
+        refuse_other_size(pose.by_tip[whole], pose.residual[whole], measured[whole], at, rms, columns)
 
 
 def seen_points(rows: Rows, frames: Array, places: Array) -> Array:

@@ -20,7 +20,6 @@ import numpy.typing as npt
 from monitor.effects import Context
 from monitor.effects.artefact.tracker import measured_points
 from monitor.effects.catalogue import of_tracker
-from monitor.exceptions import DataError
 from monitor.machine import ChainPose, evaluate
 from monitor.machine.chain import rotation_about
 from monitor.methods.chain.exact_scales import exact_scales
@@ -28,6 +27,7 @@ from monitor.methods.chain.first_frame import all_axes_meet, best_frame, frame_e
 from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.size_of_points import left_of, refuse_other_size
 from monitor.records import Array
 from monitor.sources import SCALE, CommonQuantity
 
@@ -40,8 +40,6 @@ LARGEST_DISPLACEMENT, LARGEST_ANGLE = 5.0, 0.02
 # Geometry alone leaves a robot some tenths of a millimetre over a metre. Where a fiftieth of the spread of the
 # points is left, the chain is another one.
 CONTRADICTS = 0.02
-# Points this many times too small or too large are in another unit (cm, inch, m); no error of a chain comes near.
-OTHER_UNIT = 5.0
 AXES: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -260,37 +258,18 @@ def _frame(
     if all_axes_meet(origin, size):
         return best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False)
     flat, wanted = frame_equations(rotation, origin, arm / size, at, kinds)
-    free, _, rank, _ = np.linalg.lstsq(flat, wanted, rcond=1e-8)
-    u, stretch, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
-    times = float(np.prod(stretch) ** (1.0 / 3.0))
-    if rank == flat.shape[1] and not 1.0 / OTHER_UNIT < times < OTHER_UNIT:
-        # Axes that nearly meet hardly fix the size: what fits at the size as measured is in the right unit.
-        guess = best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False)
-        if _left(guess, rotation, origin, points, at) <= CONTRADICTS * size:
-            return guess
-        raise DataError(
-            f"the measured points would have to be {times:.3g} times as large to come from this chain: check the units "
-            "of the tracker's columns (mm) and of offset_mm"
-        )
+    free = np.linalg.lstsq(flat, wanted, rcond=1e-8)[0]
+    u, _, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
     remainder = (origin - arm @ turn.T).reshape(-1)
     rest = np.linalg.lstsq(flat[:, 9:], -remainder, rcond=1e-8)[0]
     linear = (turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3))
-    if _left(linear, rotation, origin, points, at) <= CONTRADICTS * size:
+    if left_of(linear, rotation, origin, points, at) <= CONTRADICTS * size:
         return linear
     # Axes that nearly meet, or a geometry that is far off: which guess is better shows in what it leaves.
     guesses = (linear, best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False))
-    return min(guesses, key=lambda guess: _left(guess, rotation, origin, points, at))
-
-
-def _left(
-    guess: tuple[Array, Array, Array],
-    rotation: Array,
-    origin: Array,
-    points: Array,
-    at: npt.NDArray[np.int64],
-) -> float:
-    """Root mean square in mm of what a guess leaves of points (n, 3)."""
-    turn, shift, places = guess
-    apart = np.einsum("nij,nj->ni", rotation, places[at]) + origin - points @ turn.T - shift
-    return float(np.sqrt(np.mean(apart**2)))
+    rms, best = min(
+        (left_of(guess, rotation, origin, points, at), number) for number, guess in enumerate(guesses)
+    )
+    refuse_other_size(rotation, origin, points, at, rms, "the tracker's columns")
+    return guesses[best]

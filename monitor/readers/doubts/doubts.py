@@ -17,6 +17,7 @@ from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
+from monitor.readers.doubts.zero_rows import zero_rows
 from monitor.readers.faults import and_of
 from monitor.records import Array, Campaign, Run
 from monitor.row_files import runs_in
@@ -62,16 +63,17 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _days,
             _to_come,
             repeated_rows,
+            zero_rows,
         )
         for sentence in check(campaign)
     )
 
 
 def column_doubts(campaign: Campaign) -> tuple[str, ...]:
-    """The sentences on columns exchanged, of the other sign or in another unit, each of which refutes a fit."""
+    """The sentences on columns exchanged, of other sign or unit, or of zeros, each of which refutes a fit."""
     return tuple(
         sentence
-        for check in (_travel, radians, _places, exchanged_columns, _units_of_runs)
+        for check in (_travel, radians, _places, exchanged_columns, _units_of_runs, zero_rows)
         for sentence in check(campaign)
     )
 
@@ -106,6 +108,7 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             if machine.is_linear(axis)
         },
         {name: values for name, values in probings.channels.items() if name.startswith("tracker_")},
+        *_points_of_setups(campaign),
     )
     for columns in groups:
         spans = _spans(columns)
@@ -114,6 +117,19 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             yield (
                 f"{and_of(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
             )
+
+
+def _points_of_setups(campaign: Campaign) -> Iterator[dict[str, Array]]:
+    """The columns of points that each setup read, of its own rows."""
+    channels = campaign.probings.channels
+    for index, setup in enumerate(campaign.artefact.setups if "setup" in channels else ()):
+        if setup.reading in ("point", "pose"):
+            of_setup = {
+                name: values[channels["setup"] == index + 1]
+                for name, values in channels.items()
+                if name.startswith("point_")
+            }
+            yield {name: values[np.isfinite(values)] for name, values in of_setup.items()}
 
 
 def _places(campaign: Campaign) -> Iterator[str]:

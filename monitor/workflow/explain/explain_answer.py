@@ -60,10 +60,10 @@ class MachineMissing:
     not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
     ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
-    ``travelled_periods`` of a harmonic is the part of its period that the axis turned, where that is no whole one: over
-    a part of a turn an offset, a tilt or flexure looks alike. ``within_its_shape`` are effects that stand out beside it
-    but not beside its error in any shape: they cannot be separated from it. ``refers_to`` says in words what its
-    coefficients are stated relative to, where it is an error of the chain.
+    ``travelled_periods`` of a harmonic is how many of its periods the axis turned, where they are fewer than 1.5 over
+    a part of a turn: an offset, a tilt, flexure or another order looks alike there. ``within_its_shape`` are effects
+    that stand out beside it but not beside its error in any shape: they cannot be separated from it. ``refers_to``
+    says in words what its coefficients are stated relative to, where it is an error of the chain.
     """
 
     rank: int
@@ -136,7 +136,8 @@ class CurveMissing:
 
 @dataclass(frozen=True)
 class BadProbing:
-    """A probing that contradicts the same one of the other runs; it was left out."""
+    """A probing that contradicts the same one of the other runs; it was left out. ``turn_urad`` is by how much a whole
+    pose is turned, beside what its place is off by."""
 
     run: int
     sequence: int
@@ -144,6 +145,7 @@ class BadProbing:
     axis: str
     size_um: float
     p_value: float
+    turn_urad: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from monitor.reporting.machine_finding import (
     fits_too_well,
     machine_sentences,
 )
-from monitor.units import DEGREE, MICROMETRE, Unit
+from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -334,7 +334,15 @@ def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
     """Readings that were left out."""
     um = MICROMETRE.to_display
     return tuple(
-        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
+        BadProbing(
+            point.run,
+            point.sequence,
+            point.target,
+            point.axis,
+            um(point.size),
+            point.p_value,
+            None if point.turn is None else MICRORADIAN.to_display(point.turn),
+        )
         for point in points
     )
 

@@ -16,7 +16,7 @@ from monitor.discovery.machine.scene import (
 )
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.variants import bends_of, part_of_period, with_drivers
+from monitor.discovery.machine.shapes.variants import bends_of, part_of_bend, with_drivers
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
@@ -72,8 +72,9 @@ class RivalSearch:
         ]
         families |= {rival.family for rival in pool}
         variants = with_drivers(candidate.effect, self.drivers)
-        if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
-            variants += bends_of(candidate.effect)
+        context = self.scene.fit.problem.context
+        if part_of_bend(candidate.effect, context) is not None:
+            variants += bends_of(candidate.effect, context)
         variants += _of_other_errors(candidate.effect)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:

@@ -74,6 +74,8 @@ ODDS_OF_A_WIDTH = 20.0
 NEVER_FOUND = 1e300
 # A period counts as travelled a little before its end.
 WHOLE_PERIOD = 0.95
+# Fewer periods over a part of a turn are a smooth bend: other low orders and flexure follow it nearly as well.
+BEND_PERIODS, HIGHEST_OF_BENDS = 1.5, 8
 # Over less than a quarter of a period a cosine and a sine are a slope and a parabola, to 5 % of what they bend.
 SHORTEST_PART = 0.25
 # An axis is level where it leans less than 15 degrees: there three quarters of flexure lie about it alone.
@@ -114,6 +116,23 @@ def _is_level(joint: int, context: Context) -> bool:
 
 def part_of_period(effect: MachineEffect, context: Context) -> float | None:
     """The part of its period that the axis of an effect turned; None for whole periods, and for what has none."""
+    part = _periods_turned(effect, context)
+    return part if part is not None and part < WHOLE_PERIOD else None
+
+
+def part_of_bend(effect: MachineEffect, context: Context) -> float | None:
+    """The periods of an effect that its axis turned where these are so few that it is a smooth bend; None for more, for
+    whole turns, after which every order comes back, and for what has no period."""
+    part = _periods_turned(effect, context)
+    if part is None or part >= BEND_PERIODS:
+        return None
+    assert isinstance(effect, ChainEffect)
+    turned = float(np.ptp(context.positions[:, effect.term.joint])) / (2.0 * np.pi)
+    return part if turned < WHOLE_PERIOD else None
+
+
+def _periods_turned(effect: MachineEffect, context: Context) -> float | None:
+    """How many periods of an effect its axis turned; None where it did not turn, and for what has no period."""
     if not isinstance(effect, ChainEffect) or not effect.joint.turns:
         return None
     if isinstance(effect.shape, Harmonic):
@@ -122,16 +141,24 @@ def part_of_period(effect: MachineEffect, context: Context) -> float | None:
         periods = 1.0
     else:
         return None
-    part = periods * float(np.ptp(context.positions[:, effect.term.joint])) / (2.0 * np.pi)
-    return part if 0.0 < part < WHOLE_PERIOD else None
+    turned = float(np.ptp(context.positions[:, effect.term.joint])) / (2.0 * np.pi)
+    return periods * turned or None
 
 
-def bends_of(effect: MachineEffect) -> list[ChainVariant]:
-    """What the same error looks like over a part of a period: a slope and bends of any cause, and the weight on it."""
+def bends_of(effect: MachineEffect, context: Context) -> list[ChainVariant]:
+    """What the same error looks like over a part of a period: a slope and bends of any cause, the other waves that are
+    no more than a bend there, and the weight on it."""
     if not isinstance(effect, ChainEffect):
         return []
     plain = replace(effect, driver=Always(), driver_text="")
-    bends = [replace(plain, shape=parse_shape(text), shape_text=text) for text in ("poly1", "poly2", "poly3")]
+    texts = ["poly1", "poly2", "poly3", *(f"harmonic{order}" for order in range(1, HIGHEST_OF_BENDS + 1))]
+    bends = [replace(plain, shape=parse_shape(text), shape_text=text) for text in texts]
+    bends = [
+        bend
+        for bend in bends
+        if not isinstance(bend.shape, Harmonic)
+        or (bend.shape_text != effect.shape_text and part_of_bend(bend, context) is not None)
+    ]
     weight = replace(
         effect, shape=parse_shape("const"), shape_text="const", driver=Gravity(), driver_text="gravity"
     )

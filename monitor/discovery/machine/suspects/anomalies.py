@@ -31,7 +31,8 @@ CHECKED = 1e-6
 @dataclass(frozen=True)
 class BadPoint:
     """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``. ``rows`` are
-    those of a pose that is bad as a whole."""
+    those of a pose that is bad as a whole; ``turn`` rad is by how much a body of six numbers is turned, whose place is
+    off by ``size``."""
 
     row: int
     run: int
@@ -42,6 +43,7 @@ class BadPoint:
     p_value: float
     chi_square: float = 0.0
     rows: tuple[int, ...] = ()
+    turn: float | None = None
 
     @property
     def all_rows(self) -> tuple[int, ...]:

@@ -22,6 +22,8 @@ UPPER = 0.95
 # The p-value of a rest that is not Gaussian is larger than it looks; a bad reading is off by more than this many times
 # the usual deviation in any case.
 LEAST_TIMES = 6.0
+# Whole poses end with their turns, which stand beside lengths as what they come to at one metre, in mm.
+TURNS, LEVER = ("a", "b", "c"), 1000.0
 
 
 def _chi_squares(squares: Array, numbers: int) -> Array:
@@ -71,14 +73,20 @@ def _point(fit: Fit, rows: list[int], white: Array, chi_square: float, numbers: 
     context, first = fit.problem.context, rows[0]
     targets = ", ".join(dict.fromkeys(str(context.target[row]) for row in rows))
     p_value = float(special.chdtrc(numbers, chi_square)) * tests
+    size, turn = float(np.linalg.norm(white)) * fit.sigma, None
+    if fit.problem.components[-3:] == TURNS:
+        sigma = fit.problem.sigma[first]
+        off = white * np.where(np.isfinite(sigma), sigma, fit.sigma)
+        size, turn = float(np.linalg.norm(off[:-3])), float(np.linalg.norm(off[-3:])) / LEVER
     return BadPoint(
         row=first,
         run=int(context.run[first]),
         sequence=int(context.sequence[first]),
         target=targets,
         axis="the pose" if len(rows) > 1 else "its place",
-        size=float(np.linalg.norm(white)) * fit.sigma,
+        size=size,
         p_value=min(1.0, p_value),
         chi_square=chi_square,
         rows=tuple(rows),
+        turn=turn,
     )
