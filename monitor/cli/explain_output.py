@@ -9,7 +9,14 @@ from monitor.cli.contradiction_output import against_others
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.measurement_output import where
 from monitor.cli.residual_output import four_digits, with_uncertainty
-from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
+from monitor.reporting.runs_that_tell import (
+    MOVED_ONCE,
+    NO_POSE_TELLS,
+    WHO_MOVED,
+    more_runs,
+    poses_that_tell,
+    runs_that_tell,
+)
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -177,9 +184,22 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     if tie.broken_by is TieBreak.DRIVERS:
         return f"to tell {rivals} apart, measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs)}"
     if tie.broken_by is TieBreak.INDEXATIONS:
-        return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
+        return (
+            f"to tell {rivals} apart, bring {' and '.join(tie.axes)} to other positions while {drivers} acts"
+        )
     if tie.broken_by is TieBreak.PLAN:
-        return f'to tell {rivals} apart: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+        acting = f", at poses probed while {drivers} acts" if drivers else ""
+        return (
+            f'to tell {rivals} apart{acting}: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+        )
+    if tie.broken_by is TieBreak.REPEATED:
+        return f"to tell {rivals} apart, {MOVED_ONCE}"
+    if tie.broken_by is TieBreak.REFERENCES:
+        return f"to tell {rivals} apart, {WHO_MOVED}"
+    if tie.broken_by is TieBreak.MORE_RUNS and tie.runs is not None:
+        return f"to tell {rivals} apart, {more_runs(tie.runs)}"
+    if tie.broken_by is TieBreak.NO_POSES:
+        return f"{NO_POSE_TELLS} {rivals} apart{'' if tie.runs is None else f': {more_runs(tie.runs)}'}"
     if tie.broken_by is TieBreak.INSTRUMENT and tie.measurement is not None:
         return f"to tell {rivals} apart: {_test(tie.measurement)}"
     if tie.broken_by is TieBreak.INSTRUMENT:

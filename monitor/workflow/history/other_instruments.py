@@ -111,9 +111,9 @@ class _Measuring:
 
     def alike(self, run: int) -> npt.NDArray[np.bool_]:
         """The runs (n,) that were measured by the same as one of them."""
-        campaigns, firsts, index = np.unique(self.history.campaign, return_index=True, return_inverse=True)
+        _, firsts, index = np.unique(self.history.campaign, return_index=True, return_inverse=True)
         same = [self.by(run, int(first)) is None for first in firsts]
-        return np.asarray(np.array(same)[index.ravel()] & (len(campaigns) > 0))
+        return np.array(same)[index.ravel()]
 
     def apart(self, name: str, last: int, first: int) -> Array:
         """What the difference of a parameter in two runs has of each quantity (q,)."""

@@ -370,13 +370,13 @@ def _leave_out_cancelled(
 
 
 def _texts(
-    joints: Sequence[_Joint], lines: dict[int, list[float]], besides: _Joint | None = None
+    joints: Sequence[_Joint], lines: dict[int, list[float]], except_for: _Joint | None = None
 ) -> list[str]:
-    """The lines of all joints ``besides`` one, as effects."""
+    """The lines of all joints ``except_for`` one, as effects."""
     return [
         f"{joint.term}:{harmonics_text(lines[joint.index])}"
         for joint in joints
-        if joint is not besides and lines[joint.index]
+        if joint is not except_for and lines[joint.index]
     ]
 
 

@@ -106,7 +106,8 @@ def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
     separable = [pair for pair in close if _is_separable(pair, runs)]
     alike = tuple(pair.effects for pair in close if not _is_separable(pair, runs))
     if not separable:
-        return Selection((), 0.0, 0.0, alike)
+        closest = min((distance_of(pair.present, runs) for pair in close or pairs), default=0.0)
+        return Selection((), closest, closest, alike)
     grams = [pair.present for pair in separable]
     before = after = min(distance_of(gram, runs) for gram in grams)
     selected: list[int] = []
