@@ -178,6 +178,19 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: 
                     output.say(f"   {_tie(effect.effect, tie, campaign)}")
 
 
+#: Ties that other runs break.
+_MORE_RUNS = (TieBreak.REPEATED, TieBreak.REFERENCES, TieBreak.MORE_RUNS, TieBreak.NO_POSES)
+
+
+def _more_runs(rivals: str, tie: Tie) -> str:
+    """What other runs do about rivals."""
+    runs = "" if tie.runs is None else more_runs(tie.runs)
+    if tie.broken_by is TieBreak.NO_POSES:
+        return f"{NO_POSE_TELLS} {rivals} apart{runs and ': '}{runs}"
+    said = {TieBreak.REPEATED: MOVED_ONCE, TieBreak.REFERENCES: WHO_MOVED}.get(tie.broken_by, runs)
+    return f"to tell {rivals} apart, {said}"
+
+
 def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
@@ -192,14 +205,8 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
         return (
             f'to tell {rivals} apart{acting}: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
         )
-    if tie.broken_by is TieBreak.REPEATED:
-        return f"to tell {rivals} apart, {MOVED_ONCE}"
-    if tie.broken_by is TieBreak.REFERENCES:
-        return f"to tell {rivals} apart, {WHO_MOVED}"
-    if tie.broken_by is TieBreak.MORE_RUNS and tie.runs is not None:
-        return f"to tell {rivals} apart, {more_runs(tie.runs)}"
-    if tie.broken_by is TieBreak.NO_POSES:
-        return f"{NO_POSE_TELLS} {rivals} apart{'' if tie.runs is None else f': {more_runs(tie.runs)}'}"
+    if tie.broken_by in _MORE_RUNS:
+        return _more_runs(rivals, tie)
     if tie.broken_by is TieBreak.INSTRUMENT and tie.measurement is not None:
         return f"to tell {rivals} apart: {_test(tie.measurement)}"
     if tie.broken_by is TieBreak.INSTRUMENT:
