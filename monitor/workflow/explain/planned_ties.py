@@ -24,9 +24,9 @@ MOST_TIMES = 20
 
 
 def with_plans(
-    explanation: MachineExplanation, found: Sequence[ChainMissing], campaign: Campaign, model: StoredModel
+    explanation: MachineExplanation, missing: Sequence[ChainMissing], campaign: Campaign, model: StoredModel
 ) -> MachineExplanation:
-    """The explanation of what was ``found`` with what the plan says of each tie: poses, runs more of the same plan, or
+    """The explanation of what is ``missing`` with what the plan says of each tie: poses, runs more of the same plan, or
     that no pose helps."""
     if not any(tie.broken_by in ASKED for effect in explanation.missing for tie in effect.ties):
         return explanation
@@ -38,7 +38,7 @@ def with_plans(
         explanation,
         missing=tuple(
             plan.of_missing(effect, each.coefficients)
-            for effect, each in zip(explanation.missing, found, strict=True)
+            for effect, each in zip(explanation.missing, missing, strict=True)
         ),
     )
 
@@ -82,5 +82,5 @@ class PlanOfPairs:
         present = len(self.fitted.problem.runs)
         times = (DECIDES / apart) ** 2
         runs = max(ceil(present * times) - present, 1) if times <= MOST_TIMES else None
-        told = verdict is SeparationVerdict.ALREADY and runs is not None
-        return replace(tie, broken_by=TieBreak.MORE_RUNS if told else TieBreak.NO_POSES, runs=runs)
+        is_told = verdict is SeparationVerdict.ALREADY and runs is not None
+        return replace(tie, broken_by=TieBreak.MORE_RUNS if is_told else TieBreak.NO_POSES, runs=runs)
