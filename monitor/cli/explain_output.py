@@ -9,7 +9,14 @@ from monitor.cli.contradiction_output import against_others
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.measurement_output import where
 from monitor.cli.residual_output import four_digits, with_uncertainty
-from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
+from monitor.reporting.runs_that_tell import (
+    MOVED_ONCE,
+    NO_POSE_TELLS,
+    WHO_MOVED,
+    more_runs,
+    poses_that_tell,
+    runs_that_tell,
+)
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -176,15 +183,35 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: 
                     output.say(f"   {_tie(effect.effect, tie, campaign)}")
 
 
+#: Ties that other runs break.
+_MORE_RUNS = (TieBreak.REPEATED, TieBreak.REFERENCES, TieBreak.MORE_RUNS, TieBreak.NO_POSES)
+
+
+def _more_runs(rivals: str, tie: Tie) -> str:
+    """What other runs do about rivals."""
+    runs = "" if tie.runs is None else more_runs(tie.runs)
+    if tie.broken_by is TieBreak.NO_POSES:
+        return f"{NO_POSE_TELLS} {rivals} apart{runs and ': '}{runs}"
+    said = {TieBreak.REPEATED: MOVED_ONCE, TieBreak.REFERENCES: WHO_MOVED}.get(tie.broken_by, runs)
+    return f"to tell {rivals} apart, {said}"
+
+
 def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
     if tie.broken_by is TieBreak.DRIVERS:
         return f"to tell {rivals} apart, measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs)}"
     if tie.broken_by is TieBreak.INDEXATIONS:
-        return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
+        return (
+            f"to tell {rivals} apart, bring {' and '.join(tie.axes)} to other positions while {drivers} acts"
+        )
     if tie.broken_by is TieBreak.PLAN:
-        return f'to tell {rivals} apart: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+        acting = f", at poses probed while {drivers} acts" if drivers else ""
+        return (
+            f'to tell {rivals} apart{acting}: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+        )
+    if tie.broken_by in _MORE_RUNS:
+        return _more_runs(rivals, tie)
     if tie.broken_by is TieBreak.INSTRUMENT and tie.measurement is not None:
         return f"to tell {rivals} apart: {_test(tie.measurement)}"
     if tie.broken_by is TieBreak.INSTRUMENT:

@@ -30,6 +30,19 @@ OF_TIMES = {
 #: What names of effects have that weight makes.
 OF_WEIGHT = ("gravity", "compliance", "link_weights")
 
+#: What tells a move within a run from an effect that is there in every run; which of two things moved.
+MOVED_ONCE = "repeat the run: what moved once does not move again at that reading"
+WHO_MOVED = (
+    "repeat the run with targets that rest beside the machine, read again and again: they seem to move with the "
+    "station, and stand still where the machine moved on its base"
+)
+NO_POSE_TELLS = "no pose that this machine reaches tells"
+
+
+def more_runs(runs: int) -> str:
+    """Return how many ``runs`` more tell effects apart which the poses do not, or not yet."""
+    return f"measure {runs} {'run' if runs == 1 else 'runs'} more at the present poses"
+
 
 def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
     """Return which runs give one or two ``drivers`` other values, and what has to be recorded of them.
@@ -53,6 +66,8 @@ def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
 
 def poses_that_tell(axes: Sequence[str], effects: Sequence[str]) -> str:
     """Return which poses of ``axes`` tell ``effects`` apart; of what weight bends another load does, too."""
-    poses = f"more poses over the whole range of {' and '.join(axes)}"
     bends = any(word in effect for effect in effects for word in OF_WEIGHT)
+    if bends and not axes:
+        return "some poses under another load"
+    poses = f"more poses over the whole range of {' and '.join(axes) or 'all axes'}"
     return f"{poses}, and some under another load" if bends else f"{poses}, between the present ones"

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 from monitor.exceptions import MonitorError
 from monitor.records import SecondSetup
 from monitor.reporting.numbers import round_result, written
-from monitor.reporting.runs_that_tell import poses_that_tell, runs_that_tell
+from monitor.reporting.runs_that_tell import (
+    MOVED_ONCE,
+    NO_POSE_TELLS,
+    WHO_MOVED,
+    more_runs,
+    poses_that_tell,
+    runs_that_tell,
+)
 from monitor.reporting.second_setup import IN_WORDS
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
@@ -304,8 +311,12 @@ def what_breaks(tie: Tie) -> str:
     return {
         TieBreak.POSES: "probe at the poses below too",
         TieBreak.DRIVERS: f"measure {runs_that_tell(tie.drivers, within_runs=tie.within_runs).replace('_', ' ')}",
-        TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
-        TieBreak.PLAN: "let the plan choose poses for the pair",
+        TieBreak.INDEXATIONS: f"bring {' and '.join(tie.axes)} to other positions while {drivers} acts",
+        TieBreak.PLAN: f"let the plan choose poses for the pair{f', to probe while {drivers} acts' * bool(drivers)}",
+        TieBreak.MORE_RUNS: more_runs(tie.runs or 1),
+        TieBreak.NO_POSES: f"{NO_POSE_TELLS} them apart{'' if tie.runs is None else f': {more_runs(tie.runs)}'}",
+        TieBreak.REPEATED: MOVED_ONCE,
+        TieBreak.REFERENCES: WHO_MOVED,
         TieBreak.MORE_POSES: f"measure {poses_that_tell(tie.axes, tie.rivals)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.SETUP: f"measure a run more {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",

@@ -32,6 +32,15 @@ def test_every_chart_has_its_height_before_it_is_drawn() -> None:
     assert {str(110 + 34 * count) for count in range(2, 21)} <= set(rules)  # the ranking of effects
 
 
+def test_the_buttons_of_a_chart_show_where_it_is_pointed_at_alone() -> None:
+    """Without a mouse plotly.js shows them at all times, over the legend on a telephone, over bars elsewhere."""
+    rules = dict(
+        re.findall(r"^(\.canvas[^{]*\.modebar-group) \{ opacity: (\d)", report_text("pages/pages.css"), re.M)
+    )
+    shown = ".canvas:hover .modebar-group, .canvas:focus-within .modebar-group"
+    assert rules == {".canvas .modebar-group": "0", shown: "1"}
+
+
 @pytest.mark.parametrize(
     ("value", "u", "text"),
     [

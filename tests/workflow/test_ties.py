@@ -6,20 +6,28 @@ import os
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from monitor.discovery import fit
 from monitor.discovery.machine.separation.separate import Separation
+from monitor.effects import parse_effect
 from monitor.methods import ChainMethod, campaign_method, methods
 from monitor.readers import read_campaign
 from monitor.records import SecondSetup
+from monitor.reporting.runs_that_tell import poses_that_tell
 from monitor.store import Database
 from monitor.web.words import what_breaks
 from monitor.workflow.explain.machine_answer import has_plan_of_pairs
+from monitor.workflow.explain.planned_ties import PlanOfPairs
 from monitor.workflow.explain.ties import Tie, TieBreak, ties_of
+from monitor.workflow.identify.fitting import machine_problem
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.models import as_model, resolve
+from monitor.workflow.plan.answer import SeparationVerdict
 from monitor.workflow.plan.plan import plan
 from monitor.workflow.plan.request import PlanRequest
+from monitor.workflow.plan.separate import deviations_apart, separation_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POSES = Separation(({"C": 0.5},), 0.1, 12.0, (("EXC:harmonic2", "EYC:harmonic2"),))
@@ -103,3 +111,74 @@ def test_no_method_is_told_to_type_what_is_refused(method: str, tmp_path: Path) 
                 what_breaks(tie)
                 == f"measure more poses over the whole range of {name}, between the present ones"
             )
+
+
+def test_what_moved_once_is_told_by_no_pose() -> None:
+    """Of a station and the base under the machine poses over "the whole range of " no axis were asked for."""
+    found = SimpleNamespace(effect="tracker:moved(run 1, sequence 80)", separation=NONE, within_runs=False)
+    ties = ties_of(found, ("base:moved(run 1, sequence 80)", "EXX:poly1@run_time"), is_planned=False)
+    assert [tie.broken_by for tie in ties] == [TieBreak.REFERENCES, TieBreak.REPEATED]
+    assert "targets that rest beside the machine" in what_breaks(ties[0])
+
+
+@pytest.mark.parametrize(
+    ("effects", "words"),
+    [
+        (("flexure:tool@gravity", "EBEL:poly1"), "some poses under another load"),
+        (("sight:up:formula(x)",), "more poses over the whole range of all axes, between the present ones"),
+    ],
+)
+def test_no_list_of_axes_is_empty(effects: tuple[str, ...], words: str) -> None:
+    assert poses_that_tell((), effects) == words
+
+
+def test_a_linear_axis_is_not_indexed() -> None:
+    words = what_breaks(Tie(("EZZ:poly1@warmup",), TieBreak.INDEXATIONS, ("warmup",), ("C1", "Z")))
+    assert words == "bring C1 and Z to other positions while warmup acts"
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> PlanOfPairs:
+    """The plan of the example in which C turns three times as far as B."""
+    campaign = read_campaign(EXAMPLES / "cold-cold")
+    with Database(tmp_path_factory.mktemp("ties") / "one.duckdb") as db:
+        return PlanOfPairs(fit(machine_problem(campaign, resolve(db, None, "samba"))), campaign)
+
+
+@pytest.mark.parametrize(
+    ("effect", "rival", "kind"),
+    [
+        ("EXC:harmonic2", "EXB:harmonic3", TieBreak.PLAN),
+        ("EXC1:harmonic1", "EYC1:harmonic1", TieBreak.NO_POSES),
+        ("EAZ:poly2", "EAZ:poly3", TieBreak.MORE_RUNS),
+    ],
+)
+def test_a_tie_is_broken_by_what_the_plan_says(
+    planned: PlanOfPairs, effect: str, rival: str, kind: TieBreak
+) -> None:
+    """`explain` named `plan --separate` for pairs that it tells apart already, and for those that no pose does."""
+    said = separation_of(planned.fitted, planned.campaign, (effect, rival))
+    context = planned.fitted.problem.context
+    size = parse_effect(effect, context.chain).basis(context).size
+    (tie,) = planned.of_tie(effect, np.full(size, 1e-7), Tie((rival,), TieBreak.PLAN))
+    assert tie.broken_by is kind
+    assert (
+        said.verdict
+        is {
+            TieBreak.PLAN: SeparationVerdict.WITH_POSES,
+            TieBreak.NO_POSES: SeparationVerdict.IMPOSSIBLE,
+            TieBreak.MORE_RUNS: SeparationVerdict.ALREADY,
+        }[kind]
+    )
+    assert (said.standard_deviations_apart.present > 5.0) is (kind is TieBreak.MORE_RUNS)
+
+
+def test_as_many_runs_more_are_asked_for_as_make_five_standard_deviations(planned: PlanOfPairs) -> None:
+    pair, coefficients = ("EAZ:poly2", "EAZ:poly3"), np.array([1e-9])
+    apart = deviations_apart(planned.fitted, planned.campaign, pair, coefficients)
+    coefficients *= 2.0 / apart  # two standard deviations apart: 44 * (5 / 2)² runs are 275
+    (tie,) = planned.of_tie(pair[0], coefficients, Tie(pair[1:], TieBreak.PLAN))
+    assert len(planned.fitted.problem.runs) == 44
+    assert tie.runs in (275 - 44, 276 - 44)
+    (tie,) = planned.of_tie(pair[0], coefficients / 10.0, Tie(pair[1:], TieBreak.PLAN))
+    assert (tie.broken_by, tie.runs) == (TieBreak.NO_POSES, None)

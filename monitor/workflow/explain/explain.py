@@ -40,6 +40,7 @@ from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation
 from monitor.workflow.explain.measurements import with_measurements
+from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
@@ -124,7 +125,8 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     # A search that has not the memory is refused before minutes of fitting.
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = with_measurements(machine_explanation(explanation), campaign, as_model(model))
+    answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
+    answer = with_measurements(answer, campaign, as_model(model))
     if not explanation.mistakes:
         final, ability = explanation.final, campaign_method(campaign).instruments
         beside = against_others(final.problem, final.solution, ability)

@@ -30,8 +30,16 @@ class TieBreak(Enum):
     DRIVERS = "drivers"
     #: More indexations while the driver, which both have, acts.
     INDEXATIONS = "indexations"
-    #: Poses that `monitor plan --separate` selects for one pair.
+    #: Poses that `monitor plan --separate` selects for one pair, while ``drivers`` act.
     PLAN = "plan"
+    #: So many ``runs`` more of the present plan, whose poses tell them apart.
+    MORE_RUNS = "more_runs"
+    #: No pose that the machine reaches; ``runs`` more of the present plan, where these are not too many.
+    NO_POSES = "no_poses"
+    #: Another run: what moved once within one does not move again at that reading.
+    REPEATED = "repeated"
+    #: Targets that rest beside the machine, before and after a move: of the station, or of the machine on its base.
+    REFERENCES = "references"
     #: More poses over the whole range of ``axes``, of what gives way another load: the method has no plan for pairs.
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
@@ -45,14 +53,16 @@ class TieBreak(Enum):
 @dataclass(frozen=True)
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
-    ``axes`` those to index or to move, ``measurement`` the test of an instrument. What stays the same through a run
-    shows nothing where ``drivers`` have to vary ``within_runs``; ``setup`` is the second set-up to measure in."""
+    ``axes`` those to index or to move, ``measurement`` the test of an instrument, ``runs`` those to measure besides,
+    ``setup`` the second set-up to measure in. What stays the same through a run shows nothing where ``drivers`` have to
+    vary ``within_runs``."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak
     drivers: tuple[str, ...] = field(default=(), metadata=OMITTED)
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
     within_runs: bool = field(default=False, metadata=OMITTED)
+    runs: int | None = field(default=None, metadata=OMITTED)
     measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
     setup: SecondSetup | None = field(default=None, metadata=OMITTED)
 
@@ -69,7 +79,7 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) ->
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
         if kind is TieBreak.PLAN and not is_planned:
-            kind, axes = TieBreak.MORE_POSES, _axes(effect.effect, rival)
+            kind, axes = TieBreak.MORE_POSES, axes_of(effect.effect, rival)
         actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(
         Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, setup=setup)
@@ -91,13 +101,16 @@ def is_of_instrument(text: str) -> bool:
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:
     if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
         return TieBreak.NOTHING, (), ()
+    moved = [":moved(" in text for text in (effect.effect, rival)]
+    if any(moved):
+        return (TieBreak.REFERENCES if all(moved) else TieBreak.REPEATED), (), ()
     driver, other = _driver(effect.effect), _driver(rival)
     if driver not in OF_POSES or other not in OF_POSES:
         # What one run did does not act again while others are indexed.
         if driver != other or driver == "each_run":
             columns = (_recorded(name) for name in (driver, other) if name not in OF_POSES)
             return TieBreak.DRIVERS, tuple(dict.fromkeys(columns)), ()
-        return TieBreak.INDEXATIONS, (driver,), _axes(effect.effect, rival)
+        return TieBreak.INDEXATIONS, (driver,), axes_of(effect.effect, rival)
     return (TieBreak.POSES if effect.separation.poses else TieBreak.PLAN), (), ()
 
 
@@ -114,7 +127,7 @@ def _recorded(driver: str) -> str:
     return driver.removeprefix("lagged_")
 
 
-def _axes(*effects: str) -> tuple[str, ...]:
+def axes_of(*effects: str) -> tuple[str, ...]:
     """The axes that effects name, each once."""
     return tuple(dict.fromkeys(filter(None, map(_axis, effects))))
 

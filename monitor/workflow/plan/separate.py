@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.discovery import fit
+from monitor.discovery import Fit, fit
+from monitor.discovery.machine.scene import MachineEffect
+from monitor.discovery.machine.separation.distances import DECIDES
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.effects import parse_effect
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.explain.explain_answer import DeviationsApart
@@ -26,14 +28,18 @@ def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -
     """
     with explained_refusals(campaign, model):
         fitted = fit(machine_problem(campaign, model))
+    return separation_of(fitted, campaign, texts)
+
+
+def separation_of(fitted: Fit, campaign: Campaign, texts: tuple[str, str]) -> SeparationAnswer:
+    """The poses for a model that is ``fitted`` to its campaign. Raises EffectError."""
     context = fitted.problem.context
     effect, rival = (parse_effect(text, context.chain) for text in texts)
     basis = effect.basis(context)
     displacement = fitted.moved_by(basis) @ np.ones(basis.size)
     largest = float(np.linalg.norm(displacement, axis=1).max())
     size = SEPARATED_PEAK / largest if largest > 0.0 else 1.0
-    rotary, linear = strokes_of(campaign, context.chain, context.positions)
-    poses = separating_poses(fitted, effect, np.full(basis.size, size), [rival], {**rotary, **linear})
+    poses = _separation(fitted, campaign, effect, rival, np.full(basis.size, size))
     return SeparationAnswer(
         effects=(effect.text, rival.text),
         peak_um=MICROMETRE.to_display(SEPARATED_PEAK),
@@ -50,7 +56,21 @@ def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -
     )
 
 
+def deviations_apart(fitted: Fit, campaign: Campaign, texts: tuple[str, str], coefficients: Array) -> float:
+    """How many standard deviations the present plan tells an effect of these coefficients from a rival."""
+    effect, rival = (parse_effect(text, fitted.problem.context.chain) for text in texts)
+    return _separation(fitted, campaign, effect, rival, coefficients).before
+
+
+def _separation(
+    fitted: Fit, campaign: Campaign, effect: MachineEffect, rival: MachineEffect, coefficients: Array
+) -> Separation:
+    context = fitted.problem.context
+    rotary, linear = strokes_of(campaign, context.chain, context.positions)
+    return separating_poses(fitted, effect, coefficients, [rival], {**rotary, **linear})
+
+
 def _verdict(separation: Separation) -> SeparationVerdict:
-    if separation.together:
-        return SeparationVerdict.IMPOSSIBLE
-    return SeparationVerdict.WITH_POSES if separation.poses else SeparationVerdict.ALREADY
+    if separation.poses:
+        return SeparationVerdict.WITH_POSES
+    return SeparationVerdict.ALREADY if separation.before > DECIDES else SeparationVerdict.IMPOSSIBLE

@@ -106,7 +106,7 @@ def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
     separable = [pair for pair in close if _is_separable(pair, runs)]
     alike = tuple(pair.effects for pair in close if not _is_separable(pair, runs))
     if not separable:
-        return Selection((), 0.0, 0.0, alike)
+        return _without_poses(pairs, runs, alike)
     grams = [pair.present for pair in separable]
     before = after = min(distance_of(gram, runs) for gram in grams)
     selected: list[int] = []
@@ -122,6 +122,12 @@ def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
             break
     decides = after >= DECIDES and after >= WORTHWHILE * before
     return Selection(tuple(selected) if decides else (), before, after, alike)
+
+
+def _without_poses(pairs: Sequence[Pair], runs: int, alike: tuple[tuple[int, int], ...]) -> Selection:
+    """No poses, and how far apart the closest pair is."""
+    closest = min((distance_of(pair.present, runs) for pair in pairs), default=0.0)
+    return Selection((), closest, closest, alike)
 
 
 def _is_separable(pair: Pair, runs: int) -> bool:

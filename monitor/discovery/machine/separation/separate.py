@@ -44,7 +44,8 @@ STRETCH = 1.25
 class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
-    separates; they do not count. ``setups`` are second set-ups that separate such pairs, None where none does."""
+    separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, None where none
+    does."""
 
     poses: tuple[dict[str, float], ...]
     before: float

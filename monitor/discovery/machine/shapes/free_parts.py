@@ -28,6 +28,7 @@ PRICE = float(np.log(45.0))
 
 
 def is_free(candidate: ChainCandidate) -> bool:
+    """Return whether an effect is of free shape."""
     effect = candidate.effect
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
 
