@@ -16,7 +16,7 @@ from monitor.discovery.machine.scene import (
 )
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.variants import bends_of, part_of_period, with_drivers
+from monitor.discovery.machine.shapes.variants import as_it_appears, bends_of, part_of_period, with_drivers
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
@@ -75,6 +75,7 @@ class RivalSearch:
         if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
             variants += bends_of(candidate.effect)
         variants += _of_other_errors(candidate.effect)
+        variants += as_it_appears(candidate.effect, self.scene.fit.problem.context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))
