@@ -237,7 +237,7 @@ def _more_of_its_shape(first: MissingEffect, further: Sequence[MissingEffect]) -
     if first.nearest_shape is None:
         return []
     error = first.effect.partition(":")[0] + ":"
-    return [one.effect for one in further if any(rival.startswith(error) for rival in one.others)]
+    return [effect.effect for effect in further if any(rival.startswith(error) for rival in effect.others)]
 
 
 def _missing_sentences(finding: MachineFinding) -> list[str]:
