@@ -232,6 +232,14 @@ def _unlike(unlike: RunUnlike) -> str:
     )
 
 
+def _more_of_its_shape(first: MissingEffect, further: Sequence[MissingEffect]) -> list[str]:
+    """The effects named with one of unknown shape that these data do not tell from another shape of the same error."""
+    if first.nearest_shape is None:
+        return []
+    error = first.effect.partition(":")[0] + ":"
+    return [effect.effect for effect in further if any(rival.startswith(error) for rival in effect.others)]
+
+
 def _missing_sentences(finding: MachineFinding) -> list[str]:
     if not finding.missing:
         return [
@@ -242,10 +250,12 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
             else "The model does not explain the measurements, but no other error explains more."
         ]
     first = finding.missing[0]
+    doubtful = _more_of_its_shape(first, finding.missing[1:])
+    further = [missing.effect for missing in finding.missing[1:] if missing.effect not in doubtful]
     sentences = [f"The model lacks {first.effect}: {first.meaning}."]
     if first.nearest_shape is not None:
         sentences.append(f"The catalogue does not have its shape; {first.nearest_shape} comes nearest.")
-        if len(finding.missing) > 1:
+        if further and not doubtful:
             sentences.append("The other effects hold whatever its shape is.")
     if first.varies:
         sentences.append("It varies from run to run and no recorded column follows it.")
@@ -253,8 +263,13 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         sentences.append(f"These data cannot tell it apart from {', '.join(first.others)}.")
     if finding.unseen:
         sentences.append(UNSEEN)
-    if further := [missing.effect for missing in finding.missing[1:]]:
+    if further:
         sentences.append(f"It also lacks {joined_by_and(further)}.")
+    if doubtful:
+        error = first.effect.partition(":")[0]
+        sentences.append(
+            f"These data cannot tell {joined_by_and(doubtful)} from more of the shape of {error}."
+        )
     return sentences
 
 

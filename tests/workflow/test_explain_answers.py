@@ -76,6 +76,24 @@ def test_an_effect_that_all_residuals_together_do_not_show_is_said_to_be_small(u
     assert machine_sentences(finding) == (f"{sentence} {UNSEEN}" if unseen else sentence)
 
 
+def test_what_may_be_more_of_an_unknown_shape_is_not_said_to_hold() -> None:
+    """Was: "The other effects hold whatever its shape is", of refraction beside a bump of the elevation."""
+    shaped = MissingEffect("EBEL:free(11,16)", "angular positioning error of EL", "EBEL:windup", False, ())
+    bent = MissingEffect("sight:up:formula(1/tan(elevation))", "bent up", None, False, ("EBEL:harmonic2",))
+    other = MissingEffect("EBAZ:harmonic2", "tilt of AZ", None, False, ("EBAZ:harmonic2@warmup",))
+
+    def told(*further: MissingEffect) -> str:
+        return machine_sentences(MachineFinding(False, [shaped, *further], 0, (), (), 8, (), False, ()))
+
+    assert told(other).endswith("The other effects hold whatever its shape is. It also lacks EBAZ:harmonic2.")
+    assert "hold whatever" not in told(bent, other)
+    assert told(bent, other).endswith(
+        "It also lacks EBAZ:harmonic2. "
+        "These data cannot tell sight:up:formula(1/tan(elevation)) from more of the shape of EBEL."
+    )
+    assert "hold whatever" not in told()
+
+
 @pytest.mark.parametrize("driver", ["warmup", "settling", "run_time", "sequence", "each_run"])
 @pytest.mark.parametrize("within_runs", [True, False])
 def test_nobody_is_asked_to_record_what_follows_from_the_times(driver: str, within_runs: bool) -> None:

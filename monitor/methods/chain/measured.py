@@ -125,6 +125,12 @@ class MeasuredChain(ABC):
         return ()
 
     @property
+    def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
+        """Indices of the joints that stop where a target is, and the rows (n,) at which they do: what is read of such a
+        joint holds the noise of the row."""
+        return self.measured_joints, np.ones(len(self.context), dtype=bool)
+
+    @property
     def extra_names(self) -> tuple[str, ...]:
         """Names of the e calibrated quantities that every run has besides its rows."""
         return ()

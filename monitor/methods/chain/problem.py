@@ -37,14 +37,15 @@ class ChainProblem(MeasuredChain):
     """Readings on a chain as a least-squares problem."""
 
     def foreseen(self) -> Self:
-        """The problem with ``context.expected``, for effects that look at the measured joints.
+        """The problem with ``context.expected``, for effects that look at joints which stop where a target is.
 
-        Expected is where the base effects and the own unknowns, fitted to all readings, let a measured joint stop. Of
+        Expected is where the base effects and the own unknowns, fitted to all readings, let such a joint stop. Of
         Gaussian noise the fitted values are independent of what the fit leaves, so no function of them explains it
         better than chance (J. B. Ramsey, J. R. Stat. Soc. B 31 (1969) 350, tests models so). At the readings
         themselves sin(2 pi x / 10 mm) at points 10 mm apart is the noise in another unit.
         """
-        if self.context.expected is not None or not self.measured_joints:
+        joints, rows = self.stopping
+        if self.context.expected is not None or not joints or not rows.any():
             return self
         bare = replace(self, added=())
         return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
@@ -285,15 +286,17 @@ class ChainProblem(MeasuredChain):
 
 
 def stops(problem: ChainProblem, solution: Solution) -> Array:
-    """Where the measured joints stop (n, J) under a solution: the readings less the shortest move that would do away
-    with a row's residual."""
-    chain, measured = problem.context.chain, list(problem.measured_joints)
+    """Where the joints that are stopping do so (n, J) under a solution: the readings less the shortest move that would
+    do away with a row's residual."""
+    chain, (joints, rows) = problem.context.chain, problem.stopping
+    measured = list(joints)
     pose = problem.evaluated(solution.local, solution.common, jacobian=True)
     assert pose.by_error is not None
     along = np.array([chain.joints[index].direction for index in measured])
     moved = problem.observe(np.einsum("nrac,ac->nra", pose.by_error[:, :, measured, MOTION, :3], along))
     positions = problem.context.positions.copy()
-    positions[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(pose.residual))
+    shift = np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(pose.residual))
+    positions[:, measured] -= np.where(rows[:, None], shift, 0.0)
     return positions
 
 

@@ -16,7 +16,7 @@ have one.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -155,3 +155,18 @@ class Part:
                 by_point = by_point + shown.by_mean @ mean_of_runs(stance.turned, self.rows.run)
             by_own = np.concatenate([by_own, by_point], axis=2)
         return replace(shown, by_own=by_own)
+
+
+def own_columns_of(parts: Sequence[Part]) -> tuple[npt.NDArray[np.int64], ...]:
+    """Return where the unknowns of each part (q,) stand among a run's own; what parts share stands there once."""
+    column_of: dict[Hashable, int] = {}
+    return tuple(
+        np.array(
+            [
+                column_of.setdefault((name, part.shared(name, index)), len(column_of))
+                for name in part.unknowns
+            ],
+            dtype=np.int64,
+        )
+        for index, part in enumerate(parts)
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -20,10 +20,11 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
 from monitor.methods.instruments.first_guess import first_guess, stance_at
-from monitor.methods.instruments.part import Part
+from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
+from monitor.methods.instruments.touched_points import brought_to_points
 from monitor.records import Array, Setup
 from monitor.sources import CommonQuantity
 
@@ -80,17 +81,7 @@ class InstrumentProblem(ChainProblem):
     @cached_property
     def own_columns(self) -> tuple[npt.NDArray[np.int64], ...]:
         """Where the unknowns of each setup stand among a run's own; what setups share stands there once."""
-        column_of: dict[Hashable, int] = {}
-        return tuple(
-            np.array(
-                [
-                    column_of.setdefault((name, part.shared(name, index)), len(column_of))
-                    for name in part.unknowns
-                ],
-                dtype=np.int64,
-            )
-            for index, part in enumerate(self.parts)
-        )
+        return own_columns_of(self.parts)
 
     @cached_property
     def own_start(self) -> Array:
@@ -178,6 +169,11 @@ class InstrumentProblem(ChainProblem):
     def observes_numbers(self) -> bool:
         """A number may be the length of a vector, or a turn."""
         return True
+
+    @property
+    def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
+        """The linear axes, at the balls of plates."""
+        return brought_to_points(self.context, self.parts)
 
     def can_show(self, effect: Effect) -> bool:
         """Nothing of targets that are touched or tracked; angles alone show no displacement."""

@@ -16,6 +16,7 @@ from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import FlexibleErrors, error_of
 from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.shown_cycles import is_cycle, is_shown
 from monitor.discovery.machine.shapes.variants import with_drivers
 from monitor.discovery.machine.suspects.wander import is_drift_of_machine, tracker_wander
 from monitor.discovery.search.acceptance import Acceptance
@@ -237,12 +238,17 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect beside others is no larger than a machine could have, and not many times as large as what
-        it takes of the residual: such a one is nearly cancelled by others."""
+        it takes of the residual: such a one is nearly cancelled by others. A cycle is asked at its best pitch, where
+        it may pass through zero at all positions."""
+        if is_cycle(candidate):
+            candidate = self.at_best_value([*others, candidate], len(others))
         size = candidate.columns.shape[1]
         fitted = amplitudes(self.scene, [*others, candidate])
         peak = float(np.linalg.norm(candidate.raw @ fitted.estimate[-size:], axis=1).max())
         removed = self.scene.fit.sigma**2 * self._explained(others, candidate)
         if nearly_cancelled(peak, removed, self.scene.fit.readings):
+            return False
+        if is_cycle(candidate) and not is_shown(candidate, fitted.estimate[-size:], removed):
             return False
         sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
@@ -287,6 +288,21 @@ def without_aliases(
     ]
 
 
+def as_it_appears(effect: MachineEffect, context: Context) -> list[ChainVariant]:
+    """The cycle of the longer pitch for which positions on a grid take one below twice their step; none elsewhere."""
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Cyclic):
+        return []
+    shortest, travel = _pitch_limits(context)[effect.joint.name]
+    if not effect.shape.pitch < shortest < float("inf"):
+        return []
+    apparent = _apparent(1.0 / effect.shape.pitch, 2.0 / shortest)
+    if apparent * travel < FEWEST_PERIODS:
+        return []
+    text = f"cyclic{1.0 / apparent:.6g}mm"
+    longer = replace(effect, shape=parse_shape(text), shape_text=text)
+    return [Variant(longer.text, longer)]
+
+
 def that_moves_first(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
     """The variants, with the heat of linear axes that never moved less likely beforehand."""
     still = np.ptp(context.positions, axis=0) < GRID_TOLERANCE_MM
@@ -306,9 +322,12 @@ def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     on a grid."""
     if not 0.0 < shortest < float("inf"):
         return shortest == 0.0 and pitch <= travel
-    frequency, steps = 1.0 / pitch, 2.0 / shortest
-    apparent = abs(frequency - steps * np.round(frequency / steps))
-    return bool(apparent * travel >= FEWEST_PERIODS)
+    return _apparent(1.0 / pitch, 2.0 / shortest) * travel >= FEWEST_PERIODS
+
+
+def _apparent(frequency: float, steps: float) -> float:
+    """The frequency in 1/mm that a wave has at positions of which so many ``steps`` are in a mm."""
+    return float(abs(frequency - steps * np.round(frequency / steps)))
 
 
 def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
@@ -321,11 +340,34 @@ def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, floa
 
 def _pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
     """The shortest and the longest pitch in mm that the positions of every linear axis can show."""
+    series = _series(context)
     return {
-        joint.name: (_shortest_pitch(context.positions[:, index]), float(np.ptp(context.positions[:, index])))
+        joint.name: (
+            _shortest_of(context.positions[:, index], series),
+            float(np.ptp(context.positions[:, index])),
+        )
         for index, joint in enumerate(context.chain.joints)
         if joint.kind == "linear"
     }
+
+
+def _series(context: Context) -> list[npt.NDArray[np.int64]]:
+    """The rows of each setup of each run: a plate that is laid anew is the same grid elsewhere."""
+    setup = np.zeros(len(context), dtype=np.int64)
+    if context.instruments is not None:
+        setup = context.instruments.setup
+    _, of = np.unique(np.stack([context.run, setup]), axis=1, return_inverse=True)
+    return [np.flatnonzero(of.reshape(-1) == number) for number in range(of.max(initial=-1) + 1)]
+
+
+def _shortest_of(positions: Array, series: Sequence[npt.NDArray[np.int64]]) -> float:
+    """The shortest pitch in mm that any of the series shows; all positions together where each has too few.
+
+    What is free in every series takes up the place of its grid: of several that lie elsewhere none shows what repeats
+    at all of its own positions.
+    """
+    shortest = min((_shortest_pitch(positions[rows]) for rows in series), default=float("inf"))
+    return shortest if shortest < float("inf") else _shortest_pitch(positions)
 
 
 def _shortest_pitch(positions: Array) -> float:
@@ -339,9 +381,10 @@ def _shortest_pitch(positions: Array) -> float:
     if len(stops) < FEWEST_POSITIONS:
         return float("inf")
     steps = np.diff([float(stop.mean()) for stop in stops])
-    step = float(steps.min())
-    multiples = steps / step
-    return 2.0 * step if np.all(np.abs(multiples - np.round(multiples)) < 0.02) else 0.0
+    multiples = steps / steps.min()
+    if np.any(np.abs(multiples - np.round(multiples)) >= 0.02):
+        return 0.0
+    return 2.0 * float(np.sum(steps) / np.sum(np.round(multiples)))
 
 
 def that_lag(effects: Iterable[MachineEffect], context: Context) -> list[ChainVariant]:
