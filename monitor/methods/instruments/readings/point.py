@@ -24,9 +24,11 @@ from monitor.records import Array, Setup
 from monitor.sources import SCALE
 
 # A third number that is the same in all rows says that a plate is flat where the axes measured its points: those lie in
-# a plane nearly, and off it by more than so many stated standard uncertainties. Nearer than that the axes may lie where
-# they were told to go, off it by what their scales jitter, and nobody may have touched in that direction.
-MEASURED = 2.0
+# a plane nearly, and off it by more than so many mm. Nearer than that axes lie where they are told to go.
+PROGRAMMED = 5e-5
+# Where x and y are measured and not stated, nobody may have touched across the plane, and scales jitter: the axes lie
+# off it by more than so many stated standard uncertainties there.
+JITTER = 2.0
 
 
 @dataclass(frozen=True)
@@ -144,11 +146,10 @@ def _without_constant(rows: Rows, setup: Setup) -> Array:
 
 
 def _is_flat(rows: Rows, setup: Setup) -> bool:
-    """Whether in some run the axes found the points in a plane nearly, and off it by more than the jitter of axes that
-    stand still; never where the rows state uncertainties of their own."""
-    u = setup.standard_uncertainty
-    if u is None:
-        return False
+    """Whether in some run the axes found the points in a plane as nearly as they measure, and not exactly."""
+    nearest = PROGRAMMED
+    if not _are_stated(rows, setup):
+        nearest = float("inf") if setup.standard_uncertainty is None else JITTER * setup.standard_uncertainty
     count = len(rows)
     none = np.zeros((count, len(rows.chain.joints), 2, 6))
     targets = np.unique(rows.target)
@@ -157,9 +158,15 @@ def _is_flat(rows: Rows, setup: Setup) -> bool:
     for run in np.unique(rows.run):
         arms = points[rows.run == run]
         spread = np.linalg.svd(arms - arms.mean(axis=0), compute_uv=False) / np.sqrt(len(arms))
-        if len(spread) == 3 and MEASURED * u < spread[2] < FLAT * spread[1]:
+        if len(spread) == 3 and nearest < spread[2] < FLAT * spread[1]:
             return True
     return False
+
+
+def _are_stated(rows: Rows, setup: Setup) -> bool:
+    """Whether the points are places of a plate to which the axes were brought: they recur to the last digit, or the tip
+    that is brought to them is known."""
+    return "targets" in setup.known or len(np.unique(rows.measured[:, :2], axis=0)) < len(rows)
 
 
 def _stated_places(setup: Setup, rows: Rows, targets: Sequence[str] | npt.NDArray[np.str_]) -> Array:
