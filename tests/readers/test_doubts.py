@@ -142,6 +142,13 @@ def test_an_axis_that_turned_to_and_fro_over_a_turn_did_not_begin_anew(altered: 
     assert of(altered("mount-gem-28", {"ha_deg": lambda angle: 2.0 * angle - 180.0})) == ()
 
 
+def test_two_passes_over_a_whole_turn_are_no_angles_that_begin_anew(altered: Callable[..., Path]) -> None:
+    """360, and 0 for the next pass: the table turned back."""
+    quarters = iter([0.0, 90.0, 180.0, 270.0, 360.0] * 1000)
+    told = of(altered("mount-gem-28", {"ha_deg": lambda _: next(quarters)}))
+    assert not any("goes from" in sentence for sentence in told)
+
+
 def test_a_tracker_in_metres(altered: Callable[..., Path]) -> None:
     (told,) = of(altered("tracked-robot", dict.fromkeys([f"tracker_{k}_mm" for k in "xyz"], metres)))
     assert "tracker_x_mm, tracker_y_mm and tracker_z_mm span" in told

@@ -18,6 +18,8 @@ INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
 SHORTER_BY = 45.0
 #: Degrees within which the angles of a column that begins anew come near both of its ends.
 NEAR_END = 30.0
+#: Degrees within which two angles are one.
+SAME_PLACE = 1e-3
 
 
 def radians(campaign: Campaign) -> Iterator[str]:
@@ -59,6 +61,8 @@ def angles_begun_anew(campaign: Campaign) -> Iterator[str]:
         end = 180.0 if least < 0.0 else 360.0
         if not (end - NEAR_END < largest <= end and end - 360.0 <= least < end - 360.0 + NEAR_END):
             continue
+        if largest - least > 360.0 - SAME_PLACE:
+            continue  # Indexed over a whole turn, and turned back for the next pass.
         widest = int(np.argmax(np.diff(around)))
         turned = 360.0 - float(np.diff(around)[widest])
         if largest - least - turned < SHORTER_BY:

@@ -36,6 +36,8 @@ def zero_rows(campaign: Campaign) -> Iterator[str]:
         if setup.reading not in TARGETS:
             continue
         columns, at_zero, same, target_word = TARGETS[setup.reading]
+        if not set(columns) <= channels.keys():
+            continue  # A plate of which x and y are known.
         mine = np.flatnonzero(channels["setup"] == index + 1)
         targets = np.column_stack([channels[name][mine] for name in columns])
         poses = np.column_stack([values[mine] for values in probings.readings.values()])
