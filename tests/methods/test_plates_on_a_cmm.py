@@ -11,7 +11,7 @@ import pytest
 
 from monitor.methods import campaign_method
 from monitor.methods.method import ChainMethod
-from monitor.readers import read_campaign
+from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
 
 AXIS = '[[machine.tool_chain]]\nname = "{0}"\nkind = "linear"\nalong = "{0}"\n'
@@ -142,3 +142,16 @@ def test_a_height_that_was_written_beside_measured_points_is_none_though_z_jitte
         lines[number] = ",".join(cells)
     table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
     assert unknowns_of(folder) == 6  # One turn, two shifts, and the place of the tip.
+
+
+def test_a_ball_at_the_origin_of_its_plate_is_no_row_of_zeros(tmp_path: Path) -> None:
+    """Was: "zeros that a program writes where it got no reading", where a plate had been turned on the table."""
+    folder = campaign_of(tmp_path, [LYING], 1, "0.00000")
+    table = folder / "probings.csv"
+    head, first, *lines = table.read_text(encoding="utf-8").splitlines()
+    cells = [*first.split(",")[:7], "0.00000", "0.00000", "0.00000"]
+    elsewhere = [*cells[:1], "100", *cells[2:4], "400.0", *cells[5:]]
+    table.write_text("\n".join([head, ",".join(cells), *lines, ",".join(elsewhere)]) + "\n", encoding="utf-8")
+    campaign = read_campaign(folder)
+    assert isinstance(campaign, Campaign)
+    assert not any("zeros" in doubt for doubt in doubts(campaign))

@@ -36,11 +36,19 @@ def zero_rows(campaign: Campaign) -> Iterator[str]:
         if setup.reading not in TARGETS:
             continue
         columns, at_zero, same, target_word = TARGETS[setup.reading]
-        if not set(columns) <= channels.keys():
-            continue  # A plate of which x and y are known.
+        if "targets" in setup.known or not set(columns) <= channels.keys():
+            continue  # Balls of a plate stand where its certificate says, one of them at its origin.
         mine = np.flatnonzero(channels["setup"] == index + 1)
         targets = np.column_stack([channels[name][mine] for name in columns])
-        poses = np.column_stack([values[mine] for values in probings.readings.values()])
+        # Millimetres of linear axes count as radians do, each in its own tolerance.
+        unit = {
+            axis: SAME_DIRECTION / SAME_POINT
+            for axis in probings.readings
+            if campaign.machine.is_linear(axis)
+        }
+        poses = np.column_stack(
+            [unit.get(axis, 1.0) * values[mine] for axis, values in probings.readings.items()]
+        )
         # Of one pose every run sees each point of the tool elsewhere.
         names = probings.target[mine] if setup.reading != "direction" else np.full(len(mine), "")
         series = np.array([f"{run} {name}" for run, name in zip(probings.run[mine], names, strict=True)])
