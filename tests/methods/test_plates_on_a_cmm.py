@@ -150,7 +150,7 @@ def test_a_ball_at_the_origin_of_its_plate_is_no_row_of_zeros(tmp_path: Path) ->
     table = folder / "probings.csv"
     head, first, *lines = table.read_text(encoding="utf-8").splitlines()
     cells = [*first.split(",")[:7], "0.00000", "0.00000", "0.00000"]
-    elsewhere = [*cells[:1], "100", *cells[2:4], "400.0", *cells[5:]]
+    elsewhere = [cells[0], "100", "9999.0", cells[3], "400.0", *cells[5:]]
     table.write_text("\n".join([head, ",".join(cells), *lines, ",".join(elsewhere)]) + "\n", encoding="utf-8")
     campaign = read_campaign(folder)
     assert isinstance(campaign, Campaign)
