@@ -21,6 +21,12 @@ def test_slope_and_scatter_by_hand():
     assert not found.common
 
 
+def test_a_covariance_that_is_not_stated_is_refused():
+    """Was: a drift of every parameter, with an unknown u and p = 0."""
+    with pytest.raises(DataError, match="the stated covariance must be finite, of 2 parameters"):
+        run_drift(np.zeros((4, 2)), HOURS, [[1.0, np.nan], [np.nan, 1.0]])
+
+
 def test_false_alarms_keep_their_rate():
     root = np.linalg.cholesky(COVARIANCE)
     rng = np.random.default_rng(1)

@@ -25,6 +25,8 @@ def session_drift(campaign: Campaign, identification: StoredIdentification, runs
     units = [unit for unit, finite in zip(identification.units, complete, strict=True) if finite]
     factors = np.array([unit.factor for unit in units])
     stated = np.mean([by_run[run].covariance[np.ix_(complete, complete)] for run in runs], axis=0)
+    # What an added effect varies together with the others is not stated.
+    stated = np.nan_to_num(stated)
     days = np.array([started[run][1] for run in runs])
     hours = np.array([started[run][0] for run in runs])
     try:
