@@ -65,7 +65,11 @@ def run_drift(
     n, k = y.shape
     t = as_vector(hours, "hours", length=n)
     covariance = np.asarray(stated, dtype=np.float64)
-    if covariance.shape != (k, k) or not np.isfinite(covariance).all() or not np.all(np.diag(covariance) > 0.0):
+    if (
+        covariance.shape != (k, k)
+        or not np.isfinite(covariance).all()
+        or not np.all(np.diag(covariance) > 0.0)
+    ):
         raise DataError(f"the stated covariance must be finite, of {k} parameters, with variances above zero")
     index = np.zeros(n, dtype=np.intp) if days is None else label_groups(days, n)[1]
     count = int(index.max()) + 1

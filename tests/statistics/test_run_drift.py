@@ -64,7 +64,7 @@ def test_scatter_that_is_not_common_is_not_pooled():
     [
         (np.zeros((2, 1)), [0.0, 1.0], [[1.0]], "2 runs of 1 day"),
         (np.zeros((3, 1)), [1.0, 1.0, 1.0], [[1.0]], "began at the same time"),
-        (np.zeros((3, 2)), [0.0, 1.0, 2.0], [[1.0]], "must be that of 2 parameters"),
+        (np.zeros((3, 2)), [0.0, 1.0, 2.0], [[1.0]], "must be finite, of 2 parameters"),
         ([[np.nan], [0.0], [0.0]], [0.0, 1.0, 2.0], [[1.0]], "finite matrix"),
     ],
 )
