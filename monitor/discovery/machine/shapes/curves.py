@@ -49,8 +49,8 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
 
 
 def beyond_base(context: Context, effect: ChainEffect) -> Array:
-    """The columns (n, k) of a shape without what the base has already, which is no part of the shape: a constant, and of
-    what a linear axis is displaced by a slope (its gain, its squareness)."""
+    """The columns (n, k) of a shape without what the base has already, which is no part of the shape: a constant, and
+    a slope where a linear axis shifts something (its gain, a squareness)."""
     columns, at = (
         effect.shape.columns(context, effect.term.joint),
         context.places[:, effect.term.joint],
