@@ -160,6 +160,7 @@ def test_explain_names_what_could_not_be_fitted_and_blames_no_file(virtual_campa
     assert all(found.effect != "EXX:reversal" for found in answer.missing)
 
 
+@pytest.mark.slow
 def test_a_warm_up_of_two_time_constants_is_told_although_few_runs_show_it(
     virtual_campaigns, trial, explained
 ):
@@ -171,6 +172,7 @@ def test_a_warm_up_of_two_time_constants_is_told_although_few_runs_show_it(
     assert found.effect.partition(":")[0] in right
 
 
+@pytest.mark.slow
 def test_a_bump_that_another_error_mimics_in_part_is_the_error_of_its_axis(
     virtual_campaigns, trial, explained
 ):
@@ -200,6 +202,7 @@ def test_a_slight_step_or_bump_is_the_error_of_its_axis(virtual_campaigns, trial
     assert found.effect.partition(":")[0] in right
 
 
+@pytest.mark.slow
 def test_a_slight_wave_of_eight_periods_is_named_as_that(virtual_campaigns, trial, explained):
     # 5.3 standard deviations of both coefficients together; neither alone stands among 1 700 parts.
     _, effect, curve = trial.FAMILIES["eighth harmonic of C"]
@@ -231,6 +234,7 @@ def test_later_parts_of_a_free_shape_stand_behind_the_earlier_ones(virtual_campa
             assert np.all(steps[position < left, number] < -0.9)
 
 
+@pytest.mark.slow
 def test_a_part_that_follows_a_temperature_late_has_its_time_constant(virtual_campaigns, trial, explained):
     _, effect, curve = trial.FAMILIES["lag behind a temperature"]
     hidden = simulator().Effect(effect, peak_um=8.0, curve=curve)

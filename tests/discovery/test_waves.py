@@ -17,6 +17,7 @@ from monitor.effects import parse_effect
 from monitor.methods.samba.method import problem_of
 
 
+@pytest.mark.slow
 def test_a_fifth_wave_is_told_as_one_with_its_size(virtual_campaigns, explained):
     """It was `ECC:free(9,10)`: cosine and sine of five periods a turn."""
     sim = simulator()
