@@ -19,6 +19,11 @@ from monitor.records import Array
 HATS = 12
 # Harmonics of a rotary axis: a bearing, a gear and a scale of a table err up to some eight times a turn.
 HARMONICS = 8
+# Hats over the part of a turn that an axis visits: they follow what harmonics to the eighth do not, where they lie
+# closer than half a wave of the last of these and positions are four times as many.
+HATS_OF_A_PART, POSITIONS_A_HAT = 8, 4
+# Angles closer than this, in rad, are the same.
+SAME_ANGLE = 1e-4
 # Play takes this part of the travel to build up.
 BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
 # A drive that is wound up gives way over this part of the travel before it follows; shorter moves leave it in between.
@@ -35,8 +40,9 @@ class Free(DescribedShape):
     building up with the way since the last reversal), the position times that of every other axis, and steps in the
     middle between two hats. Rotary axes: harmonics to the eighth, the direction (alone and times cosine and sine),
     cosine and sine times the other axes. Behind all others, since stored names keep their numbers: the play of three
-    widths, and what the axis does until it first moves in a run, when nobody knows from which side it came. Every part
-    is scaled to 1 at most.
+    widths, what the axis does until it first moves in a run, when nobody knows from which side it came, and hats over
+    the part of a turn that a rotary axis visits, where it is some 150 degrees at most. Every part is scaled to 1 at
+    most.
     """
 
     parts: tuple[int, ...] = ()
@@ -93,8 +99,7 @@ def _unscaled(context: Context, joint: int) -> Array:
         parts = [wave(order * position) for order in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
         simple = [np.cos(position), np.sin(position), scaled]
     else:
-        nodes = np.linspace(-1.0, 1.0, HATS)
-        parts = [np.interp(scaled, nodes, hat) for hat in np.eye(HATS)]
+        parts = _hats(scaled, HATS)
         simple = [scaled, scaled**2]
     parts += [direction, *(direction * part for part in simple)]
     way = way_since_reversal(context, joint) / (2.0 * half)
@@ -104,7 +109,22 @@ def _unscaled(context: Context, joint: int) -> Array:
         parts += _steps(scaled)
     parts += [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
     parts.append((direction == 0.0).astype(np.float64))
+    if context.chain.joints[joint].turns and _is_part_of_turn(visited):
+        parts += _hats(scaled, HATS_OF_A_PART)
     return np.column_stack(parts)
+
+
+def _hats(scaled: Array, count: int) -> list[Array]:
+    """Hats (n,) over positions from -1 to 1, the first and the last half ones."""
+    nodes = np.linspace(-1.0, 1.0, count)
+    return [np.interp(scaled, nodes, hat) for hat in np.eye(count)]
+
+
+def _is_part_of_turn(visited: Array) -> bool:
+    """Whether hats over the angles that an axis visits are finer than its harmonics, and positions enough for them."""
+    if not 0.0 < np.ptp(visited) < (HATS_OF_A_PART - 1) * np.pi / HARMONICS:
+        return False
+    return len(np.unique(np.round(visited / SAME_ANGLE))) >= POSITIONS_A_HAT * HATS_OF_A_PART
 
 
 def _steps(scaled: Array) -> list[Array]:

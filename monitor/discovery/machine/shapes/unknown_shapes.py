@@ -26,6 +26,12 @@ from monitor.discovery.machine.shapes.free_parts import (
     priced,
     whole_basis,
 )
+from monitor.discovery.machine.shapes.inside_shapes import (
+    LEVEL,
+    bending_sight,
+    standing_beside,
+    with_those_outside,
+)
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -52,10 +58,6 @@ from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
 
-# The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
-LEVEL = 1e-3
-# What bends the line of sight of every telescope.
-BENDING_SIGHT = ("flexure:tool@gravity", "sight:up:formula(1/tan(elevation))")
 # So many times the stated noise is an error that is missing, not a statement that is wrong.
 FAR = 1.5
 
@@ -100,7 +102,18 @@ def _in_any_shapes(
         new = [each for each in instead if not _is_among(each, [*selected, *scene.candidates])]
         selected = instead
         scene = replace(scene, candidates=(*scene.candidates, *new))
-    return _with_waves(scene, selected)
+    return _with_waves(*_with_those_outside(scene, selected))
+
+
+def _with_those_outside(
+    scene: ChainScene, selected: list[ChainCandidate]
+) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects without those inside a free shape, and the scene with the shapes that came of it."""
+    without = with_those_outside(scene, selected)
+    for shape in without:
+        if is_free(shape) and not _is_among(shape, scene.candidates):
+            scene = _with_candidate(scene, shape)
+    return scene, without
 
 
 def _rather_waves(
@@ -170,8 +183,10 @@ def _margin(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float | No
         return UNDECIDED
     if any(is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         return WORTH_EXCHANGING
-    # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing.
-    if scene.fit.problem.needs_whole_periods and not _far_from_noise(scene, selected):
+    # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing and no other run says
+    # what is a shape and what one night.
+    problem = scene.fit.problem
+    if problem.needs_whole_periods and len(problem.runs) == 1 and not _far_from_noise(scene, selected):
         return None
     return UNDECIDED
 
@@ -301,7 +316,7 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
         symbol: (shapes, whole_basis(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
     }
     best: list[ChainCandidate] = []
-    worth = max(priced(scene, selected), priced(scene, _bending_sight(scene))) + margin
+    worth = max(priced(scene, selected), priced(scene, bending_sight(scene))) + margin
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
         teeth = teeth_of(scene, shapes[0])
@@ -314,18 +329,11 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 of_others = [each for each in gone if error_of(each) != symbol]
                 # One goes in any case: where teeth take the place of their error's other shapes, these do.
                 may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
-                together = [*leading, *new, *_standing_beside(scene, beside, may_stay)]
+                together = [*leading, *new, *standing_beside(scene, beside, may_stay)]
                 score = priced(scene, together)
                 if score > worth:
                     best, worth = together, score
     return best
-
-
-def _bending_sight(scene: ChainScene) -> list[ChainCandidate]:
-    """Flexure and refraction, which together bend the line of sight as a free shape may; none where nothing points."""
-    if scene.fit.problem.context.sight is None:
-        return []
-    return [each for each in scene.candidates if each.visible and each.family in BENDING_SIGHT]
 
 
 def _of_error(
@@ -346,18 +354,6 @@ def _of_error(
     able = foretells_poses(scene, [free], leading)
     bends = bends_instead(scene, symbol, priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]
-
-
-def _standing_beside(
-    scene: ChainScene, others: Sequence[ChainCandidate], effects: Sequence[ChainCandidate]
-) -> list[ChainCandidate]:
-    """Those of some effects that stand out beside others."""
-    standing: list[ChainCandidate] = []
-    for effect in effects:
-        (evidence,) = weigh_beside(scene, [effect], [*others, *standing])
-        if evidence.p_value * family_count(scene) < LEVEL:
-            standing.append(effect)
-    return standing
 
 
 def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
