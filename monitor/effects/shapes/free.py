@@ -19,8 +19,9 @@ from monitor.records import Array
 HATS = 12
 # Harmonics of a rotary axis: a bearing, a gear and a scale of a table err up to some eight times a turn.
 HARMONICS = 8
-# Hats over the part of a turn that an axis visits: they follow what harmonics to the eighth do not, where they lie
-# closer than half a wave of the last of these and positions are four times as many.
+# Hats over the part of a turn that an axis of a mount visits: they follow what harmonics to the eighth do not, where
+# they lie closer than half a wave of the last of these and positions are four times as many. Eight say most of a bump
+# of 0.12 rad over 70 degrees (12 and 16 were tried). Turning axes of other machines were not tried.
 HATS_OF_A_PART, POSITIONS_A_HAT = 8, 4
 # Angles closer than this, in rad, are the same.
 SAME_ANGLE = 1e-4
@@ -41,8 +42,7 @@ class Free(DescribedShape):
     middle between two hats. Rotary axes: harmonics to the eighth, the direction (alone and times cosine and sine),
     cosine and sine times the other axes. Behind all others, since stored names keep their numbers: the play of three
     widths, what the axis does until it first moves in a run, when nobody knows from which side it came, and hats over
-    the part of a turn that a rotary axis visits, where it is some 150 degrees at most. Every part is scaled to 1 at
-    most.
+    the part of a turn, some 150 degrees at most, that an axis of a mount visits. Every part is scaled to 1 at most.
     """
 
     parts: tuple[int, ...] = ()
@@ -109,7 +109,7 @@ def _unscaled(context: Context, joint: int) -> Array:
         parts += _steps(scaled)
     parts += [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
     parts.append((direction == 0.0).astype(np.float64))
-    if context.chain.joints[joint].turns and _is_part_of_turn(visited):
+    if context.sight is not None and context.chain.joints[joint].turns and _is_part_of_turn(visited):
         parts += _hats(scaled, HATS_OF_A_PART)
     return np.column_stack(parts)
 

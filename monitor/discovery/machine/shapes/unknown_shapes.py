@@ -183,8 +183,8 @@ def _margin(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float | No
         return UNDECIDED
     if any(is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         return WORTH_EXCHANGING
-    # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing and no other run says
-    # what is a shape and what one night.
+    # Over a part of a turn flexure and refraction bend as any shape does, where they leave nothing; of a single night
+    # no other says what is a shape.
     problem = scene.fit.problem
     if problem.needs_whole_periods and len(problem.runs) == 1 and not _far_from_noise(scene, selected):
         return None
