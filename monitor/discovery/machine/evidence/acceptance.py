@@ -4,7 +4,7 @@ scatters from run to run, and by the error on runs that took no part in its fit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,8 @@ from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_
 from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import FlexibleErrors, error_of
+from monitor.discovery.machine.shapes.free_parts import is_free
+from monitor.discovery.machine.shapes.inside_shapes import bending_sight, standing_beside
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle, is_shown
 from monitor.discovery.machine.shapes.variants import with_drivers
@@ -179,7 +181,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
         """For each selected effect the families that stand out beside all selected ones, but not beside its error in
-        any shape."""
+        any shape; for one of free shape what bends every line of sight, too, if it stands out in its place alone."""
         pool = pool_of(self.scene)
         families = {candidate.family for candidate in selected}
         within: list[list[str]] = [[] for _ in selected]
@@ -194,7 +196,19 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 ):
                     within[index].append(candidate.family)
                     break
-        return [tuple(names[:MOST_NAMED]) for names in within]
+        for index, named in enumerate(selected):
+            if is_free(named):
+                within[index] += self._bends_within(except_for(selected, index), named, families)
+        return [tuple(dict.fromkeys(names))[:MOST_NAMED] for names in within]
+
+    def _bends_within(
+        self, others: Sequence[ChainCandidate], named: ChainCandidate, families: Collection[str]
+    ) -> list[str]:
+        """Flexure and refraction that stand out in place of a free shape, but not beside its error in any shape."""
+        competitors = self._flexible.competitors([named])
+        bends = [bend for bend in bending_sight(self.scene) if bend.family not in families]
+        standing = [bend for bend in bends if standing_beside(self.scene, others, [bend])]
+        return [bend.family for bend in standing if not self._survives(others, bend, competitors)]
 
     def _survives(
         self,
