@@ -76,7 +76,7 @@ def _is_of_shape(candidate: ChainCandidate) -> bool:
 def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScene, ChainScan]:
     """The result with one effect of free shape instead of those of the catalogue, for every error whose shape they are
     not."""
-    selected = result.candidates
+    selected = result.candidates or _both_bends(scene)
     if selected or _lacks_something(scene) or _is_lost_sight(scene):
         scene, selected = _in_any_shapes(scene, selected)
     if not selected:
@@ -214,6 +214,16 @@ def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chain
 def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
     """Whether a candidate is the same object as one of the others: their columns are arrays, which do not compare."""
     return any(candidate is other for other in others)
+
+
+def _both_bends(scene: ChainScene) -> list[ChainCandidate]:
+    """Flexure and refraction where a sight is lost that both bend: one of them takes back most of what the other does,
+    and neither stands alone."""
+    bends = bending_sight(scene) if _is_lost_sight(scene) else []
+    both = len(bends) > 1 and all(
+        standing_beside(scene, [other], [bend]) for bend, other in zip(bends, bends[::-1], strict=True)
+    )
+    return bends if both and foretells_poses(scene, bends, []) else []
 
 
 def _lacks_something(scene: ChainScene) -> bool:
