@@ -68,23 +68,26 @@ def _beside_shape(
     symbol = error_of(free)
     whole = whole_basis(scene, symbol, free)
     of_error = [each for each in others if error_of(each) == symbol]
-    kept = [*of_error, *standing_beside(scene, [whole, *of_error], _of_other_errors(others, symbol))]
-    names = {each.family for each in kept}
+    named = [*of_error, *standing_beside(scene, [whole, *of_error], _of_other_errors(others, symbol))]
+    names = {each.family for each in named}
     inside = {each.family: each for each in [*others, *bending_sight(scene)] if each.family not in names}
-    if not inside:
+    shape = _shape(scene, free, whole, named) if inside else None
+    if shape is None:
         return [*others, free]
-    shape = _shape(scene, free, whole, kept)
     while shape is not None and inside:
-        explained = {name: weigh_beside(scene, [each], kept)[0].explained for name, each in inside.items()}
+        explained = {name: weigh_beside(scene, [each], named)[0].explained for name, each in inside.items()}
         largest = max(explained, key=explained.__getitem__)
-        beside = [*kept, inside.pop(largest)]
-        part_of = weigh_beside(scene, [shape], kept)[0].explained
+        beside = [*named, inside.pop(largest)]
+        part_of = weigh_beside(scene, [shape], named)[0].explained
         further = _shape(scene, free, whole, beside)
-        gain = priced(scene, _with(beside, further)) - priced(scene, _with(kept, shape))
+        gain = priced(scene, _with(beside, further)) - priced(scene, _with(named, shape))
         if explained[largest] < MOST_OF_SHAPE * part_of or gain < -UNDECIDED:
             break
-        kept, shape = beside, further
-    return _with(kept, shape)
+        named, shape = beside, further
+    if shape is None:
+        # Of what was selected no shape is left to hide it.
+        named += standing_beside(scene, named, [each for each in others if each.family in inside])
+    return _with(named, shape)
 
 
 def _of_other_errors(effects: Sequence[ChainCandidate], symbol: str) -> list[ChainCandidate]:
