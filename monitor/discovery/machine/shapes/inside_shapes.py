@@ -54,9 +54,11 @@ def standing_beside(
 
 
 def with_those_outside(scene: ChainScene, selected: list[ChainCandidate]) -> list[ChainCandidate]:
-    """The selected effects without those inside a free shape among them, whose parts are selected anew."""
+    """The selected effects without those inside a free shape among them, whose parts are selected anew where some go."""
     for free in filter(is_free, list(selected)):
-        selected = _beside_shape(scene, free, [each for each in selected if each is not free])
+        outside = _beside_shape(scene, free, [each for each in selected if each is not free])
+        if {each.family for each in outside} != {each.family for each in selected}:
+            selected = outside
     return selected
 
 
