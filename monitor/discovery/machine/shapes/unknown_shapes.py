@@ -26,6 +26,7 @@ from monitor.discovery.machine.shapes.free_parts import (
     priced,
     whole_basis,
 )
+from monitor.discovery.machine.shapes.one_instead import one_instead
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -193,6 +194,8 @@ def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chain
             bends = bends_instead(scene, symbol, score_beside(scene, [free], others) - price, others)
             selected = [*others, *(bends or [free])]
             scene = scene if bends else _with_candidate(scene, free)
+        elif (one := one_instead(scene, mine, others)) is not None:
+            selected, scene = [*others, one], _with_candidate(scene, one)
     return scene, selected
 
 
