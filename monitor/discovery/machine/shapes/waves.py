@@ -91,7 +91,9 @@ def worth_keeping(
     """
     worthy = list(parts)
     while len(worthy) > 1:
-        remaining = [left_by(columns[:, [part for part in worthy if part != out]], residual) for out in worthy]
+        remaining = [
+            left_by(columns[:, [part for part in worthy if part != out]], residual) for out in worthy
+        ]
         least = int(np.argmin(remaining))
         if freedom * np.log(remaining[least] / max(left_by(columns[:, worthy], residual), 1e-300)) >= price:
             break
