@@ -39,8 +39,8 @@ def one_instead(
     ones = [refine(scene, [*others, shape], len(others)).candidate for shape in sought]
     ones += _free(scene, several, others)
 
-    def score(one: ChainCandidate) -> float:
-        return score_beside(scene, [one], others) - (price_of_parts(one) or choice)
+    def score(shape: ChainCandidate) -> float:
+        return score_beside(scene, [shape], others) - (price_of_parts(shape) or choice)
 
     best = max(ones, key=score)
     return best if score(best) > worth and foretells_poses(scene, [best], others) else None

@@ -194,8 +194,8 @@ def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chain
             bends = bends_instead(scene, symbol, score_beside(scene, [free], others) - price, others)
             selected = [*others, *(bends or [free])]
             scene = scene if bends else _with_candidate(scene, free)
-        elif (one := one_instead(scene, mine, others)) is not None:
-            selected, scene = [*others, one], _with_candidate(scene, one)
+        elif (single := one_instead(scene, mine, others)) is not None:
+            selected, scene = [*others, single], _with_candidate(scene, single)
     return scene, selected
 
 
