@@ -17,6 +17,7 @@ from monitor.discovery.machine.shapes.waves import left_by, worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import Free
 from monitor.records import Array
@@ -80,7 +81,7 @@ def parts_worth_keeping(
     """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other.
 
     The selection begins once with the best part and once with the best pair: a drive that is wound up is the direction
-    less what decays after a reversal, and neither of the two says much alone.
+    less what decays after a reversal, and neither of the two says much alone. The pair has to say more beyond doubt.
     """
     beside = scene.remainders.beside(others)
     columns, residual = without(beside.basis, whole.columns), beside.residual
@@ -96,7 +97,8 @@ def parts_worth_keeping(
     for begin in ([], _best_pair(columns, residual, least)):
         parts = _selected(columns, residual, least, (dof, price), begin)
         selections.append(worth_keeping(columns, residual, parts, dof, price))
-    return min(selections, key=cost)
+    one_by_one, from_pair = selections
+    return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
 
 
 def _selected(
