@@ -12,6 +12,7 @@ from by_path import simulator
 
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.evidence.held_out import held_out_by_poses, pose_folds
+from monitor.discovery.machine.shapes.free_parts import _best_pair
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 
@@ -27,6 +28,23 @@ def wound_up(width):
             for row in rows:
                 behind = np.clip(behind, q[row] - width / 2, q[row] + width / 2)
                 ahead[row] = (q[row] - behind) / (width / 2)
+        return ahead
+
+    return curve
+
+
+def dying_away(width):
+    """What relaxes towards the sense of motion over a way (rad), as a drive with friction does (Dahl)."""
+
+    def curve(q, travel, now):
+        ahead = np.zeros(len(q))
+        for run in np.unique(now.run):
+            at, wound = 0.0, 0.0
+            for row in np.flatnonzero(now.run == run):
+                sense = np.sign(q[row] - at)
+                if sense:
+                    wound = sense + (wound - sense) * np.exp(-abs(q[row] - at) / width)
+                ahead[row], at = wound, q[row]
         return ahead
 
     return curve
@@ -89,3 +107,29 @@ def test_what_only_the_poses_left_out_show_is_not_predicted(virtual_campaigns):
     column -= (basis @ (np.swapaxes(basis, 1, 2) @ column[..., None]))[..., 0]
     without = held_out_by_poses(residual, np.zeros((residual.size, 0)), folds)
     assert held_out_by_poses(residual, column.reshape(-1, 1), folds) < 2.0 * without
+
+
+def test_parts_that_say_something_together_alone_are_found():
+    """A difference of two columns that are nearly one, beside a third that is like it: one by one the third is taken
+    first, and after it neither of the two is worth its price."""
+    rng = np.random.default_rng(3)
+    common, apart, noise = rng.standard_normal((3, 400))
+    first, second = 10.0 * common, 10.0 * common + apart
+    third = apart + 0.25 * noise
+    columns = np.column_stack([third, first, second])
+    columns /= np.linalg.norm(columns, axis=0)
+    assert _best_pair(columns, apart, np.full(3, 1e-2)) == [1, 2]
+    assert _best_pair(columns[:, :1], apart, np.full(1, 1e-2)) == []
+    # The same column twice is no pair.
+    assert _best_pair(columns[:, [0, 0]], apart, np.full(2, 1e-2)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("curve", [dying_away(0.5), wound_up(0.41)], ids=["exponential", "play"])
+def test_a_head_that_is_wound_up_has_one_effect(virtual_campaigns, curve):
+    """Before, a reversal and a wind-up of another width, or these and a wave."""
+    hidden = [simulator().Effect("EBB:curve", peak_um=8.0, curve=curve)]
+    campaign, _ = virtual_campaigns.on_machine("fork head", 5, hidden)
+    (told,) = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1)).missing
+    names = {told.effect, *(rival.effect for rival in told.rivals)}
+    assert any(name.startswith("EBB:") for name in names)

@@ -13,10 +13,11 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import score_beside
-from monitor.discovery.machine.shapes.waves import worth_keeping
+from monitor.discovery.machine.shapes.waves import left_by, worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
-from monitor.discovery.search.projection import without
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import Free
 from monitor.records import Array
@@ -25,6 +26,8 @@ from monitor.records import Array
 MOST_PARTS = 8
 # The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
 PRICE = float(np.log(45.0))
+# A part of which others leave less than this is one of them.
+SMALLEST_LENGTH = 1e-2
 
 
 def is_free(candidate: ChainCandidate) -> bool:
@@ -75,18 +78,43 @@ def of_parts(
 def parts_worth_keeping(
     scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> list[int]:
-    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other."""
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other.
+
+    The selection begins once with the best part and once with the best pair: a drive that is wound up is the direction
+    less what decays after a reversal, and neither of the two says much alone. The pair has to say more beyond doubt.
+    """
     beside = scene.remainders.beside(others)
-    basis, residual = beside.basis, beside.residual
-    columns = without(basis, whole.columns)
+    columns, residual = without(beside.basis, whole.columns), beside.residual
     before: Array = np.linalg.norm(whole.columns, axis=0)
-    dof = scene.degrees_of_freedom - basis.shape[1]
+    least = SMALLEST_LENGTH * np.maximum(before, 1e-300)
+    dof = scene.degrees_of_freedom - beside.basis.shape[1]
     price = float(np.log(dof)) + 2.0 * PRICE
-    parts: list[int] = []
+
+    def cost(parts: Sequence[int]) -> float:
+        return float(dof * np.log(left_by(columns[:, list(parts)], residual)) + price * len(parts))
+
+    selections = []
+    for begin in ([], _best_pair(columns, residual, least)):
+        parts = _selected(columns, residual, least, (dof, price), begin)
+        selections.append(worth_keeping(columns, residual, parts, dof, price))
+    one_by_one, from_pair = selections
+    return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
+
+
+def _selected(
+    columns: Array, residual: Array, least: Array, prices: tuple[float, float], begin: Sequence[int]
+) -> list[int]:
+    """The parts to ``begin`` with and those that are worth their price beside them, one after the other; ``prices`` are
+    the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part is one of those before."""
+    (dof, price), parts = prices, list(begin)
+    if parts:
+        basis = orthonormal(columns[:, parts])
+        residual, columns = without(basis, residual[:, None])[:, 0], without(basis, columns)
     while len(parts) < MOST_PARTS:
         length = np.linalg.norm(columns, axis=0)
-        able = length > 1e-2 * np.maximum(before, 1e-300)
-        explained = np.where(able, (columns.T @ residual) ** 2 / np.where(able, length, 1.0) ** 2, 0.0)
+        explained = np.where(
+            length > least, (columns.T @ residual) ** 2 / np.where(length > least, length, 1.0) ** 2, 0.0
+        )
         best = int(np.argmax(explained))
         total = float(residual @ residual)
         if dof * np.log(total / max(total - float(explained[best]), 1e-300)) < price:
@@ -95,4 +123,20 @@ def parts_worth_keeping(
         direction = (columns[:, best] / length[best])[:, None]
         residual = without(direction, residual[:, None])[:, 0]
         columns = without(direction, columns)
-    return worth_keeping(without(basis, whole.columns), beside.residual, parts, dof, price)
+    return parts
+
+
+def _best_pair(columns: Array, residual: Array, least: Array) -> list[int]:
+    """The two parts that explain most of a residual together; none where no two differ."""
+    length = np.linalg.norm(columns, axis=0)
+    able = np.flatnonzero(length > least)
+    if len(able) < 2:
+        return []
+    unit = columns[:, able] / length[able]
+    along, onto = unit.T @ unit, unit.T @ residual
+    apart = 1.0 - along**2
+    differ = length[able] ** 2 * apart > least[able] ** 2
+    squares = onto[:, None] ** 2 + onto**2 - 2.0 * along * np.outer(onto, onto)
+    explained = np.where(differ & differ.T, squares / np.where(differ, apart, 1.0), 0.0)
+    first, second = np.unravel_index(int(np.argmax(explained)), explained.shape)
+    return [] if first == second else [int(able[first]), int(able[second])]

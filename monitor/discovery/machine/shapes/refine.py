@@ -38,6 +38,8 @@ LIMIT_FACTOR = 2.0**0.25
 # So often it goes on below the grid, to a 250th of its shortest; an optimum as near to an end, as a part of the range,
 # is that end.
 MOST_BELOW_GRID, AT_END = 8, 0.02
+# Widths that are tried between the neighbours on the grid.
+WIDTHS_TRIED = 9
 # A warm-up has settled after so few readings that no data show how.
 SETTLED_READINGS = 1.0
 
@@ -178,8 +180,13 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
 
 def _best_logarithm(badness: Callable[[float], float], searched: _Range) -> float:
     """The logarithm of the best value between the neighbours on the grid. Below the grid's shortest time constant there
-    is no neighbour: it goes on by that factor as long as shorter ones are better."""
+    is no neighbour: it goes on by that factor as long as shorter ones are better. All widths below a step of the axis
+    are one, and the best may stand beside that plain: it is sought from the best of a few widths."""
     middle = float(np.log(searched.start))
+    if searched.name == "width":
+        widths = np.linspace(middle - searched.width, middle + searched.width, WIDTHS_TRIED)
+        middle = float(widths[int(np.argmin([badness(width) for width in widths.tolist()]))])
+        searched = replace(searched, width=float(widths[1] - widths[0]))
     for _ in range(MOST_BELOW_GRID if searched.unit == "min" else 1):
         low = middle - searched.width
         best = scipy.optimize.minimize_scalar(

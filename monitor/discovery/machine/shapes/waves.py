@@ -91,15 +91,17 @@ def worth_keeping(
     """
     worthy = list(parts)
     while len(worthy) > 1:
-        remaining = [_left(columns[:, [part for part in worthy if part != out]], residual) for out in worthy]
+        remaining = [
+            left_by(columns[:, [part for part in worthy if part != out]], residual) for out in worthy
+        ]
         least = int(np.argmin(remaining))
-        if freedom * np.log(remaining[least] / max(_left(columns[:, worthy], residual), 1e-300)) >= price:
+        if freedom * np.log(remaining[least] / max(left_by(columns[:, worthy], residual), 1e-300)) >= price:
             break
         del worthy[least]
     return worthy
 
 
-def _left(columns: Array, residual: Array) -> float:
+def left_by(columns: Array, residual: Array) -> float:
     """The sum of squares that columns (M, k) leave of a residual (M,)."""
     remainder = without(orthonormal(columns), residual[:, None])[:, 0]
     return float(remainder @ remainder)
