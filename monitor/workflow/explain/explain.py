@@ -32,6 +32,7 @@ from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -62,7 +63,10 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
         problem = machine_problem(campaign, model)
         columns = columns_of_pitches(problem.context) if times == TIMES_OF_SEARCH else 0
         with within_memory(problem, times, columns):
-            return robust_fit(problem)
+            first = robust_fit(problem)
+        if not first.gross:
+            refuse_exact_fits(problem, first.fit.solution)
+    return first
 
 
 def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:
