@@ -109,6 +109,21 @@ def explanation_of(
     return explanation
 
 
+def explained(explanation: Explanation, campaign: Campaign, model: StoredModel) -> MachineExplanation:
+    """An explanation as it is said and stored, whoever asked: its ties are asked of the plan first, and of the setups
+    that one contradicts all others."""
+    answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
+    answer = with_measurements(answer, campaign, as_model(model))
+    if explanation.mistakes:
+        return answer
+    final, ability = explanation.final, campaign_method(campaign).instruments
+    beside = against_others(final.problem, final.solution, ability)
+    # Where several may be the wrong one, or none alone, the effects come first.
+    return (
+        replace(answer, against_others=beside) if beside is not None and len(beside.suspects) == 1 else answer
+    )
+
+
 def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     """Search for the effects that a model lacks; the answer is stored, without the names of the figures.
 
@@ -129,14 +144,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     # A search that has not the memory is refused before minutes of fitting.
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
-    answer = with_measurements(answer, campaign, as_model(model))
-    if not explanation.mistakes:
-        final, ability = explanation.final, campaign_method(campaign).instruments
-        beside = against_others(final.problem, final.solution, ability)
-        # Where several may be the wrong one, or none alone, the effects come first.
-        if beside is not None and len(beside.suspects) == 1:
-            answer = replace(answer, against_others=beside)
+    answer = explained(explanation, campaign, model)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.
