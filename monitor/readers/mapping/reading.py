@@ -108,9 +108,11 @@ def _repeated(exports: Exports) -> tuple[str, ...]:
     block = repeated_sequences(exports.campaign) if again else None
     if block is not None:
         run, sequences = block
-        told = {exports.place(run, sequence) for sequence in sequences}
+        lines_of_block = {exports.place(run, sequence) for sequence in sequences}
         again = {
-            name: lines for name, lines in again.items() if any((name, line) not in told for line in lines)
+            name: lines
+            for name, lines in again.items()
+            if any((name, line) not in lines_of_block for line in lines)
         }
     return tuple(
         f"{name}: {len(lines)} rows equal an earlier one in every cell (line {', '.join(map(str, lines[:5]))}"
