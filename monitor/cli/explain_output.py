@@ -234,6 +234,11 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
+    if explanation.rate is not None and effect.q_value > explanation.rate:
+        output.say(
+            f"   q is that of the whole scan and above its rate of {explanation.rate:g}: this was asked for "
+            "afterwards, at a level of its own that it met"
+        )
     if effect.refers_to is not None:
         output.say(f"   relative to: {effect.refers_to}")
     if effect.shape_unknown:

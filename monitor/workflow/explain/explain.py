@@ -109,10 +109,13 @@ def explanation_of(
     return explanation
 
 
-def explained(explanation: Explanation, campaign: Campaign, model: StoredModel) -> MachineExplanation:
-    """An explanation as it is said and stored, whoever asked: its ties are asked of the plan first, and of the setups
-    that one contradicts all others."""
-    answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
+def explained(
+    explanation: Explanation, campaign: Campaign, model: StoredModel, rate: float = RATE
+) -> MachineExplanation:
+    """An explanation at a ``rate`` as it is said and stored, whoever asked: its ties are asked of the plan first, and
+    of the setups that one contradicts all others."""
+    answer = replace(machine_explanation(explanation), rate=rate)
+    answer = with_plans(answer, explanation.missing, campaign, model)
     answer = with_measurements(answer, campaign, as_model(model))
     if explanation.mistakes:
         return answer
@@ -144,7 +147,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     # A search that has not the memory is refused before minutes of fitting.
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = explained(explanation, campaign, model)
+    answer = explained(explanation, campaign, model, rate)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.
