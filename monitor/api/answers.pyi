@@ -90,6 +90,7 @@ from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.answer import ValidationAnswer
 from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer
 from monitor.workflow.uncertainty.request import Asked
+from monitor.workflow.volumetric.answer import BetweenPoints
 from monitor.workflow.volumetric.answer import LeftOutOfMap
 from monitor.workflow.volumetric.answer import MapLength
 from monitor.workflow.volumetric.answer import MapPoint
@@ -639,6 +640,8 @@ class TypedVolumetricAnswer(Answer[VolumetricAnswer]):
     def refers_to(self) -> Mapping[str, str]: ...
     @property
     def vectors_refer_to(self) -> str: ...
+    @property
+    def between_points(self) -> tuple[BetweenPoints, ...] | None: ...
     @property
     def figures(self) -> tuple[str, ...] | None: ...
     @property
