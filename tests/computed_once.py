@@ -38,7 +38,7 @@ ROBUST_FIT = (
     "monitor.workflow.explain.explain.robust_fit",
     "monitor.workflow.uncertainty.evaluation.robust_fit",
 )
-FIT = ("monitor.workflow.uncertainty.evaluation.fit",)
+FIT = ("monitor.workflow.uncertainty.evaluation.machine_fit",)
 SEARCH = ("monitor.workflow.explain.explain.explanation_of", "monitor.workflow.health.task.explanation_of")
 COMPUTED_ONCE = (LAYOUT, REGION_FACTORS, JOINT_COVERAGE, ROBUST_FIT, FIT, SEARCH)
 

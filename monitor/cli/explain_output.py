@@ -27,6 +27,7 @@ from monitor.workflow.explain.explain_answer import (
     InstrumentAlias,
     MachineExplanation,
     MachineMissing,
+    SearchedValue,
 )
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.plan.test_answer import TestAnswer
@@ -234,6 +235,11 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
+    if explanation.rate is not None and effect.q_value > explanation.rate:
+        output.say(
+            f"   q is that of the whole scan and above its rate of {explanation.rate:g}: this was asked for "
+            "afterwards, at a level of its own that it met"
+        )
     if effect.refers_to is not None:
         output.say(f"   relative to: {effect.refers_to}")
     if effect.shape_unknown:
@@ -242,16 +248,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         )
     if effect.reversal_value is not None:
         output.say(f"   {reversal_words(effect.reversal_value)}")
-    searched = effect.searched
-    if searched is not None and searched.u is None:
-        limit = (
-            "" if searched.at_least is None else f": only that it is longer than {searched.at_least:.2g} min"
-        )
-        output.say(f"   {searched.what} not determined by these data{limit}")
-    elif searched is not None:
-        u = "" if searched.u is None else f" ± {output.two_digits(searched.u)}"
-        unit = "" if searched.unit == "1" else f" {searched.unit}"
-        output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
+    if effect.searched is not None:
+        output.say(f"   {_searched(effect.searched)}")
     if effect.travelled_periods is not None:
         output.say(
             f"   the axis turned {effect.travelled_periods:.2f} of its period: over less than 1.5 it is a smooth bend, "
@@ -270,6 +268,17 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         if after is not None
     ] or ["too few readings to leave some out"]
     output.say(f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; {', '.join(held_out)}")
+
+
+def _searched(searched: SearchedValue) -> str:
+    """What was searched besides the size, such as a pitch."""
+    if searched.u is None:
+        limit = (
+            "" if searched.at_least is None else f": only that it is longer than {searched.at_least:.2g} min"
+        )
+        return f"{searched.what} not determined by these data{limit}"
+    unit = "" if searched.unit == "1" else f" {searched.unit}"
+    return f"{searched.what} {output.rounded(searched.value, searched.u)} ± {output.two_digits(searched.u)}{unit}"
 
 
 def _curve_effect(effect: CurveMissing, unit: str) -> None:

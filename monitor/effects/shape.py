@@ -12,9 +12,13 @@ from monitor.effects.context import Context
 from monitor.effects.description import Explanation
 from monitor.effects.joint_error import JointError
 from monitor.effects.registry import BuiltIn
+from monitor.exceptions import EffectError
 from monitor.machine import Joint
 from monitor.records import Array
 from monitor.units import Unit
+
+#: Shorter than any period of a scale in mm (0.128 µm of the finest), and than the last digit of most positions.
+SHORTEST_PITCH = 1e-4
 
 
 class Shape(Protocol):
@@ -54,3 +58,13 @@ class DescribedShape(BuiltIn):
     def explanation(self, error: JointError) -> Explanation | None:
         """Explain the effect; None where the shape says nothing of its cause."""
         return None
+
+
+def parse_pitch(shape: str, written: str, example: str) -> float:
+    """Return the pitch in mm of a shape as it is written. Raises EffectError for one that no axis can have."""
+    pitch = float(written)
+    if not SHORTEST_PITCH <= pitch < float("inf"):
+        raise EffectError(
+            f"the pitch of {shape}{written}mm must be {SHORTEST_PITCH:.4f} mm or more; write for example {example}"
+        )
+    return pitch

@@ -349,7 +349,7 @@ NO_TOUCH_PLAN = Unable(
 class ChainMethod(Method):
     """A method that measures a machine: readings on its kinematic chain.
 
-    ``refuse`` raises DataError for a campaign that has too little to be identified. ``gross_times`` stated standard
+    ``refuse`` raises DataError for a campaign of which no fit would hold. ``gross_times`` stated standard
     uncertainties in the residual are first of all a mistake of the file; of a run of more than ``trial_rows`` some
     poses suffice to try such a mistake (None: all rows are needed). ``taken_as_known`` counts as free of errors, so
     that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own, ``as_stated``
@@ -390,6 +390,7 @@ class ChainMethod(Method):
         from monitor.methods.chain.gross_in_parts import gross_of
         from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
         from monitor.methods.chain.results import identification
+        from monitor.methods.chain.sufficiency import refuse_exact_fits
         from monitor.methods.chain.suspects import with_suspects
 
         model = model or self.own_model
@@ -402,6 +403,7 @@ class ChainMethod(Method):
                 raise with_suspects(
                     error, campaign, problem, partial(self.problem_of, model=model)
                 ) from error
+        refuse_exact_fits(problem, solution)
         search = gross_of(campaign, problem, solution, partial(self.problem_of, model=model))
         return replace(
             identification(campaign, model, problem, solution, self.advice, search.readings),

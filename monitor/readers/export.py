@@ -36,6 +36,7 @@ class Export:
     ``units`` has the columns whose unit the file states; ``lines`` (n) is the line that each row stands on. ``layout``
     says how the file is written, ``facts`` what its head says; ``started`` is a date as it stands there. ``invalid``
     has the rows (0 to n - 1) of which the file itself says that the cell of a column does not count, with its words.
+    ``repeated`` are the lines that equal an earlier one in every cell.
     """
 
     columns: Mapping[str, Sequence[str]]
@@ -45,6 +46,7 @@ class Export:
     facts: tuple[Fact, ...] = ()
     started: str | None = None
     notes: tuple[str, ...] = ()
+    repeated: tuple[int, ...] = ()
     invalid: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
 
 

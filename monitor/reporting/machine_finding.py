@@ -27,12 +27,14 @@ class MissingEffect:
 @dataclass(frozen=True)
 class MistakeFound:
     """A likely mistake of the file, and the RMS in mm with it (not finite where the readings fit no machine) and
-    without; ``enough`` where that explains the readings."""
+    without; ``enough`` where that explains the readings. Of ``untried`` setups that contradict besides none was tried.
+    """
 
     what: str
     rms_as_recorded: float
     rms_undone: float
     enough: bool = True
+    untried: int = 0
 
 
 #: From this correlation of neighbours on a run wanders rather than scatters.
@@ -284,11 +286,20 @@ def mistake_sentence(mistakes: Sequence[MistakeFound]) -> str:
     )
     remainder = f"{before}, residual {_length(first.rms_undone)} with that undone"
     if first.enough:
-        return f"It looks as if {ways}: {remainder}."
+        return f"It looks as if {ways}: {remainder}.{_untried(first.untried)}"
     return (
         "No single mistake of those that are tried explains the readings; nearest comes what they would leave if "
-        f"{ways}: {remainder}, still far more than is stated."
+        f"{ways}: {remainder}, still far more than is stated.{_untried(first.untried)}"
     )
+
+
+def _untried(count: int) -> str:
+    """What is said of setups that contradict too, but less than those whose mistakes were tried."""
+    if count == 0:
+        return ""
+    if count == 1:
+        return " One more setup contradicts, and was not tried: `monitor compare` lists every setup."
+    return f" {count} more setups contradict, and were not tried: `monitor compare` lists every setup."
 
 
 def what_to_do(mistakes: Sequence[MistakeFound]) -> str:

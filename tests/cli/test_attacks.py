@@ -16,9 +16,9 @@ import duckdb
 import numpy as np
 import pytest
 
-from monitor.discovery import fit
 from monitor.readers import read_campaign
 from monitor.readers.doubts.doubts import doubts
+from monitor.workflow.identify.fitting import machine_fit
 
 ARCHIVE = Path(__file__).parents[1] / "archives" / "monitor-0.1.0.duckdb.gz"
 
@@ -139,7 +139,7 @@ def test_a_verb_that_needs_more_memory_than_there_is_says_so(
     monkeypatch.setattr("monitor.methods.chain.memory.SMALL", 1e6)
     monkeypatch.setattr("monitor.methods.chain.memory.free_memory", lambda: 2e6)
     # Not what another test fitted (computed_once).
-    monkeypatch.setattr("monitor.workflow.uncertainty.evaluation.fit", fit)
+    monkeypatch.setattr("monitor.workflow.uncertainty.evaluation.machine_fit", machine_fit)
     said = typed(verb, "cold-cold", db=db)
     assert (said.status, said.out) == (2, "")
     assert "1320 rows at once takes some" in said.err

@@ -13,9 +13,10 @@ import pytest
 
 from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit, robust_fit
 from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
-from monitor.discovery.machine.mistakes.setup_mistakes import _explains
+from monitor.discovery.machine.mistakes.setup_mistakes import _doubted, _explains
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.method import SetupScatter
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
 from monitor.reporting.machine_finding import MistakeFound, mistake_sentence, what_to_do
@@ -234,6 +235,22 @@ def test_what_only_comes_nearest_is_not_enough() -> None:
     assert mistake_sentence([nearest]).startswith("No single mistake of those that are tried explains")
     assert "do not correct this alone" in what_to_do([nearest])
     assert what_to_do([replace(nearest, enough=True)]) == "correct the file first."
+
+
+def test_of_many_setups_that_scatter_the_three_worst_are_tried_and_the_others_counted() -> None:
+    scatters = [
+        SetupScatter(f"bar-{times:g}", times, 1.0, 40.0) for times in (4.0, 20.0, 1.0, 9.0, 6.0, 30.0)
+    ]
+    doubted, untried = _doubted((), scatters)
+    assert [each.name for each in doubted] == ["bar-30", "bar-20", "bar-9"]
+    assert untried == 2
+    mistake = MistakeFound("the sign of dy_um were the other way round", 15.7e-3, 0.6e-3)
+    assert mistake_sentence([mistake]).endswith("residual 0.6 µm with that undone.")
+    several = mistake_sentence([replace(mistake, untried=2)])
+    assert several.endswith(
+        " 2 more setups contradict, and were not tried: `monitor compare` lists every setup."
+    )
+    assert " One more setup contradicts" in mistake_sentence([replace(mistake, untried=1)])
 
 
 @pytest.mark.parametrize(("left", "explains"), [(645.0, True), (5e3, True), (2e5, False)])

@@ -135,7 +135,7 @@ def test_a_joint_that_stands_still_is_named(tracked: Tracks, robots: ModuleType)
 
 def test_too_few_poses_are_refused(tracked: Tracks) -> None:
     _, campaign = tracked(12, poses=5, reflectors=("R1",))
-    with pytest.raises(DataError, match="has 15 readings for 27 unknowns; measure more poses"):
+    with pytest.raises(DataError, match="the 15 readings of run 1 determine as many unknowns"):
         tracker.identify(campaign)
 
 

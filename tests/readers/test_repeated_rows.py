@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.readers import read_campaign
+from monitor.readers import doubts, read_campaign, read_exports
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.records import Campaign
 
@@ -199,3 +199,19 @@ def test_rows_that_stand_there_twice_are_told(
             rf"{count} rows of run 1, from sequence \d+ on, equal those from sequence \d+ on in every",
             sentence,
         )
+
+
+def test_lines_of_a_file_that_are_told_as_a_block_are_told_once(tmp_path: Path) -> None:
+    folder = tmp_path / "files"
+    shutil.copytree(EXAMPLES / "files-as-they-come", folder)
+    lines = (folder / "r-test.csv").read_text(encoding="latin-1").splitlines()
+    files = [path for path in folder.iterdir() if path.name != "mapping.toml"]
+    (folder / "r-test.csv").write_text("\n".join([*lines, *lines[4:]]) + "\n", encoding="latin-1")
+    read = read_exports(folder / "mapping.toml", files)
+    (told,) = (sentence for sentence in (*read.notes, *doubts(read.campaign)) if "exported twice" in sentence)
+    assert told.startswith("25 rows of run 1")
+    # Apart from each other they are no block.
+    (folder / "r-test.csv").write_text("\n".join([*lines, lines[-1], lines[-5]]) + "\n", encoding="latin-1")
+    read = read_exports(folder / "mapping.toml", files)
+    (told,) = (sentence for sentence in (*read.notes, *doubts(read.campaign)) if "exported twice" in sentence)
+    assert told.startswith("r-test.csv: 2 rows equal an earlier one in every cell (line ")

@@ -6,6 +6,7 @@ correction of a row is added to the reading of the same row.
 """
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from monitor.store import Database
 from monitor.uncertainty.geometric_errors import GeometricErrors
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.volumetric.between_points import between_points
 from monitor.workflow.volumetric.compensation import write_tables
 from monitor.workflow.volumetric.error_map import VolumetricMap, poses_of
 from monitor.workflow.volumetric.request import VolumetricRequest
@@ -363,3 +365,24 @@ def test_all_the_way_from_a_measured_campaign_to_the_corrected_machine(simulator
     u = np.array([np.linalg.norm([row[f"u_{axis}_um"] for axis in "xyz"]) for row in rows]) * 1e-3
     assert np.all(after < 4.0 * u + 1e-5)
     assert after.max() < before.max() / 10.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "value", "size"),
+    [
+        ("EXX:sawtooth68mm(12)", 0.0126, 6.3),
+        ("EXX:cyclic68mm", (0.003, 0.004), 5.0),
+        ("EBX:cyclic68mm", (3e-6, 4e-6), 5.0),
+    ],
+)
+def test_what_repeats_between_the_points_of_a_map_is_said_with_its_size(effect, value, size):
+    """Teeth 68 mm apart on points 66.7 mm apart look like next to nothing."""
+    truth = SimpleNamespace(values={"EXX:poly1": 1e-5, effect: value})
+    topology = "w C B X b Z Y (C1) t"
+    mapped = _mapped(truth, topology, _signs(topology, True), points=7)
+    (between,) = between_points(mapped)
+    assert (between.effect, between.axis, between.pitch_mm) == (effect, "X", 68.0)
+    assert between.spacing_mm == pytest.approx(400.0 / 6.0)
+    assert between.size == pytest.approx(size, rel=0.01)
+    assert between.unit == ("µrad" if effect.startswith("EBX") else "µm")
+    assert between_points(replace(mapped, points=49)) == ()

@@ -9,18 +9,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from monitor.discovery import fit
+from monitor.discovery import Explanation, RobustFit, compare, fit
 from monitor.discovery.machine.separation.separate import Separation
 from monitor.effects import parse_effect
 from monitor.methods import ChainMethod, campaign_method, methods
 from monitor.readers import read_campaign
-from monitor.records import SecondSetup
+from monitor.records import Campaign, SecondSetup
 from monitor.reporting.runs_that_tell import poses_that_tell
-from monitor.store import Database
+from monitor.store import Database, StoredModel
 from monitor.web.words import what_breaks
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.machine_answer import has_plan_of_pairs
 from monitor.workflow.explain.planned_ties import PlanOfPairs
 from monitor.workflow.explain.ties import Tie, TieBreak, ties_of
+from monitor.workflow.health.task import Task, computed
 from monitor.workflow.identify.fitting import machine_problem
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.models import as_model, resolve
@@ -135,6 +137,29 @@ def test_no_list_of_axes_is_empty(effects: tuple[str, ...], words: str) -> None:
 def test_a_linear_axis_is_not_indexed() -> None:
     words = what_breaks(Tie(("EZZ:poly1@warmup",), TieBreak.INDEXATIONS, ("warmup",), ("C1", "Z")))
     assert words == "bring C1 and Z to other positions while warmup acts"
+
+
+def test_the_weekly_report_asks_the_plan_as_explain_does(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It stored the poses that `explain` names only where the plan has them."""
+    campaign = read_campaign(EXAMPLES / "r-test")
+    with Database(tmp_path / "one.duckdb") as db:
+        model = resolve(db, None, campaign.method)
+    asked: list[object] = []
+
+    def with_plans(answer: MachineExplanation, *others: object) -> MachineExplanation:
+        asked.append(answer)
+        return answer
+
+    def unsearched(campaign: Campaign, model: StoredModel, robust: RobustFit) -> Explanation:
+        comparison = compare(robust.fit, campaign.name, model.name)
+        return Explanation(comparison, (), (), (), (), (), (), robust.fit)
+
+    monkeypatch.setattr("monitor.workflow.explain.explain.with_plans", with_plans)
+    monkeypatch.setattr("monitor.workflow.health.task.explanation_of", unsearched)
+    task = Task(model, (), campaign, True, 1, uncertainty=False, explanation=True, map=False, versions=())
+    assert asked == [computed(task).explanation]
 
 
 @pytest.fixture(scope="module")

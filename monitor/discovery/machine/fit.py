@@ -14,11 +14,12 @@ from monitor.discovery.machine.noise.plan_cells import plan_cells
 from monitor.discovery.machine.noise.rows import Rows, from_pose_to_pose, neighbours_of
 from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.effects import Basis, Effect
-from monitor.exceptions import DataError, TooFewReadingsError
+from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
 from monitor.methods.chain.memory import TIMES_OF_FIT, within_memory
 from monitor.methods.chain.poses import shared_poses
 from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.records import Array
 
 
@@ -195,10 +196,7 @@ class Fit:
         Raises TooFewReadingsError where the model takes as many numbers as there are.
         """
         if self.degrees_of_freedom < 1:
-            raise TooFewReadingsError(
-                f"the model takes as many unknowns from the {self.readings} readings as they determine: nothing is "
-                "left over to judge it by; measure more poses"
-            )
+            refuse_exact_fits(self.problem, self.solution)
         return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
 
 

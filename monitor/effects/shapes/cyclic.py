@@ -11,7 +11,7 @@ import numpy as np
 from monitor.effects.context import Context
 from monitor.effects.description import POSITIONING, Explanation
 from monitor.effects.joint_error import JointError
-from monitor.effects.shape import DescribedShape
+from monitor.effects.shape import DescribedShape, parse_pitch
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
@@ -21,11 +21,11 @@ class Cyclic(DescribedShape):
     """A cosine and a sine of a pitch in millimetres, as a ball screw or a scale has."""
 
     pitch: float
-    pattern: ClassVar[str] = r"cyclic(?P<pitch>\d+(?:\.\d+)?)mm"
+    pattern: ClassVar[str] = r"cyclic(?P<pitch>-?\d+(?:\.\d+)?)mm"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(float(groups["pitch"]))
+        return cls(parse_pitch("cyclic", groups["pitch"], "cyclic20mm"))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -38,8 +38,6 @@ class Cyclic(DescribedShape):
             )
 
     def columns(self, context: Context, joint: int) -> Array:
-        if self.pitch <= 0:
-            raise EffectError(f"the pitch of cyclic{self.pitch:g}mm must be above 0 mm")
         phase = 2.0 * np.pi * context.places[:, joint] / self.pitch
         return np.column_stack([np.cos(phase), np.sin(phase)])
 

@@ -29,11 +29,15 @@ class Harmonic(DescribedShape):
     """A cosine and a sine of a number of periods a turn; a gear has as many as its ratio, whole or not."""
 
     order: float
-    pattern: ClassVar[str] = r"harmonic(?P<order>[1-9]\d{0,3}(?:\.\d+)?)"
+    pattern: ClassVar[str] = r"harmonic(?P<order>-?\d{1,4}(?:\.\d+)?)"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
         order = groups["order"]
+        if float(order) < 1.0:
+            raise EffectError(
+                f"the order of harmonic{order} must be 1 to 9999 periods a turn; what no turn changes is const"
+            )
         return cls(float(order) if "." in order else int(order))
 
     @property

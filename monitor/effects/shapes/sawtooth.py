@@ -11,7 +11,7 @@ import numpy as np
 from monitor.effects.context import Context
 from monitor.effects.description import POSITIONING, Explanation
 from monitor.effects.joint_error import JointError
-from monitor.effects.shape import DescribedShape
+from monitor.effects.shape import DescribedShape, parse_pitch
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
@@ -23,11 +23,11 @@ class Sawtooth(DescribedShape):
 
     pitch: float
     edge: float
-    pattern: ClassVar[str] = r"sawtooth(?P<pitch>\d+(?:\.\d+)?)mm\((?P<edge>-?\d+(?:\.\d+)?)\)"
+    pattern: ClassVar[str] = r"sawtooth(?P<pitch>-?\d+(?:\.\d+)?)mm\((?P<edge>-?\d+(?:\.\d+)?)\)"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(float(groups["pitch"]), float(groups["edge"]))
+        return cls(parse_pitch("sawtooth", groups["pitch"], "sawtooth84mm(12)"), float(groups["edge"]))
 
     @property
     def text(self) -> str:
@@ -41,8 +41,6 @@ class Sawtooth(DescribedShape):
             )
 
     def columns(self, context: Context, joint: int) -> Array:
-        if self.pitch <= 0:
-            raise EffectError(f"the pitch of sawtooth{self.pitch:g}mm must be above 0 mm")
         reading = context.chain.joints[joint].sign * context.places[:, joint]
         return np.asarray(((reading - self.edge) / self.pitch % 1.0 - 0.5)[:, np.newaxis])
 

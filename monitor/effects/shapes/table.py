@@ -29,15 +29,16 @@ class Table(DescribedShape):
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(int(groups.get("nodes", TABLE_NODES)))
+        nodes = int(groups.get("nodes", TABLE_NODES))
+        if nodes < 2:
+            raise EffectError(f"table{nodes} has too few nodes; write table or table2 and above")
+        return cls(nodes)
 
     @property
     def labels(self) -> tuple[str, ...]:
         return tuple(f".node{number}" for number in range(1, self.nodes + 1))
 
     def columns(self, context: Context, joint: int) -> Array:
-        if self.nodes < 2:
-            raise EffectError(f"table{self.nodes} has too few nodes; write table or table2 and above")
         q, visited = context.places[:, joint], context.scaling.places[:, joint]
         grid = np.linspace(visited.min(), visited.max(), self.nodes)
         step = grid[1] - grid[0]

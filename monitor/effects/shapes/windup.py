@@ -28,11 +28,17 @@ class WindUp(DescribedShape):
 
     width: float
     width_unit: str = "mm"
-    pattern: ClassVar[str] = r"windup(?P<width>\d+(?:\.\d+)?)(?P<unit>mm|deg)"
+    pattern: ClassVar[str] = r"windup(?P<width>-?\d+(?:\.\d+)?)(?P<unit>mm|deg)"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(float(groups["width"]), groups["unit"])
+        width, unit = float(groups["width"]), groups["unit"]
+        if not 0.0 < width < float("inf"):
+            raise EffectError(
+                f"the width of windup{groups['width']}{unit} must be above 0 {unit}; write reversal for what turns "
+                "over at once"
+            )
+        return cls(width, unit)
 
     @property
     def text(self) -> str:
@@ -49,10 +55,6 @@ class WindUp(DescribedShape):
             )
 
     def columns(self, context: Context, joint: int) -> Array:
-        if self.width <= 0:
-            raise EffectError(
-                f"the width of windup{self.width:g}{self.width_unit} must be above 0 {self.width_unit}"
-            )
         width = np.deg2rad(self.width) if self.width_unit == "deg" else self.width
         return wound_up(context, joint, float(width))[:, None]
 

@@ -19,6 +19,7 @@ from monitor.effects import Effect, parse_effect
 from monitor.exceptions import DataError, EffectError
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.methods.method import ChainMethod
 from monitor.records import Array, Campaign, Probings
 
@@ -56,6 +57,7 @@ class Likeness:
         problem = method.problem_of(campaign, method.own_model)
         method.refuse(campaign, problem)
         self.solution: Solution = solve_problem(problem)
+        refuse_exact_fits(problem, self.solution)
         self.problem = _with_planned_poses(problem, self.solution)
         knows_columns = bool(self.problem.read_columns)
         self.kept = {} if knows_columns else _kept_numbers(self.problem, campaign.probings.channels)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Chain
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
@@ -20,7 +17,6 @@ from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.shares import shares
 from monitor.methods.instruments.standard_tests import standard_tests
 from monitor.methods.method import ChainMethod, InstrumentPlan, Instruments, Nouns, StandardTests, Unable
-from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
 
 
@@ -36,19 +32,6 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
         return Advice(AdviceKind.STOOD_STILL, still)
     # More poses of the same setups often do not help: a square, a level or an autocollimator does.
     return Advice(AdviceKind.OTHER_MEASUREMENT, parameters[:1])
-
-
-def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """TooFewReadingsError where a run has fewer numbers than unknowns: what nothing was read of is no number."""
-    for run in problem.runs:
-        rows = problem.context.run == run
-        numbers = int(np.isfinite(problem.sigma[rows]).sum()) + len(problem.extra_names)
-        unknowns = len(problem.local_names)
-        if numbers < unknowns:
-            raise TooFewReadingsError(
-                f"run {run} of campaign {campaign.name} has {numbers} readings for {unknowns} unknowns; "
-                "measure more poses"
-            )
 
 
 def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
@@ -71,7 +54,6 @@ METHOD = ChainMethod(
     description="any instruments on one machine: where it points, points, distances, displacements, angles",
     nouns=Nouns(target="target", row="reading"),
     problem_of=problem_of,
-    refuse=refuse,
     advice=advice,
     base_effects=usual_base,
     trial_rows=150,

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.effects import ChainEffect, context_of
-from monitor.exceptions import DataError, TooFewReadingsError
+from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
 from monitor.methods.bar_temperature import bar_temperature
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
+from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.chain.touch import Distance, TouchProblem
 from monitor.methods.method import ChainMethod, Nouns, TouchPlan
 from monitor.methods.model import Model, chain_of
@@ -116,25 +116,12 @@ def _gains(problem: ChainProblem) -> set[str]:
     }
 
 
-def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """TooFewReadingsError where a run has fewer readings than its unknowns need."""
-    for run in problem.runs:
-        readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
-        unknowns = unknowns_of_run(problem, run)
-        if readings < unknowns:
-            raise TooFewReadingsError(
-                f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
-                "probe more balls or indexations"
-            )
-
-
 METHOD = ChainMethod(
     name=NAME,
     title="scale and master balls",
     description="balls and a scale bar, touched at indexed angles",
     nouns=Nouns(target="ball", row="touch"),
     problem_of=problem_of,
-    refuse=refuse,
     advice=advice,
     plan=TouchPlan(),
     rehearsal=Rehearsal("machine tool", virtual_campaign, noise_um=1.0, chosen_campaign=chosen_campaign),

@@ -10,18 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.identification import AsStated
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
+from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.methods.rehearsal import Rehearsal
 from monitor.methods.tracker.assembly import NAME, problem_of, tool_side
 from monitor.methods.tracker.problem import TrackingProblem
 from monitor.methods.tracker.virtual import virtual_robot
-from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
 
 
@@ -40,18 +38,6 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
     return Advice(AdviceKind.MORE_POSES)
 
 
-def refuse(campaign: Campaign, problem: ChainProblem) -> None:
-    """TooFewReadingsError where a run has fewer readings than its unknowns need."""
-    for run in problem.runs:
-        readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
-        unknowns = unknowns_of_run(problem, run)
-        if readings < unknowns:
-            raise TooFewReadingsError(
-                f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
-                "measure more poses"
-            )
-
-
 def exact_scale(problem: ChainProblem) -> tuple[AsStated, ...]:
     """The scale of the tracker where it is taken as exact, and what counts from it."""
     assert isinstance(problem, TrackingProblem)
@@ -64,7 +50,6 @@ METHOD = ChainMethod(
     description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
     nouns=Nouns(target="reflector", row="reading"),
     problem_of=problem_of,
-    refuse=refuse,
     advice=advice,
     base_effects=tracker_base,
     trial_rows=150,

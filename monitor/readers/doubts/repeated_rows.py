@@ -57,27 +57,10 @@ class _Block:
 
 def repeated_rows(campaign: Campaign) -> Iterator[str]:
     """A sentence on the least likely block of rows that repeats an earlier one in all but its times."""
-    probings = campaign.probings
-    if len(probings) < 2 * LEAST_ROWS:
+    block = _block_of(campaign)
+    if block is None:
         return
-    columns = [*probings.readings.values(), *probings.channels.values()]
-    numbers = _mixed(probings.run, columns)
-    setup = [probings.channels["setup"]] if "setup" in probings.channels else []
-    poses = _mixed(probings.run, [*probings.readings.values(), *setup])
-    # The same pose is the same only where it was reached from the same one: a reversal is no scatter.
-    before = np.concatenate([[np.uint64(0)], poses[:-1]])
-    poses = (poses ^ (before >> np.uint64(7))) * np.uint64(MIXING)
-    first, previous = _equal_before(numbers)
-    rows = _Rows(numbers, _mixed(probings.run, setup), poses, first >= 0)
-    distances = {distance for earlier in (first, previous) for distance in _distances(earlier)}
-    blocks = [block for distance in sorted(distances) if (block := rows.block(distance)) is not None]
-    block = min(blocks, key=lambda each: each.chance, default=None)
-    if block is None or block.chance > np.log(CHANCE):
-        return
-    begin = block.begin
-    different = max(len(np.unique(column[begin : begin + block.length])) for column in columns)
-    if different < LEAST_DIFFERENT:
-        return
+    probings, begin = campaign.probings, block.begin
     equal = (
         f"{block.length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those "
         f"from sequence {probings.sequence[begin - block.distance]} on in every number"
@@ -92,6 +75,38 @@ def repeated_rows(campaign: Campaign) -> Iterator[str]:
         f"{equal}; of {block.others} other rows {block.equal} repeat one so: were they exported twice, or two files "
         "joined? Counted twice they make u too small"
     )
+
+
+def repeated_sequences(campaign: Campaign) -> tuple[int, tuple[int, ...]] | None:
+    """The run and the sequence numbers of the rows that ``repeated_rows`` tells of; None where there are none."""
+    block = _block_of(campaign)
+    if block is None:
+        return None
+    probings, rows = campaign.probings, slice(block.begin, block.begin + block.length)
+    return int(probings.run[block.begin]), tuple(probings.sequence[rows].tolist())
+
+
+def _block_of(campaign: Campaign) -> _Block | None:
+    """The least likely block of rows that repeats an earlier one; None where none is unlikely."""
+    probings = campaign.probings
+    if len(probings) < 2 * LEAST_ROWS:
+        return None
+    columns = [*probings.readings.values(), *probings.channels.values()]
+    numbers = _mixed(probings.run, columns)
+    setup = [probings.channels["setup"]] if "setup" in probings.channels else []
+    poses = _mixed(probings.run, [*probings.readings.values(), *setup])
+    # The same pose is the same only where it was reached from the same one: a reversal is no scatter.
+    before = np.concatenate([[np.uint64(0)], poses[:-1]])
+    poses = (poses ^ (before >> np.uint64(7))) * np.uint64(MIXING)
+    first, previous = _equal_before(numbers)
+    rows = _Rows(numbers, _mixed(probings.run, setup), poses, first >= 0)
+    distances = {distance for earlier in (first, previous) for distance in _distances(earlier)}
+    blocks = [block for distance in sorted(distances) if (block := rows.block(distance)) is not None]
+    block = min(blocks, key=lambda each: each.chance, default=None)
+    if block is None or block.chance > np.log(CHANCE):
+        return None
+    different = max(len(np.unique(column[block.begin : block.begin + block.length])) for column in columns)
+    return block if different >= LEAST_DIFFERENT else None
 
 
 def _is_coarse(campaign: Campaign, row: int) -> bool:

@@ -140,7 +140,14 @@ def read_text(
     columns = dict(zip(head.names, zip(*plain, strict=True), strict=True))
     layout = f"{encoding}, {Style(separator, decimal)}"
     return Export(
-        columns, head.units, at, layout, facts, started, (*_repeated(plain, at), *_taken_as_names(rows, at))
+        columns,
+        head.units,
+        at,
+        layout,
+        facts,
+        started,
+        tuple(_taken_as_names(rows, at)),
+        _repeated(plain, at),
     )
 
 
@@ -304,16 +311,12 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(stated) and all(cell[0] in "[(" or foreign_unit(cell.strip("[]()")) for cell in stated)
 
 
-def _repeated(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> list[str]:
-    """Return a sentence on rows that equal another in every cell."""
+def _repeated(rows: Sequence[Sequence[str]], lines: Sequence[int]) -> tuple[int, ...]:
+    """Return the lines of the rows that equal another in every cell."""
     first: dict[tuple[str, ...], int] = {}
-    again = [
+    return tuple(
         line for line, row in zip(lines, rows, strict=True) if first.setdefault(tuple(row), line) != line
-    ]
-    if not again:
-        return []
-    where = ", ".join(map(str, again[:5])) + (", ..." if len(again) > 5 else "")
-    return [f"{len(again)} rows equal an earlier one in every cell (line {where}); were they exported twice?"]
+    )
 
 
 EXPORT = ExportFormat(

@@ -13,6 +13,7 @@ from monitor.exceptions import CampaignError, Fault
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.campaign import probings_file, runs_file
 from monitor.readers.campaign.campaign_parts import Head, campaign_of, read_head, read_parts
+from monitor.readers.doubts.repeated_rows import repeated_sequences
 from monitor.readers.export import LARGEST_EXPORT, Export, ExportFile
 from monitor.readers.exports import table as plain_table
 from monitor.readers.faults import Faults, one_of, quoted
@@ -88,12 +89,9 @@ def read_exports(mapping: Path, paths: Sequence[Path], name: str | None = None) 
     sources = [SourceFile(mapping.name, content)]
     sources += [SourceFile(file.name, file.content) for file in files.values() if file.name in used]
     campaign = campaign_of(head, understood, tuple(sources))
-    return Exports(
-        campaign,
-        tuple(map(_understood, parts)),
-        _notes(parts, [file for file in files if file not in used]),
-        tuple(parts),
-    )
+    exports = Exports(campaign, tuple(map(_understood, parts)), (), tuple(parts))
+    notes = (*_repeated(exports), *_notes(parts, [file for file in files if file not in used]))
+    return replace(exports, notes=notes)
 
 
 def _notes(parts: Sequence[_Part], unused: Sequence[str]) -> tuple[str, ...]:
@@ -101,6 +99,26 @@ def _notes(parts: Sequence[_Part], unused: Sequence[str]) -> tuple[str, ...]:
     notes = [f"{part.file.name}: {note}" for part in parts for note in part.export.notes]
     notes += [f"{file} is named by no [[exports]] of the mapping and was not read" for file in unused]
     return tuple(dict.fromkeys(notes))
+
+
+def _repeated(exports: Exports) -> tuple[str, ...]:
+    """Return sentences on lines of files that equal another in every cell, but for the block of rows that
+    ``repeated_rows`` tells of."""
+    again = {part.file.name: part.export.repeated for part in exports.parts if part.export.repeated}
+    block = repeated_sequences(exports.campaign) if again else None
+    if block is not None:
+        run, sequences = block
+        lines_of_block = {exports.place(run, sequence) for sequence in sequences}
+        again = {
+            name: lines
+            for name, lines in again.items()
+            if any((name, line) not in lines_of_block for line in lines)
+        }
+    return tuple(
+        f"{name}: {len(lines)} rows equal an earlier one in every cell (line {', '.join(map(str, lines[:5]))}"
+        f"{', ...' if len(lines) > 5 else ''}); were they exported twice?"
+        for name, lines in again.items()
+    )
 
 
 def _files(paths: Sequence[Path], faults: Faults) -> dict[str, ExportFile]:

@@ -32,6 +32,7 @@ from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -62,7 +63,10 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
         problem = machine_problem(campaign, model)
         columns = columns_of_pitches(problem.context) if times == TIMES_OF_SEARCH else 0
         with within_memory(problem, times, columns):
-            return robust_fit(problem)
+            first = robust_fit(problem)
+        if not first.gross:
+            refuse_exact_fits(problem, first.fit.solution)
+    return first
 
 
 def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:
@@ -105,6 +109,24 @@ def explanation_of(
     return explanation
 
 
+def explained(
+    explanation: Explanation, campaign: Campaign, model: StoredModel, rate: float = RATE
+) -> MachineExplanation:
+    """An explanation at a ``rate`` as it is said and stored, whoever asked: its ties are asked of the plan first, and
+    of the setups that one contradicts all others."""
+    answer = replace(machine_explanation(explanation), rate=rate)
+    answer = with_plans(answer, explanation.missing, campaign, model)
+    answer = with_measurements(answer, campaign, as_model(model))
+    if explanation.mistakes:
+        return answer
+    final, ability = explanation.final, campaign_method(campaign).instruments
+    beside = against_others(final.problem, final.solution, ability)
+    # Where several may be the wrong one, or none alone, the effects come first.
+    return (
+        replace(answer, against_others=beside) if beside is not None and len(beside.suspects) == 1 else answer
+    )
+
+
 def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     """Search for the effects that a model lacks; the answer is stored, without the names of the figures.
 
@@ -125,14 +147,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     # A search that has not the memory is refused before minutes of fitting.
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
-    answer = with_measurements(answer, campaign, as_model(model))
-    if not explanation.mistakes:
-        final, ability = explanation.final, campaign_method(campaign).instruments
-        beside = against_others(final.problem, final.solution, ability)
-        # Where several may be the wrong one, or none alone, the effects come first.
-        if beside is not None and len(beside.suspects) == 1:
-            answer = replace(answer, against_others=beside)
+    answer = explained(explanation, campaign, model, rate)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.

@@ -271,7 +271,9 @@ class MachineExplanation:
     The residual is pictured where something is missing. ``taken_for_machine`` are errors of
     instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
     other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
-    instrument contradicts all others with all of this in the model too: that comes first.
+    instrument contradicts all others with all of this in the model too: that comes first. ``rate`` is the false
+    discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
+    of its own.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -297,6 +299,7 @@ class MachineExplanation:
     unlike_runs: tuple[UnlikeRun, ...] = ()
     added_together: tuple[str, ...] = ()
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
+    rate: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)

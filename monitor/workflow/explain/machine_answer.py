@@ -227,7 +227,10 @@ def is_hopeless(explanation: Explanation) -> bool:
 
 def mistakes_found(mistakes: Sequence[Mistake]) -> list[MistakeFound]:
     """Mistakes as a sentence says them."""
-    return [MistakeFound(each.what, each.rms_as_recorded, each.rms_undone, each.enough) for each in mistakes]
+    return [
+        MistakeFound(each.what, each.rms_as_recorded, each.rms_undone, each.enough, each.untried)
+        for each in mistakes
+    ]
 
 
 def _as_said(effect: MachineMissing) -> MissingEffect:

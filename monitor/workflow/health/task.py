@@ -20,9 +20,8 @@ from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.reporting.health.sentences import Step, StepFailed
 from monitor.store import StoredIdentification, StoredModel
-from monitor.workflow.explain.explain import explanation_of, first_fit
+from monitor.workflow.explain.explain import explained, explanation_of, first_fit
 from monitor.workflow.explain.explain_answer import MachineExplanation
-from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.version_answer import HistoryAnswer
 from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
@@ -149,7 +148,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         uncertainty = attempted(lambda: fitted.uncertainty, Step.UNCERTAINTY, remarks)
     if task.explanation:
         explanation = attempted(
-            lambda: machine_explanation(explanation_of(task.past, task.model, fitted.robust)),
+            lambda: explained(explanation_of(task.past, task.model, fitted.robust), task.past, task.model),
             Step.COMPARISON,
             remarks,
         )

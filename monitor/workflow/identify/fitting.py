@@ -10,6 +10,7 @@ from monitor.discovery import Fit, fit
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
@@ -50,6 +51,17 @@ def explained_refusals(campaign: Campaign, model: StoredModel) -> Iterator[None]
         raise refusal_of(refusal, campaign, lambda changed: machine_problem(changed, model)) from refusal
 
 
+def machine_fit(campaign: Campaign, model: StoredModel, problem: ChainProblem | None = None) -> Fit:
+    """A model fitted to a machine's campaign, of which ``problem`` is made where it is not given.
+
+    Raises DataError where the readings do not suffice, with what looks wrong in the file where that can be said.
+    """
+    with explained_refusals(campaign, model):
+        fitted = fit(problem or machine_problem(campaign, model))
+        refuse_exact_fits(fitted.problem, fitted.solution)
+    return fitted
+
+
 def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | CurveFit:
     """A version of a model fitted to a campaign.
 
@@ -57,8 +69,7 @@ def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | Curv
     """
     if isinstance(campaign, CurveCampaign):
         return campaign_method(campaign).fit(curve_problem(campaign, model))
-    with explained_refusals(campaign, model):
-        return fit(machine_problem(campaign, model))
+    return machine_fit(campaign, model)
 
 
 def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:

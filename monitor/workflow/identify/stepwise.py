@@ -7,6 +7,7 @@ import numpy as np
 from monitor.methods import Stepwise, campaign_method
 from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.store import Database
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
@@ -30,6 +31,7 @@ def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
     with explained_refusals(campaign, model):
         problem = machine_problem(campaign, model)
         solution = solve_problem(problem)
+        refuse_exact_fits(problem, solution)
     coefficients = stepwise.coefficients(problem, solution, number)
     return StepwiseAnswer(
         request.campaign,

@@ -12,6 +12,7 @@ from monitor.exceptions import NotFoundError
 from monitor.methods import campaign_method
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.methods.instruments import suspects
 from monitor.methods.method import Instruments, InstrumentShare, Unable
 from monitor.records import Array
@@ -55,6 +56,7 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
         )
     with explained_refusals(campaign, model):
         solution = solve_problem(problem)
+        refuse_exact_fits(problem, solution)
     of_all, beforehand = ability.shares(problem, solution, run)
     parameters, open_ones = _parameters(problem, solution, run, of_all, beforehand)
     return InstrumentsAnswer(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.discovery import Fit, fit
+from monitor.discovery import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.distances import DECIDES
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
@@ -13,7 +13,7 @@ from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.explain.explain_answer import DeviationsApart
-from monitor.workflow.identify.fitting import explained_refusals, machine_problem
+from monitor.workflow.identify.fitting import machine_fit
 from monitor.workflow.plan.answer import SeparationAnswer, SeparationVerdict
 from monitor.workflow.plan.strokes import strokes_of
 
@@ -26,9 +26,7 @@ def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -
 
     Raises EffectError for an effect that the machine does not have.
     """
-    with explained_refusals(campaign, model):
-        fitted = fit(machine_problem(campaign, model))
-    return separation_of(fitted, campaign, texts)
+    return separation_of(machine_fit(campaign, model), campaign, texts)
 
 
 def separation_of(fitted: Fit, campaign: Campaign, texts: tuple[str, str]) -> SeparationAnswer:

@@ -17,7 +17,7 @@ from monitor.records import Array, Campaign, CurveCampaign, Probings
 from monitor.store import Database, StoredModel
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.compare_answer import MachinePart
-from monitor.workflow.identify.fitting import explained_refusals, machine_problem
+from monitor.workflow.identify.fitting import machine_fit, machine_problem
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve_for, subject_of
 from monitor.workflow.predict.answer import PredictAnswer, PredictedRow
@@ -148,9 +148,8 @@ def _driven_by(problem: ChainProblem, drivers: tuple[type, ...]) -> tuple[str, .
 
 def _by_parts(campaign: Campaign, model: StoredModel) -> PredictAnswer:
     """Every part of the poses predicted from the others."""
-    with explained_refusals(campaign, model):
-        problem = machine_problem(campaign, model)
-        whole = fit(problem)
+    whole = machine_fit(campaign, model)
+    problem = whole.problem
     pose = poses_of(whole)
     blocks = min(BLOCKS, int(pose[-1]) + 1)
     parts = min(PARTS, blocks)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.discovery import Fit, fit, robust_fit
+from monitor.discovery import Fit, robust_fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
 from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects.catalogue import catalogue
@@ -41,7 +41,7 @@ from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.runs.sensitivity import sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
-from monitor.workflow.identify.fitting import explained_refusals, machine_problem
+from monitor.workflow.identify.fitting import explained_refusals, machine_fit, machine_problem
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
@@ -140,8 +140,7 @@ def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest
     of_run = problem.context.run == (problem.runs[-1] if request.run is None else request.run)
     # Before the fit, which takes minutes and memory where the rows are so many: a number is a reading or more.
     _refuse_too_many(int(np.isfinite(problem.sigma[of_run]).sum()), request.method)
-    with explained_refusals(campaign, model):
-        fitted = fit(problem)
+    fitted = machine_fit(campaign, model, problem)
     selected = None
     if request.select is not None:
         selected = selected_readings(db, request.select, campaign.name, model, fitted.problem)

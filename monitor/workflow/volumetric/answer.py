@@ -70,6 +70,19 @@ class LeftOutOfMap:
 
 
 @dataclass(frozen=True)
+class BetweenPoints:
+    """An error in the map, up to ``size`` along its ``axis``, that repeats every ``pitch_mm`` where the points of the
+    map are ``spacing_mm`` apart: what it does between them is in no number of the map."""
+
+    effect: str
+    axis: str
+    pitch_mm: float
+    spacing_mm: float
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class VolumetricAnswer:
     """The volumetric error of one run. ``k`` is the coverage factor of one length for the probability ``p``.
 
@@ -96,5 +109,6 @@ class VolumetricAnswer:
     slices: tuple[Slice, ...]
     refers_to: Mapping[str, str]
     vectors_refer_to: str
+    between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     tables: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -20,6 +20,7 @@ from monitor.workflow.volumetric.answer import (
     PoseError,
     VolumetricAnswer,
 )
+from monitor.workflow.volumetric.between_points import between_points
 from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose
 
 AXES = "xyz"
@@ -61,6 +62,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         slices=_slices(mapped, k),
         refers_to=refers_to((*error.names, *mapped.left_out), chain),
         vectors_refer_to=VECTORS,
+        between_points=between_points(mapped) or None,
     )
 
 

@@ -29,12 +29,14 @@ Maker = Callable[[Campaign], ChainProblem]
 @dataclass(frozen=True)
 class Mistake:
     """A likely mistake of the file: ``what`` in words, and the RMS of all coordinates in mm with it and without. Where
-    it is not ``enough``, it comes nearest of all that are tried and leaves more than effects of a machine may."""
+    it is not ``enough``, it comes nearest of all that are tried and leaves more than effects of a machine may.
+    ``untried`` setups or instruments contradict besides, less than those that were tried."""
 
     what: str
     rms_as_recorded: float
     rms_undone: float
     enough: bool = True
+    untried: int = 0
 
 
 def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:

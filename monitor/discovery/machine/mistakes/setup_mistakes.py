@@ -121,7 +121,7 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
             return ()
         of_tried = refitted
     for run in islice(reversed(of_tried.problem.runs), MOST_RUNS):
-        doubted = _doubted(
+        doubted, untried = _doubted(
             ability.contrasts(of_tried.problem, of_tried.solution, int(run)),
             ability.scatters(of_tried.problem, of_tried.solution, int(run)),
         )
@@ -133,7 +133,7 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
             for cure in sorted(alike, key=lambda cure: cure.fit.sum_of_squares):
                 fit = cure.fit if tried is campaign else fitted(cure.undone(campaign), problem_of)
                 if fit is not None:
-                    mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains))
+                    mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains, untried))
             return tuple(mistakes)
     return ()
 
@@ -155,9 +155,9 @@ def only_misread(campaign: Campaign, problem_of: Maker) -> str | None:
     return misread[0] if agrees else None
 
 
-def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> list[_Doubted]:
+def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> tuple[list[_Doubted], int]:
     """Whose mistakes are tried: the suspects of those that contradict all others, else all that do; and the setups that
-    contradict themselves."""
+    contradict themselves. And of how many more, which contradict less, none is tried."""
     contradiction = who_contradicts(every)
     against: Sequence[Contrast] = ()
     if contradiction is not None:
@@ -188,7 +188,8 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> lis
     ]
     # Where many do, it is the machine that the model does not describe: a mistake would be the largest.
     scattering.sort(key=lambda each: -each.excess)
-    return [*doubted, *too_still, *scattering[:MOST_TRIED]]
+    untried = max(len(against) - MOST_TRIED, 0) + max(len(scattering) - MOST_TRIED, 0)
+    return [*doubted, *too_still, *scattering[:MOST_TRIED]], untried
 
 
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
