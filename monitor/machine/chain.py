@@ -129,7 +129,8 @@ def _derivatives(branch: _Branch, point: Array, to_work: Array, sign: float, out
         for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             part = turn[..., y, :] * lever[..., z, None] - turn[..., z, :] * lever[..., y, None]
             moved[..., x, joint, stage, 3:] = part
-    out[...] = ((sign * to_work) @ moved.reshape(*moved.shape[:-3], 12 * moved.shape[-3])).reshape(out.shape)
+    side_by_side = moved.reshape(*moved.shape[:-3], 6 * len(branch.turns))
+    out[...] = ((sign * to_work) @ side_by_side).reshape(out.shape)
 
 
 def evaluate(

@@ -94,15 +94,15 @@ class ChainSearch:
     def under(self, first: Fit, beside_curves: Suspects | None = None) -> ChainRound:
         """Search until nothing changes, from a fit that leaves the ``gross`` readings out; beside the curves of joints
         one that leaves out the suspects so far."""
-        known = _Known()
-        latest, settled = self._settled(first, beside_curves, None, known)
+        before = _Found()
+        latest, settled = self._settled(first, beside_curves, None, before)
         # Of few runs effects may take up noise that walks, or noise an effect, and either stands under its own noise.
         few = beside_curves is None and len(self.problem.runs) <= FEWEST
         by_poses = poses_of_rows(first) is not None
         doubtful = any(not by_poses or _may_be_a_walk(effect) for effect in latest.effects)
         correlation = correlation_under(first, shared=True) if few and doubtful else None
         if correlation is not None:
-            other, other_settled = self._settled(first, beside_curves, correlation, known)
+            other, other_settled = self._settled(first, beside_curves, correlation, before)
             # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good, on
             # whichever side they are.
             margin = 2.0 * float(np.log((1.0 - self.rate) / self.rate))
@@ -120,11 +120,11 @@ class ChainSearch:
         return replace(latest, limits=tuple(limit for limit, is_reached in reached.items() if is_reached))
 
     def _settled(
-        self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None, known: _Known
+        self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None, before: _Found
     ) -> tuple[ChainRound, bool]:
         """What stands in the end, and whether it settled: from noise of so correlated neighbours on, to which belongs
         what runs share as long as no effect explains it, or from white noise and what runs do not share."""
-        rounds = _Rounds(self, first, beside_curves, correlation, known)
+        rounds = _Rounds(self, first, beside_curves, correlation, before)
         latest, settled = in_rounds(rounds, MOST_ROUNDS)
         if not settled:
             latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
@@ -155,7 +155,7 @@ NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]
 
 
 @dataclass
-class _Known:
+class _Found:
     """What searches of one problem, from white noise and from that of neighbours, need to find out but once: the
     ``rounds`` under the same conditions, and the ``suspects`` beside the same effects in the same noise."""
 
@@ -173,10 +173,10 @@ class _Rounds:
         first: Fit,
         beside_curves: Suspects | None,
         correlation: Correlation | None,
-        known: _Known,
+        before: _Found,
     ) -> None:
         self.search = search
-        self.known = known
+        self.before = before
         self.first = first
         self.beside_curves = beside_curves is not None
         self.most_effects = MOST_BESIDE_CURVES if self.beside_curves else MOST_EFFECTS
@@ -197,11 +197,11 @@ class _Rounds:
     def round(self) -> ChainRound:
         """The effects under the present suspects and correlation, and the fit with those that can be fitted."""
         conditions = self.suspects.conditions, self.correlation, *self.unfitted
-        if conditions not in self.known.rounds:
-            found = self._round()
+        if conditions not in self.before.rounds:
+            searched = self._round()
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
-            self.known.rounds[conditions] = replace(found, scene=replace(found.scene))
-        return replace(self.known.rounds[conditions], suspects=self.suspects)
+            self.before.rounds[conditions] = replace(searched, scene=replace(searched.scene))
+        return replace(self.before.rounds[conditions], suspects=self.suspects)
 
     def _round(self) -> ChainRound:
         """Search effects under the present conditions."""
@@ -256,16 +256,16 @@ class _Rounds:
         """Judge the readings under the effects of a round, again from the ``gross`` ones where others were left out:
         what looked bad without the effects may be good."""
         problem, gross, begin = self.search.problem, self.search.gross, standing.under
-        own = self.suspects.conditions if self.beside_curves else ()
+        left_out = self.suspects.conditions if self.beside_curves else ()
         noise = None if start.whitening is None else start.whitening.correlation
-        beside = tuple(standing.effects), noise, *self.unfitted, *own
-        if beside in self.known.suspects:
-            return self.known.suspects[beside]
+        beside = tuple(standing.effects), noise, *self.unfitted, *left_out
+        if beside in self.before.suspects:
+            return self.before.suspects[beside]
         if not self.beside_curves and not self.suspects.same_as(gross):
             begin, _ = fit_those_possible(problem, standing.effects, gross.left_out(problem), start)
         same_scene = standing.scene if begin is standing.scene.fit else None
         suspects = find_suspects(begin, problem, standing.effects, gross, self._able, same_scene)
-        return self.known.suspects.setdefault(beside, suspects)
+        return self.before.suspects.setdefault(beside, suspects)
 
 
 def _may_be_a_walk(effect: MachineEffect) -> bool:
