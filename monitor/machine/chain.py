@@ -44,6 +44,26 @@ def rotation_about(direction: tuple[float, float, float], angle: Array) -> Array
     return rotation
 
 
+def small_turn(angles: Array, *, with_axes: bool) -> tuple[Array, Array]:
+    """R_C R_B R_A (..., 3, 3) for small angles (..., 3) A, B and C, element by element: a stack of small products takes
+    three times as long. In columns the axes (..., 3, 3) of their changes: R_C R_B x, R_C y and z, if asked for."""
+    sine_a, sine_b, sine_c = np.moveaxis(np.sin(angles), -1, 0)
+    cosine_a, cosine_b, cosine_c = np.moveaxis(np.cos(angles), -1, 0)
+    turn = np.empty((*angles.shape, 3))
+    turn[..., 0, 0], turn[..., 1, 0], turn[..., 2, 0] = cosine_b * cosine_c, cosine_b * sine_c, -sine_b
+    turn[..., 0, 1] = sine_a * sine_b * cosine_c - cosine_a * sine_c
+    turn[..., 1, 1] = sine_a * sine_b * sine_c + cosine_a * cosine_c
+    turn[..., 2, 1] = sine_a * cosine_b
+    turn[..., 0, 2] = cosine_a * sine_b * cosine_c + sine_a * sine_c
+    turn[..., 1, 2] = cosine_a * sine_b * sine_c - sine_a * cosine_c
+    turn[..., 2, 2] = cosine_a * cosine_b
+    axes = np.zeros(turn.shape if with_axes else (0,))
+    if with_axes:
+        axes[..., :, 0] = turn[..., :, 0]
+        axes[..., 0, 1], axes[..., 1, 1], axes[..., 2, 2] = -sine_c, cosine_c, 1.0
+    return turn, axes
+
+
 class _Branch:
     """Multiplies a branch up and remembers, where asked, the twist of every error in the bed's frame."""
 
@@ -67,19 +87,10 @@ class _Branch:
         before = self.rotation
         turned = bool(np.any(error[..., 3:]))
         if turned:
-            about_c = rotation_about((0.0, 0.0, 1.0), error[..., 5])
-            about_cb = about_c @ rotation_about((0.0, 1.0, 0.0), error[..., 4])
-            self.rotation = before @ (about_cb @ rotation_about((1.0, 0.0, 0.0), error[..., 3]))
+            turn, axes = small_turn(error[..., 3:], with_axes=self.keep)
+            self.rotation = before @ turn
         if self.keep:
-            axes = before
-            if turned:
-                # d(R_C R_B R_A) turns about R_C R_B x, R_C y and z.
-                local = np.empty((*about_c.shape[:-2], 3, 3))
-                local[..., :, 0] = about_cb[..., :, 0]
-                local[..., :, 1] = about_c[..., :, 1]
-                local[..., :, 2] = (0.0, 0.0, 1.0)
-                axes = before @ local
-            self.turns.append(axes)
+            self.turns.append(before @ axes if turned else before)
             self.centres.append(self.origin)
 
     def motion(self, joint: Joint, position: Array) -> None:
@@ -107,14 +118,19 @@ def _multiply(joints: tuple[Joint, ...], first: int, positions: Array, errors: A
 
 def _derivatives(branch: _Branch, point: Array, to_work: Array, sign: float, out: Array) -> None:
     """Fill out (..., 3, joints, 2, 6): the motion of ``point`` with each error, seen in the work frame."""
+    # All errors side by side in the bed's frame: one product turns them.
+    moved = np.empty(out.shape)
     for index, (shift, turn, centre) in enumerate(
         zip(branch.shifts, branch.turns, branch.centres, strict=True)
     ):
         joint, stage = divmod(index, 2)
-        out[..., joint, stage, :3] = sign * (to_work @ shift)
-        lever = (point - centre)[..., None, :]
-        moved = np.cross(np.swapaxes(turn, -1, -2), lever)  # (..., axis, 3)
-        out[..., joint, stage, 3:] = sign * (to_work @ np.swapaxes(moved, -1, -2))
+        moved[..., joint, stage, :3] = shift
+        lever = point - centre
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            part = turn[..., y, :] * lever[..., z, None] - turn[..., z, :] * lever[..., y, None]
+            moved[..., x, joint, stage, 3:] = part
+    side_by_side = moved.reshape(*moved.shape[:-3], 6 * len(branch.turns))
+    out[...] = ((sign * to_work) @ side_by_side).reshape(out.shape)
 
 
 def evaluate(
@@ -127,14 +143,23 @@ def evaluate(
     mm in the frame of the last tool axis. Leading dimensions broadcast, so poses, runs and trials may be
     evaluated at once. Time and memory grow linearly with the number of poses.
     """
+    return _pose(chain, *_branches(chain, positions, errors, jacobian), target, tip)
+
+
+def _branches(chain: Chain, positions: Array, errors: Array, keep: bool) -> tuple[_Branch, _Branch]:
+    """The branches of work and tool."""
+    work = _multiply(chain.work, 0, positions, errors, keep)
+    return work, _multiply(chain.tool, len(chain.work), positions, errors, keep)
+
+
+def _pose(chain: Chain, work: _Branch, tool: _Branch, target: Array, tip: Array) -> ChainPose:
+    """The vector between the ends of two branches, with its derivatives where these are kept."""
     count = len(chain.work)
-    work = _multiply(chain.work, 0, positions, errors, jacobian)
-    tool = _multiply(chain.tool, count, positions, errors, jacobian)
     tip_in_bed = tool.origin + np.einsum("...ij,...j->...i", tool.rotation, tip)
     to_work = np.swapaxes(work.rotation, -1, -2)
     residual = np.einsum("...ij,...j->...i", to_work, tip_in_bed - work.origin) - target
     by_error = None
-    if jacobian:
+    if work.keep:
         by_error = np.empty((*residual.shape, len(chain.joints), 2, 6))
         # The work branch is inverted: r = T_work^-1 x, so dr = -R_work' (turn x (x - centre)).
         _derivatives(work, tip_in_bed, to_work, -1.0, by_error[..., :count, :, :])
@@ -157,14 +182,23 @@ class Orientation:
 
 def orientation(chain: Chain, positions: Array, errors: Array, *, jacobian: bool = False) -> Orientation:
     """The orientation of both sides of a chain; arguments as in ``evaluate``."""
-    count = len(chain.work)
-    work = _multiply(chain.work, 0, positions, errors, jacobian)
-    tool = _multiply(chain.tool, count, positions, errors, jacobian)
+    return _sides(chain, *_branches(chain, positions, errors, jacobian))
+
+
+def evaluate_with_sides(
+    chain: Chain, positions: Array, errors: Array, target: Array, tip: Array, *, jacobian: bool = False
+) -> tuple[ChainPose, Orientation]:
+    """As ``evaluate``, and the orientation of both sides, multiplied up once."""
+    branches = _branches(chain, positions, errors, jacobian)
+    return _pose(chain, *branches, target, tip), _sides(chain, *branches)
+
+
+def _sides(chain: Chain, work: _Branch, tool: _Branch) -> Orientation:
+    """How two branches are turned, with the derivatives where these are kept."""
     by_error = None
-    if jacobian:
-        shape = np.broadcast_shapes(positions.shape[:-1], errors.shape[:-3])
-        by_error = np.zeros((*shape, 3, len(chain.joints), 2, 6))
-        for branch, first in ((work, 0), (tool, count)):
+    if work.keep:
+        by_error = np.zeros((*work.origin.shape, len(chain.joints), 2, 6))
+        for branch, first in ((work, 0), (tool, len(chain.work))):
             for index, turn in enumerate(branch.turns):
                 joint, stage = divmod(index, 2)
                 by_error[..., first + joint, stage, 3:] = turn

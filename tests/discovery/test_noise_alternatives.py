@@ -223,7 +223,9 @@ def test_more_effects_have_to_be_likelier_by_the_odds_of_the_rate(
     monkeypatch.setattr(f"{module}.correlation_under", lambda first, shared: SLOW)
     monkeypatch.setattr(f"{module}.poses_of_rows", lambda first: None)
     monkeypatch.setattr(f"{module}.replace", lambda latest, limits: latest)
-    monkeypatch.setattr(ChainSearch, "_settled", lambda search, first, beside, noise: (rounds[noise], True))
+    monkeypatch.setattr(
+        ChainSearch, "_settled", lambda search, first, beside, noise, before: (rounds[noise], True)
+    )
     monkeypatch.setattr(ChainSearch, "_cost", lambda search, first, latest: latest.cost)
     for each in rounds.values():
         each.suspects = SimpleNamespace(bad=())

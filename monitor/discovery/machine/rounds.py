@@ -4,7 +4,7 @@ neighbours that the effects leave."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TypeAlias
 
@@ -94,14 +94,15 @@ class ChainSearch:
     def under(self, first: Fit, beside_curves: Suspects | None = None) -> ChainRound:
         """Search until nothing changes, from a fit that leaves the ``gross`` readings out; beside the curves of joints
         one that leaves out the suspects so far."""
-        latest, settled = self._settled(first, beside_curves, None)
+        before = _Found()
+        latest, settled = self._settled(first, beside_curves, None, before)
         # Of few runs effects may take up noise that walks, or noise an effect, and either stands under its own noise.
         few = beside_curves is None and len(self.problem.runs) <= FEWEST
         by_poses = poses_of_rows(first) is not None
         doubtful = any(not by_poses or _may_be_a_walk(effect) for effect in latest.effects)
         correlation = correlation_under(first, shared=True) if few and doubtful else None
         if correlation is not None:
-            other, other_settled = self._settled(first, beside_curves, correlation)
+            other, other_settled = self._settled(first, beside_curves, correlation, before)
             # An error of so many in a hundred goes for this decision too: the odds of effects have to be as good, on
             # whichever side they are.
             margin = 2.0 * float(np.log((1.0 - self.rate) / self.rate))
@@ -119,11 +120,11 @@ class ChainSearch:
         return replace(latest, limits=tuple(limit for limit, is_reached in reached.items() if is_reached))
 
     def _settled(
-        self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None
+        self, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None, before: _Found
     ) -> tuple[ChainRound, bool]:
         """What stands in the end, and whether it settled: from noise of so correlated neighbours on, to which belongs
         what runs share as long as no effect explains it, or from white noise and what runs do not share."""
-        rounds = _Rounds(self, first, beside_curves, correlation)
+        rounds = _Rounds(self, first, beside_curves, correlation, before)
         latest, settled = in_rounds(rounds, MOST_ROUNDS)
         if not settled:
             latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
@@ -153,14 +154,29 @@ class ChainSearch:
 NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]
 
 
+@dataclass
+class _Found:
+    """What searches of one problem, from white noise and from that of neighbours, need to find out but once: the
+    ``rounds`` under the same conditions, and the ``suspects`` beside the same effects in the same noise."""
+
+    rounds: dict[tuple[object, ...], ChainRound] = field(default_factory=dict)
+    suspects: dict[tuple[object, ...], Suspects] = field(default_factory=dict)
+
+
 class _Rounds:
     """The rounds of a search on a chain, and the conditions of the present one: suspects, the correlation of neighbours
     and the families that cannot be fitted."""
 
     def __init__(
-        self, search: ChainSearch, first: Fit, beside_curves: Suspects | None, correlation: Correlation | None
+        self,
+        search: ChainSearch,
+        first: Fit,
+        beside_curves: Suspects | None,
+        correlation: Correlation | None,
+        before: _Found,
     ) -> None:
         self.search = search
+        self.before = before
         self.first = first
         self.beside_curves = beside_curves is not None
         self.most_effects = MOST_BESIDE_CURVES if self.beside_curves else MOST_EFFECTS
@@ -179,7 +195,16 @@ class _Rounds:
         return with_scatter_of(self.first, self.search.problem, self.initial)
 
     def round(self) -> ChainRound:
-        """Search effects under the present suspects and correlation, and fit those that can be."""
+        """The effects under the present suspects and correlation, and the fit with those that can be fitted."""
+        conditions = self.suspects.conditions, self.correlation, *self.unfitted
+        if conditions not in self.before.rounds:
+            searched = self._round()
+            # What effects beside each other leave was of this search: a scene without it is a fifth as large.
+            self.before.rounds[conditions] = replace(searched, scene=replace(searched.scene))
+        return replace(self.before.rounds[conditions], suspects=self.suspects)
+
+    def _round(self) -> ChainRound:
+        """Search effects under the present conditions."""
         problem, suspects = self.search.problem, self.suspects
         out, single = suspects.left_out(problem), suspects.effects(problem)
         current = self.first
@@ -231,10 +256,16 @@ class _Rounds:
         """Judge the readings under the effects of a round, again from the ``gross`` ones where others were left out:
         what looked bad without the effects may be good."""
         problem, gross, begin = self.search.problem, self.search.gross, standing.under
+        left_out = self.suspects.conditions if self.beside_curves else ()
+        noise = None if start.whitening is None else start.whitening.correlation
+        beside = tuple(standing.effects), noise, *self.unfitted, *left_out
+        if beside in self.before.suspects:
+            return self.before.suspects[beside]
         if not self.beside_curves and not self.suspects.same_as(gross):
             begin, _ = fit_those_possible(problem, standing.effects, gross.left_out(problem), start)
         same_scene = standing.scene if begin is standing.scene.fit else None
-        return find_suspects(begin, problem, standing.effects, gross, self._able, same_scene)
+        suspects = find_suspects(begin, problem, standing.effects, gross, self._able, same_scene)
+        return self.before.suspects.setdefault(beside, suspects)
 
 
 def _may_be_a_walk(effect: MachineEffect) -> bool:

@@ -25,8 +25,12 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene_columns import columns_of, raw_columns, raw_lengths
 from monitor.discovery.search.candidate import Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.remainder import Remainders
-from monitor.effects import Basis, ParsedEffect
+from monitor.discovery.search.scene import family_count
+from monitor.effects import Basis, ChainEffect, ParsedEffect
+from monitor.effects.drivers import Always
+from monitor.effects.shapes import Poly
 from monitor.exceptions import EffectError
 from monitor.methods.chain.shared_effects import largest_coefficient
 from monitor.records import Array
@@ -103,6 +107,16 @@ class ChainScene:
         # Of the columns alone: with the scene it would be a circle, which stays until Python looks for garbage.
         return Remainders(self.residual, self.degrees_of_freedom, partial(_side_by_side, self.shared))
 
+    @cached_property
+    def families(self) -> int:
+        """The number of families of which the data see anything."""
+        return family_count(self)
+
+    @cached_property
+    def powers(self) -> tuple[ChainCandidate, ...]:
+        """The powers of a position that the data see anything of and that follow no driver."""
+        return tuple(filter(_is_power, self.candidates))
+
     @property
     def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
         """Those of runs (of blocks of poses where there is one run), and of poses left out of every run."""
@@ -125,6 +139,16 @@ class ChainScene:
         error = held_out_by_poses(self.fit.white, columns, self._pose_folds)
         return None if error is None else self.fit.sigma * error
 
+    @cached_property
+    def _errors_by_poses(self) -> Memory[float | None]:
+        return Memory()
+
+    def error_by_poses_beside(self, selected: Sequence[ChainCandidate]) -> float | None:
+        """That error with selected effects, to which each that may come to them is compared."""
+        return self._errors_by_poses.answer(
+            selected, None, lambda: self.held_out_error_by_poses(self.columns(selected))
+        )
+
     def held_out_error_of(self, columns: Array, fold: npt.NDArray[np.int64]) -> float | None:
         """Root mean square error in mm with ``columns`` (M, c) of shared effects; ``fold`` (R,) is that of every run.
 
@@ -144,6 +168,13 @@ class ChainScene:
         if parts is None:
             return None
         return LeftOutBlocks(self.fit.nuisance.basis.reshape(len(self.residual), -1), parts)
+
+
+def _is_power(candidate: ChainCandidate) -> bool:
+    effect = candidate.effect
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+        return False
+    return candidate.visible and isinstance(effect.shape, Poly)
 
 
 def _side_by_side(shared: Array, candidates: Sequence[Candidate[object]]) -> Array:

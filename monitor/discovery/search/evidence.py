@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from typing import Generic
 
 import numpy as np
@@ -208,7 +209,7 @@ def _weighed(
         large[members] = np.sqrt(np.sum((coefficients / pool.lengths[rows]) ** 2, axis=-1))
     rank[large > BEYOND * pool.largest] = 0
     weighed = evidence_of(pool, explained, rank, (total, dof), large > pool.largest)
-    return sorted(weighed, key=lambda evidence: -evidence.score)
+    return sorted(weighed, key=attrgetter("score"), reverse=True)
 
 
 def weigh_beside(
@@ -235,7 +236,8 @@ def explained_by(
     """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
     coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show. Directions with a
     part (squared) of at most ``least`` (...) are held."""
-    values, vectors = np.linalg.eigh(gram)
+    # Of one coefficient the product is its own eigenvalue.
+    values, vectors = np.linalg.eigh(gram) if gram.shape[-1] > 1 else (gram[..., 0], np.ones_like(gram))
     keep = values > (SMALLEST_REMAINDER if least is None else least[..., None])
     along = np.einsum("...ij,...i->...j", vectors, onto)
     inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
@@ -265,13 +267,8 @@ def evidence_of(
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
     price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
     score = np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
-    return [
-        Evidence(
-            candidate, float(explained[index]) if able[index] else 0.0, int(rank[index]), float(f[index]),
-            float(p_value[index]), float(score[index]), bool(too_large[index]),
-        )
-        for index, candidate in enumerate(pool.candidates)
-    ]  # fmt: skip
+    values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
+    return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
 
 
 def best_of_families(weighed: Sequence[Evidence[CandidateT]]) -> list[Evidence[CandidateT]]:

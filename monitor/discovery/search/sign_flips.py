@@ -98,9 +98,12 @@ def p_value_by_flips(
             np.swapaxes(vectors, -1, -2)
             * np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)[..., None]
         )
-        flipped = (scores[rows].reshape(-1, runs) @ flips).reshape(*rows.shape, -1)
-        explained = np.sum((scaled @ flipped) ** 2, axis=1)
-        beaten |= np.any(explained >= needed[:, None], axis=0)
+        along = scaled @ scores[rows]
+        # No signs make more of a candidate than the lengths of its scores one after the other.
+        most = np.sum(np.sqrt(np.sum(along**2, axis=1)), axis=1) ** 2
+        along, needed = (each[most >= (1.0 - ROUNDING) * needed] for each in (along, needed))
+        flipped = (along.reshape(-1, runs) @ flips).reshape(*along.shape[:2], flips.shape[1])
+        beaten |= np.any(np.sum(flipped**2, axis=1) >= needed[:, None], axis=0)
     return float((1 + int(beaten.sum())) / (1 + flips.shape[1]))
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from monitor.effects import ArtefactEffect, ChainEffect, Effect
 from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sight, of_zeros
 from monitor.effects.effect import InstrumentBasis
-from monitor.machine import ChainPose, Orientation, evaluate, orientation
+from monitor.machine import ChainPose, Orientation, evaluate, evaluate_with_sides, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.problem import ChainProblem
@@ -241,8 +241,9 @@ class InstrumentProblem(ChainProblem):
             local = self.start + np.einsum("rpq,rq->rp", self._separated, local - self.start)
         context, nuisance = self.context, self.own_of(local)
         errors, work, tool = self.state(local, common)
-        pose = evaluate(context.chain, context.positions, errors, work, tool, jacobian=jacobian)
-        sides = orientation(context.chain, context.positions, errors, jacobian=jacobian)
+        pose, sides = evaluate_with_sides(
+            context.chain, context.positions, errors, work, tool, jacobian=jacobian
+        )
         count, numbers = len(context), self.sigma.shape[1]
         residual, by_own = np.zeros((count, numbers)), np.zeros((count, numbers, nuisance.shape[1]))
         by_error = np.zeros((count, numbers, len(context.chain.joints), 2, 6)) if jacobian else None

@@ -17,9 +17,6 @@ from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.plausible import nearly_cancelled
-from monitor.effects import ChainEffect
-from monitor.effects.drivers import Always
-from monitor.effects.shapes import Poly
 
 
 def bends_instead(
@@ -28,7 +25,7 @@ def bends_instead(
     """The powers of the position that say together, beside others, at least as much of an error as its free shape, of
     which ``worth`` is the score at its price; none where no two or three do, or where they raise the error at poses
     left out."""
-    powers = [shape for shape in scene.candidates if _is_power(shape) and error_of(shape) == symbol]
+    powers = [shape for shape in scene.powers if error_of(shape) == symbol]
     together = [list(some) for size in (2, 3) for some in combinations(powers, size)]
     if not together:
         return []
@@ -42,7 +39,7 @@ def foretells_poses(
     scene: ChainScene, effects: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
 ) -> bool:
     """Whether effects beside others lower the error at poses left out of every run; true with too few poses."""
-    before = scene.held_out_error_by_poses(scene.columns(others))
+    before = scene.error_by_poses_beside(others)
     after = scene.held_out_error_by_poses(scene.columns([*others, *effects]))
     return before is None or after is None or after < before
 
@@ -70,10 +67,3 @@ def score_beside(
         weigh_beside(scene, [candidate], [*others, *selected[:index]])[0].score
         for index, candidate in enumerate(selected)
     )
-
-
-def _is_power(candidate: ChainCandidate) -> bool:
-    effect = candidate.effect
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
-        return False
-    return candidate.visible and isinstance(effect.shape, Poly)

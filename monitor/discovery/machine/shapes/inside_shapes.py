@@ -23,7 +23,6 @@ from monitor.discovery.machine.shapes.free_parts import (
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING
-from monitor.discovery.search.scene import family_count
 
 # An effect stands out beside others at this level: one finding in a thousand.
 LEVEL = 1e-3
@@ -48,13 +47,13 @@ def standing_beside(
     standing: list[ChainCandidate] = []
     for effect in effects:
         (evidence,) = weigh_beside(scene, [effect], [*others, *standing])
-        if evidence.p_value * family_count(scene) < LEVEL:
+        if evidence.p_value * scene.families < LEVEL:
             standing.append(effect)
     return standing
 
 
 def with_those_outside(scene: ChainScene, selected: list[ChainCandidate]) -> list[ChainCandidate]:
-    """The selected effects without those inside a free shape among them, whose parts are selected anew where some go."""
+    """The selected effects without those inside a free shape; where some go its parts are selected anew."""
     for free in filter(is_free, list(selected)):
         outside = _beside_shape(scene, free, [each for each in selected if each is not free])
         if {each.family for each in outside} != {each.family for each in selected}:

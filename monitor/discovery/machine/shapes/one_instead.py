@@ -23,7 +23,6 @@ from monitor.discovery.machine.shapes.free_parts import (
 )
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.search.scan import WORTH_EXCHANGING
-from monitor.discovery.search.scene import family_count
 
 
 def one_instead(
@@ -33,7 +32,7 @@ def one_instead(
     price of the choice of each; None where none does, or where nothing of them was sought."""
     if len(several) < 2 or all(shape.variant.tries == 1 for shape in several):
         return None
-    choice = 2.0 * float(np.log(family_count(scene)))
+    choice = 2.0 * float(np.log(scene.families))
     worth = score_beside(scene, several, others) - choice * len(several) + WORTH_EXCHANGING
     sought = [shape for shape in several if shape.variant.tries > 1]
     ones = [refine(scene, [*others, shape], len(others)).candidate for shape in sought]

@@ -140,6 +140,19 @@ class TeethOfError:
 
     def _cycle_instead(self, sawtooth: _Weighed, others: Sequence[ChainCandidate]) -> ChainCandidate:
         """The plain cycle that says at least as much as a sawtooth beside others, else that."""
+        weighed = weigh_beside(self.scene, self._cycles, others)
+        if not weighed:
+            return sawtooth.candidate
+        cycle = refine(self.scene, [*others, weighed[0].candidate], len(others)).candidate
+        return (
+            cycle
+            if weigh_beside(self.scene, [cycle], others)[0].score >= sawtooth.score
+            else sawtooth.candidate
+        )
+
+    @cached_property
+    def _cycles(self) -> list[ChainCandidate]:
+        """The plain cycles of so many periods over the travel that the data see."""
         travel, symbol = self._range[1], self.effect.term.symbol
         periods = np.arange(FEWEST_PERIODS, MOST_TEETH, travel * frequency_step(travel))
         variants = [
@@ -153,21 +166,20 @@ class TeethOfError:
             for number in periods.tolist()
         ]
         shown = resolvable(variants, self.scene.fit.problem.context)
-        cycles = [each for each in scene_of(self.scene.fit, shown).candidates if each.visible]
-        weighed = weigh_beside(self.scene, cycles, others)
-        if not weighed:
-            return sawtooth.candidate
-        cycle = refine(self.scene, [*others, weighed[0].candidate], len(others)).candidate
-        return (
-            cycle
-            if weigh_beside(self.scene, [cycle], others)[0].score >= sawtooth.score
-            else sawtooth.candidate
-        )
+        return [each for each in scene_of(self.scene.fit, shown).candidates if each.visible]
+
+    @cached_property
+    def _looked_at(self) -> dict[tuple[float, ...], _Sawtooths]:
+        return {}
 
     def _near(self, grid_point: tuple[float, float], widths: tuple[float, float]) -> _Sawtooths:
         """The sawtooths about a number of teeth and a phase, as far as these widths."""
-        steps = np.linspace(-1.0, 1.0, 2 * FINER + 1)
-        return self._of(grid_point[0] + widths[0] * steps, grid_point[1] + widths[1] * steps)
+        # Beside other effects the best of an error often is the same.
+        if (*grid_point, *widths) not in self._looked_at:
+            steps = np.linspace(-1.0, 1.0, 2 * FINER + 1)
+            near = self._of(grid_point[0] + widths[0] * steps, grid_point[1] + widths[1] * steps)
+            self._looked_at[*grid_point, *widths] = near
+        return self._looked_at[*grid_point, *widths]
 
     def _weighed(self, sawtooths: _Sawtooths, others: Sequence[ChainCandidate]) -> list[_Weighed]:
         """Sawtooths beside others, the most convincing first; none where the data see none."""

@@ -53,7 +53,6 @@ from monitor.discovery.search.scan import (
     findings_of,
     findings_without_rivals,
 )
-from monitor.discovery.search.scene import family_count
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
@@ -246,7 +245,7 @@ def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> 
     """Whether some candidate stands out beside selected effects: a scan that ends so was led astray by one of them."""
     pool = [candidate for candidate in scene.candidates if candidate.visible]
     weighed = weigh_beside(scene, pool, selected)
-    return bool(weighed) and weighed[0].p_value * family_count(scene) < LEVEL
+    return bool(weighed) and weighed[0].p_value * scene.families < LEVEL
 
 
 def _is_any_curve(candidate: ChainCandidate) -> bool:

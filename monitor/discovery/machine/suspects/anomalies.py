@@ -15,7 +15,7 @@ import scipy
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.noise.plan_cells import plan_cells
-from monitor.discovery.machine.suspects.tails import Tails, tails_of
+from monitor.discovery.machine.suspects.tails import Shifts, tails_of
 from monitor.methods.chain.gross import off_reading
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
@@ -204,10 +204,13 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01, deviations: Deviations | None =
     tests = 0
     for run, rows in enumerate(deviations.rows):
         best: BallMove | None = None
+        vectors = deviations.vectors[rows] / np.sqrt(deviations.inflation[rows])[:, None]
+        judged = ~fit.left_out[rows]
+        under_tails = Shifts(tails, vectors[judged], deviations.of_run(run)[judged])
         for target in np.intersect1d(context.target[rows], fit.problem.movable):
             touches = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
             tests += max(len(touches) - 2 * TOUCHES_EACH_SIDE + 1, 0)
-            move = _ball_move(fit, deviations, tails, run, touches)
+            move = _ball_move(fit, deviations, under_tails, run, touches)
             if move is not None:
                 # Where the others drift as well, a mean of touches knows less than their number says.
                 share = _shared_by_neighbours(deviations.vectors[rows], context.target[rows], str(target))
@@ -241,7 +244,7 @@ def _shared_by_neighbours(vectors: Array, targets: npt.NDArray[np.str_], suspect
 
 
 def _ball_move(
-    fit: Fit, deviations: Deviations, tails: Tails, run: int, touches: npt.NDArray[np.int64]
+    fit: Fit, deviations: Deviations, under_tails: Shifts, run: int, touches: npt.NDArray[np.int64]
 ) -> BallMove | None:
     """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test, and no
     smaller than its likelihood under the tails of all touches allows."""
@@ -262,9 +265,7 @@ def _ball_move(
         return None
     moved = -basis @ shared[best].T
     moved[touches[first[best] :]] += np.eye(3)
-    vectors = deviations.vectors[rows] / np.sqrt(deviations.inflation[rows])[:, None]
-    judged = ~fit.left_out[rows]
-    likelihood = tails.shift(vectors[judged], basis[judged], moved[judged], shifts[best])
+    likelihood = under_tails.likelihood(moved[~fit.left_out[rows]], shifts[best])
     chi_square[best] = min(float(chi_square[best]), max(likelihood, 0.0))
     row = int(rows[touches[first[best]]])
     # The tip followed the ball, so the vector from where the ball was to the tip is its shift.

@@ -92,6 +92,14 @@ class Suspects:
         """What they are, without how far off."""
         return frozenset(self.bad), frozenset(self.moves), frozenset(self.scatter), self.varying
 
+    @property
+    def conditions(self) -> tuple[object, ...]:
+        """All that a fit under them depends on."""
+        out = frozenset(row for point in self.bad.values() for row in point.all_rows)
+        moves = tuple(move.text for move in self.moves.values())
+        weights = tuple((scatter.target, scatter.times) for scatter in self.scatter.values())
+        return out, moves, weights, self.varying
+
     def with_scatter(self, scatter: Scatter) -> Suspects:
         """The suspects with a target that scatters."""
         return replace(self, scatter={**self.scatter, scatter.target: scatter})

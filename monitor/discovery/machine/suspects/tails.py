@@ -8,6 +8,7 @@ as much as under Gauss (Lange, Little and Taylor, Journal of the American Statis
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -33,19 +34,7 @@ class Tails:
         """Return the weights (n,) of vectors of so many numbers with lengths squared ``squares`` (n,)."""
         return np.asarray((self.freedom + numbers) / (self.freedom + squares / self.variance))
 
-    def shift(self, vectors: Array, unknowns: Array, moved: Array, start: Array) -> float:
-        """Return twice the logarithm of the likelihood ratio of a shift (k,) that moves ``vectors`` (n, d) by ``moved``
-        (n, d, k), from ``start`` (k,) on.
-
-        With it and without it the ``unknowns`` (n, d, p) are determined anew under these tails: by least squares one
-        wild touch has moved them, and all that they move.
-        """
-        usual = np.zeros(unknowns.shape[2])
-        without = self._least_deviance(vectors, unknowns, usual)
-        both = np.concatenate([unknowns, moved], axis=2)
-        return without - self._least_deviance(vectors, both, np.concatenate([usual, start]))
-
-    def _least_deviance(self, vectors: Array, columns: Array, start: Array) -> float:
+    def least_deviance(self, vectors: Array, columns: Array, start: Array) -> float:
         """The deviance that coefficients of ``columns`` (n, d, k) leave, reweighted in turn from ``start`` (k,) on."""
         coefficients, flat = start, columns.reshape(-1, columns.shape[2])
         for _ in range(STEPS):
@@ -62,6 +51,34 @@ class Tails:
     @staticmethod
     def _squares(vectors: Array) -> Array:
         return np.asarray(np.sum(vectors**2, axis=1))
+
+
+@dataclass(frozen=True)
+class Shifts:
+    """Shifts of some of the ``vectors`` (n, d) of a run under ``tails``.
+
+    With a shift and without it the ``unknowns`` (n, d, p) of the run are determined anew under these tails: by least
+    squares one wild touch has moved them, and all that they move.
+    """
+
+    tails: Tails
+    vectors: Array
+    unknowns: Array
+
+    @cached_property
+    def _without(self) -> float:
+        return self.tails.least_deviance(self.vectors, self.unknowns, self._usual)
+
+    @property
+    def _usual(self) -> Array:
+        return np.zeros(self.unknowns.shape[2])
+
+    def likelihood(self, moved: Array, start: Array) -> float:
+        """Return twice the logarithm of the likelihood ratio of a shift (k,) that moves the vectors by ``moved``
+        (n, d, k), from ``start`` (k,) on."""
+        both = np.concatenate([self.unknowns, moved], axis=2)
+        start = np.concatenate([self._usual, start])
+        return self._without - self.tails.least_deviance(self.vectors, both, start)
 
 
 def tails_of(vectors: Array) -> Tails:

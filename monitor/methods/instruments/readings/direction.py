@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from monitor.machine import orientation
-from monitor.machine.chain import rotation_about
+from monitor.machine.chain import small_turn
 from monitor.methods.chain.first_frame import nearest_rotation
 from monitor.methods.instruments.reading import LEVER, TURN, Plain, Rows, Shown, Stance, cross_matrix
 from monitor.records import Array, Setup
@@ -23,7 +23,6 @@ from monitor.records import Array, Setup
 NEAR = 0.35
 # Nearer to the vertical than this there is no side: any direction across serves.
 UPRIGHT = 1e-6
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -101,10 +100,8 @@ class Direction(Plain):
 def frame_turn(angles: Array) -> tuple[Array, Array]:
     """Rotations (m, 3, 3) by three angles (m, 3), R_C R_B R_A, and in rows the axes (m, 3, 3) of their small
     changes."""
-    about_c = rotation_about(AXES[2], angles[:, 2])
-    about_cb = about_c @ rotation_about(AXES[1], angles[:, 1])
-    axes = np.stack([about_cb[:, :, 0], about_c[:, :, 1], np.tile(AXES[2], (len(angles), 1))], axis=1)
-    return about_cb @ rotation_about(AXES[0], angles[:, 0]), axes
+    turn, axes = small_turn(angles, with_axes=True)
+    return turn, np.swapaxes(axes, 1, 2)
 
 
 READING = Direction

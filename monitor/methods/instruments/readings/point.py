@@ -115,8 +115,7 @@ class Point(Plain):
         )
         by_shift = moved @ into
         by_own = np.zeros((count, 3, values.shape[1]))
-        for column, axis in enumerate(turns):
-            by_own[:, :, column] = np.cross(axes[:, axis], arm)
+        by_own[:, :, : len(turns)] = np.swapaxes(np.cross(axes[:, turns], arm[:, None, :]), 1, 2)
         for column, axis in enumerate(shifts, start=len(turns)):
             by_own[:, axis, column] = 1.0
         if not self.holds("targets"):
