@@ -229,9 +229,11 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
     at = "tip" if explanation.target_word == "ball" else f"{explanation.target_word}s"
     output.say(f"{effect.rank}. {effect.effect}: {effect.description.meaning}")
+    size = f"{output.rounded(effect.amplitude, effect.u)} ± {output.two_digits(effect.u)} {effect.unit}"
+    if effect.largest is not None:
+        size = f"up to {size} (the node {effect.largest})"
     output.say(
-        f"   {output.rounded(effect.amplitude, effect.u)} ± {output.two_digits(effect.u)} {effect.unit}, at most "
-        f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
+        f"   {size}, at most {effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
     if effect.refers_to is not None:

@@ -29,7 +29,7 @@ from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
-from monitor.effects.shapes import Harmonics
+from monitor.effects.shapes import Harmonics, Nodes
 from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe, describe_bend
 from monitor.records import Array
@@ -52,7 +52,8 @@ class ChainMissing(Missing):
     ``unit`` is that of ``amplitude`` where it is not that of the coefficients: the weights of many links are one angle,
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
-    only what changes within runs shows it.
+    only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
+    is the absolute value of.
     """
 
     held_out_days_before: float | None
@@ -67,6 +68,7 @@ class ChainMissing(Missing):
     within_its_shape: tuple[str, ...] = ()
     unit: Unit | None = None
     within_runs: bool = False
+    largest: str | None = None
 
 
 @dataclass(frozen=True)
@@ -278,8 +280,13 @@ def _missing(
     coefficients, covariance = sizes
     candidate, effect = refined.candidate, refined.candidate.effect
     amplitude, u = _amplitude(effect, coefficients, covariance)
-    unit, raw, curve = None, candidate.raw, None
+    parameters = effect.parameters(scene.fit.problem.context)
+    unit, raw, curve, node = None, candidate.raw, None, None
     if isinstance(effect, ChainEffect):
+        if isinstance(effect.shape, Nodes) and not isinstance(effect.driver, EachRun):
+            # The length of all nodes grows with their number: what the axis errs by is the largest of them.
+            node = int(np.abs(coefficients).argmax())
+            amplitude, u = abs(float(coefficients[node])), float(np.sqrt(covariance[node, node]))
         by_weights, by_lines = isinstance(effect.driver, LinkWeights), isinstance(effect.shape, Harmonics)
         if by_weights or by_lines:
             # Over a part of a turn low orders nearly cancel: what the joint does there is their sum.
@@ -312,7 +319,7 @@ def _missing(
         rank=index + 1,
         effect=_name(candidate),
         description=describe(effect) if travelled_periods is None else describe_bend(effect),
-        parameters=effect.parameters(scene.fit.problem.context),
+        parameters=parameters,
         units=(effect.unit,) * len(coefficients),
         coefficients=coefficients,
         covariance=covariance,
@@ -340,6 +347,7 @@ def _missing(
         unit=unit,
         nearest=candidate.variant.nearest,
         curve=curve,
+        largest=None if node is None else parameters[node],
     )
 
 
