@@ -407,8 +407,8 @@ def _with_tables(
         best = pursuit.held_out(refined)
         reading = fit.problem.context.chain.joints[joint.index].sign * joint.position / DEGREE.factor
         for count in counts:
-            nodes = np.round(np.linspace(np.floor(reading.min()), np.ceil(reading.max()), count), 2)
-            nodes = occupied(nodes, reading, LEAST_POSES)
+            even: Array = np.linspace(np.floor(reading.min()), np.ceil(reading.max()), count)
+            nodes = occupied(np.round(even, 2), reading, LEAST_POSES)
             # The zero of the joint is a base parameter: the ends are held, so that every other node has a number.
             text = nodes_text(nodes, nodes[[0, -1]])
             error = pursuit.held_out(pursuit.new(pursuit.columns([f"{joint.term}:{text}"])))

@@ -62,7 +62,8 @@ def table_variants(scene: ChainScene, selected: Sequence[ChainCandidate]) -> lis
         for count in NODES:
             if positions < POSITIONS_A_NODE * count:
                 break
-            nodes = occupied(np.round(np.linspace(low, high, count), 1), reading)
+            even: Array = np.linspace(low, high, count)
+            nodes = occupied(np.round(even, 1), reading)
             held = nodes[:1] if f"{symbol}:poly1" in sloping else nodes[[0, -1]]
             text = f"{symbol}:{nodes_text(nodes, held)}"
             variants.append(Variant(f"{symbol}:table", parse_effect(text, context.chain), len(NODES)))
