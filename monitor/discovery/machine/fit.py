@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign
 from monitor.discovery.machine.noise.plan_cells import plan_cells
-from monitor.discovery.machine.noise.rows import Rows, from_pose_to_pose, neighbours_of
+from monitor.discovery.machine.noise.rows import Rows, along_axes, from_pose_to_pose, neighbours_of
 from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError, TooFewReadingsError
@@ -126,10 +126,19 @@ class Fit:
     @cached_property
     def rows(self) -> Rows:
         """How the whitened numbers follow each other: reading by reading, or where several are read at a pose from pose
-        to pose, of which one part of the noise is common to all of them."""
+        to pose, of which one part of the noise is common to all of them. Directions may follow each other as they are
+        read, to the side and up, or along an axis: as is likeliest."""
         rows = neighbours_of(self.problem, self.by_error)
         pose = shared_poses(self.problem, self.solution)
-        return rows if pose is None else from_pose_to_pose(rows, pose)
+        rows = rows if pose is None else from_pose_to_pose(rows, pose)
+        along = along_axes(self.problem, self.by_error, rows)
+        if not along:
+            return rows
+        residual, shared = self.solution.last.residual, self._is_noise_shared
+        return min(
+            (rows, *along),
+            key=lambda turned: self._noise_design(turned, shared).least_criterion(residual),
+        )
 
     def correlation(self) -> Correlation | None:
         """The correlation of neighbours that the residuals show; None where they show none.
@@ -142,17 +151,21 @@ class Fit:
     def noise_design(self) -> NoiseDesign:
         """What the estimate of that correlation needs besides the residuals; runs of which each has poses of its own
         share nothing that would not be noise."""
+        return self._noise_design(self.rows, self._is_noise_shared)
+
+    @property
+    def _is_noise_shared(self) -> bool:
+        """Whether most poses stand in one run alone."""
         cells = plan_cells(self.problem)
         repeated = np.bincount(cells)[cells] > 1
-        return self._noise_design(shared=2 * int(repeated.sum()) < len(cells))
+        return 2 * int(repeated.sum()) < len(cells)
 
     @cached_property
     def whole_noise_design(self) -> NoiseDesign:
         """The same where what all runs share is noise too, as of one run."""
-        return self.noise_design if self.noise_design.shared else self._noise_design(shared=True)
+        return self.noise_design if self.noise_design.shared else self._noise_design(self.rows, True)
 
-    def _noise_design(self, shared: bool) -> NoiseDesign:
-        rows = self.rows
+    def _noise_design(self, rows: Rows, shared: bool) -> NoiseDesign:
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )

@@ -201,6 +201,11 @@ class NoiseDesign:
         slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
         return max((best, *slow), key=slowness)
 
+    def least_criterion(self, residual: Array) -> float:
+        """Minus twice the logarithm, but for a constant, of the restricted likelihood of residuals (R, N) under the
+        likeliest correlation."""
+        return float(self._criteria(*self._parts_of(residual)).min())
+
     def likelihoods(self, residual: Array) -> list[tuple[Correlation | None, float]]:
         """Every correlation that is tried with the restricted likelihood of residuals (R, N), the largest of them 1."""
         criteria = self._criteria(*self._parts_of(residual))
