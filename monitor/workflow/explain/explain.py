@@ -32,6 +32,7 @@ from monitor.documents import to_document
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
+from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -127,6 +128,12 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     explanation = explanation_of(campaign, model, first, rate)
     answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
     answer = with_measurements(answer, campaign, as_model(model))
+    left_out = {(reading.run, reading.sequence) for reading in answer.suspect_data}
+    blank = (
+        f"{words[0].upper()}{words[1:]}."
+        for words in blank_words(left_out & blank_rows(campaign, or_axes=True))
+    )
+    answer = replace(answer, answer=" ".join((answer.answer, *blank)))
     if not explanation.mistakes:
         final, ability = explanation.final, campaign_method(campaign).instruments
         beside = against_others(final.problem, final.solution, ability)
