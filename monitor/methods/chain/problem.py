@@ -399,14 +399,11 @@ def _best_of(
 def _mistaken_unit(problem: ChainProblem, gain: float) -> str:
     """The unit that positions, or the readings of instruments, seem to be in under a gain, in words; else empty."""
     # A tip truly moves by 1 + gain of the positions that were typed.
-    words = [
-        f"its positions were {UNIT_WORDS[unit]}" for unit in mistaken_for_mm(1.0 / (1.0 + gain), NEAR_UNIT)
-    ]
-    if not problem.measured_joints:
-        words = [
-            f"its readings were {UNIT_WORDS[unit]}" for unit in mistaken_for_mm(1.0 + gain, NEAR_UNIT)
-        ] + words
-    return f"; it looks as if {' or '.join(words)}" if words else ""
+    of_positions = mistaken_for_mm(1.0 / (1.0 + gain), NEAR_UNIT)
+    of_readings = () if problem.measured_joints else mistaken_for_mm(1.0 + gain, NEAR_UNIT)
+    mistakes = [f"its readings were {UNIT_WORDS[unit]}" for unit in of_readings]
+    mistakes += [f"its positions were {UNIT_WORDS[unit]}" for unit in of_positions]
+    return f"; it looks as if {' or '.join(mistakes)}" if mistakes else ""
 
 
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:

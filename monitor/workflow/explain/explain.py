@@ -130,8 +130,8 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     answer = with_measurements(answer, campaign, as_model(model))
     left_out = {(reading.run, reading.sequence) for reading in answer.suspect_data}
     blank = (
-        f"{words[0].upper()}{words[1:]}."
-        for words in blank_words(left_out & blank_rows(campaign, or_axes=True))
+        f"{sentence[0].upper()}{sentence[1:]}."
+        for sentence in blank_words(left_out & blank_rows(campaign, or_axes=True))
     )
     answer = replace(answer, answer=" ".join((answer.answer, *blank)))
     if not explanation.mistakes:
