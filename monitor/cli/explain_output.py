@@ -227,12 +227,16 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     )
 
 
+def _size_words(effect: MachineMissing) -> str:
+    size = f"{output.rounded(effect.amplitude, effect.u)} ± {output.two_digits(effect.u)} {effect.unit}"
+    return size if effect.largest is None else f"up to {size} (the node {effect.largest})"
+
+
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
     at = "tip" if explanation.target_word == "ball" else f"{explanation.target_word}s"
     output.say(f"{effect.rank}. {effect.effect}: {effect.description.meaning}")
     output.say(
-        f"   {output.rounded(effect.amplitude, effect.u)} ± {output.two_digits(effect.u)} {effect.unit}, at most "
-        f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
+        f"   {_size_words(effect)}, at most {effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
     if explanation.rate is not None and effect.q_value > explanation.rate:

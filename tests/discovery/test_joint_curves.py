@@ -14,6 +14,7 @@ from monitor.discovery import Fit, explain, fit
 from monitor.discovery.machine.evidence.held_out import LeftOutBlocks, pose_blocks
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.joints.joint_curves import joint_curves
+from monitor.discovery.machine.shapes.tables import occupied
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.machine.suspects.bad_poses import bad_poses
 from monitor.effects import ChainEffect, parse_effect
@@ -72,6 +73,37 @@ def curves_of(campaign: Campaign, plain: Fit) -> dict[str, tuple[float, ...]]:
 
 def test_all_lines_of_two_joints_and_none_of_the_others(campaign, plain):
     assert curves_of(campaign, plain) == {name: tuple(map(float, orders)) for name, orders in ORDERS.items()}
+
+
+def test_lines_that_the_model_has_are_looked_for_no_more(campaign):
+    """No column of a low line is left beside itself: p-values of none were asked (ValueError)."""
+    model = Model("one", added=(f"ECJ1:harmonics({','.join(map(str, ORDERS['J1']))})",))
+    more = curves_of(campaign, fit(tracker.problem_of(campaign, model)))
+    assert more == {"J3": tuple(map(float, ORDERS["J3"]))}
+
+
+def test_nodes_of_a_table_lie_where_poses_stand():
+    """One pose at 20, all others above 28: of 22 nodes 11 lay between and were told as 1e-10 +- 3e-10 urad."""
+    rng = np.random.default_rng(1)
+    reading = np.concatenate([[20.0], rng.uniform(28.04, 34.9, 299)])
+    even = np.round(np.linspace(20.0, 35.0, 24), 2)
+    nodes = occupied(even, reading, 3)
+    assert nodes[:2].tolist() == [20.0, 27.83]
+    assert set(even[even > 28.0]) <= set(nodes)
+    spread = rng.uniform(20.0, 35.0, 600)
+    assert np.array_equal(occupied(even, spread, 3), even)
+
+
+def test_every_node_of_a_table_has_a_number():
+    """Schoenberg and Whitney, Trans. Am. Math. Soc. 74 (1953) 246: a place of its own under each hat."""
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        reading = np.concatenate([rng.uniform(low, low + 4.0, 8) for low in rng.uniform(-90.0, 90.0, 4)])
+        even = np.linspace(np.floor(reading.min()), np.ceil(reading.max()), 24)
+        nodes = occupied(even, reading)
+        hats = np.stack([np.interp(reading, nodes, hat) for hat in np.eye(len(nodes))], axis=1)[:, 1:-1]
+        assert np.linalg.matrix_rank(hats) == len(nodes) - 2
+        assert len(nodes) > 3
 
 
 def test_new_poses_are_predicted_to_the_noise(robots, session, campaign, plain):

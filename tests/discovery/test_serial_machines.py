@@ -12,8 +12,8 @@ import scipy
 from scipy.spatial.transform import Rotation
 
 from monitor.discovery import Verdict, compare, explain, fit
-from monitor.discovery.machine.missing import largest_deviation
 from monitor.discovery.machine.shapes.refine import counts_readings
+from monitor.discovery.machine.sizes import largest_deviation
 from monitor.discovery.search.plausible import LARGEST_RATIO
 from monitor.effects import parse_effect
 from monitor.methods.model import Model

@@ -55,6 +55,16 @@ def test_the_ends_of_a_table_hold_what_the_base_can_do(explanation):
     assert np.all(np.abs(told - (values - line)[1:-1]) < 3.0 * u + 1e-3)
 
 
+def test_the_size_of_a_table_is_its_largest_node(explanation):
+    """It was the root of the sum of squares of all nodes, twice the bump or more with as many nodes."""
+    found = explanation.missing[0]
+    nodes = dict(zip(found.parameters, found.coefficients, strict=True))
+    u = dict(zip(found.parameters, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert found.amplitude == max(abs(value) for value in nodes.values()) == abs(nodes[found.largest])
+    assert found.u == pytest.approx(u[found.largest])
+    assert 5e-3 < found.amplitude < 8e-3 + 3.0 * found.u
+
+
 def test_shapes_of_the_catalogue_stay_what_they_are(virtual_campaigns, explained):
     sim = virtual_campaigns.simulator()
     effects = [sim.Effect("EYX:poly3", peak_um=8.0), sim.Effect("EYX:reversal", peak_um=5.0)]

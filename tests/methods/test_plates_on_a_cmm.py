@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.method import ChainMethod
 from monitor.readers import doubts, read_campaign
@@ -106,6 +107,23 @@ def test_a_plate_that_lies_gives_those_of_its_plane(
     found = off(campaign_of(tmp_path, placements, 1, height))
     assert set(found) == {"EXX", "EYY", "EC0X"}
     assert max(map(abs, found.values())) < 4.0
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [(1e-3, "readings were in metres or its positions were in µm"), (1.0 / 25.4, "readings were in inches;")],
+)
+def test_points_in_another_unit_are_named_as_such(tmp_path: Path, factor: float, said: str) -> None:
+    """Of points in metres it was said that the unit of the readings were µm."""
+    table = campaign_of(tmp_path, [LYING], 1, "") / "probings.csv"
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    for number, line in enumerate(lines):
+        cells = line.split(",")
+        cells[7:9] = [f"{factor * float(cell):.9f}" for cell in cells[7:9]]
+        lines[number] = ",".join(cells)
+    table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match=said):
+        off(tmp_path)
 
 
 def unknowns_of(folder: Path) -> int:

@@ -100,7 +100,9 @@ def test_a_wrong_unit_is_refused(simulated: Callable[..., Any]) -> None:
     campaign = simulated(1)[1]
     readings = dict(campaign.probings.readings)
     readings["X"] = readings["X"] / 1000.0
-    with pytest.raises(DataError, match=r"EXX comes out at 999 mm/mm, which is no error of a machine"):
+    with pytest.raises(
+        DataError, match=r"EXX comes out at 999 mm/mm.*it looks as if its positions were in metres"
+    ):
         samba.identify(replace(campaign, probings=replace(campaign.probings, readings=readings)))
 
 

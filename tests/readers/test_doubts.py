@@ -115,6 +115,15 @@ def test_statements_of_another_unit(altered: Callable[..., Path]) -> None:
     assert "is 1.2 mm, more than a thousandth" in bar
 
 
+def test_the_uncertainty_of_an_angle_is_named_by_its_own_key(altered: Callable[..., Path]) -> None:
+    """It was called the probe's 0.005 µm, of a key that the file does not have."""
+    stated = ("standard_uncertainty_urad = 5.0", "standard_uncertainty_urad = 0.005")
+    told = of(altered("mount-mmt-2023-07", None, stated))
+    assert [line for line in told if "standard_uncertainty" in line] == [
+        "setup stars: standard_uncertainty_urad is 0.005: is it in µrad?"
+    ]
+
+
 @pytest.mark.parametrize(
     ("example", "column"), [("cold-cold", "b_deg"), ("five-days", "c_deg"), ("tilting-table", "a_deg")]
 )

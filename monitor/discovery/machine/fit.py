@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.noise.correlation import Correlation, NoiseDesign
 from monitor.discovery.machine.noise.plan_cells import plan_cells
-from monitor.discovery.machine.noise.rows import Rows, from_pose_to_pose, neighbours_of
+from monitor.discovery.machine.noise.rows import Rows, along_axes, from_pose_to_pose, neighbours_of
 from monitor.discovery.machine.noise.whitening import Whitening
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError
@@ -124,13 +124,29 @@ class Fit:
         sigma = self.problem.padded(np.where(self.has_weight, self.problem.sigma, 0.0)[:, :, None])[..., 0]
         return float(np.sqrt(np.sum((numbers[:, : sigma.shape[1]] * sigma) ** 2) / self.readings))
 
-    @cached_property
+    @property
     def rows(self) -> Rows:
-        """How the whitened numbers follow each other: reading by reading, or where several are read at a pose from pose
-        to pose, of which one part of the noise is common to all of them."""
+        """How the whitened numbers follow each other, in the frame in which they do."""
+        return self._layouts[self.frame]
+
+    @cached_property
+    def _layouts(self) -> tuple[Rows, ...]:
+        """How the whitened numbers may follow each other: reading by reading, or where several are read at a pose from
+        pose to pose, of which one part of the noise is common to all of them; directions along the axes too."""
         rows = neighbours_of(self.problem, self.by_error)
         pose = shared_poses(self.problem, self.solution)
-        return rows if pose is None else from_pose_to_pose(rows, pose)
+        rows = rows if pose is None else from_pose_to_pose(rows, pose)
+        return rows, *along_axes(self.problem, self.by_error, rows)
+
+    @cached_property
+    def frame(self) -> int:
+        """The number of the layout in which neighbours are alike, the likeliest under the residual: asked of every
+        residual anew, for an effect that was missing looks alike in a frame of its own."""
+        if len(self._layouts) == 1:
+            return 0
+        designs = [self._noise_design(frame, self._is_noise_shared) for frame in range(len(self._layouts))]
+        residual = self.solution.last.residual
+        return int(np.argmin([design.least_criterion(residual) for design in designs]))
 
     def correlation(self) -> Correlation | None:
         """The correlation of neighbours that the residuals show; None where they show none.
@@ -143,30 +159,42 @@ class Fit:
     def noise_design(self) -> NoiseDesign:
         """What the estimate of that correlation needs besides the residuals; runs of which each has poses of its own
         share nothing that would not be noise."""
+        return self._noise_design(self.frame, self._is_noise_shared)
+
+    @property
+    def _is_noise_shared(self) -> bool:
+        """Whether most poses stand in one run alone."""
         cells = plan_cells(self.problem)
         repeated = np.bincount(cells)[cells] > 1
-        return self._noise_design(shared=2 * int(repeated.sum()) < len(cells))
+        return 2 * int(repeated.sum()) < len(cells)
 
     @cached_property
     def whole_noise_design(self) -> NoiseDesign:
         """The same where what all runs share is noise too, as of one run."""
-        return self.noise_design if self.noise_design.shared else self._noise_design(shared=True)
+        return self.noise_design if self.noise_design.shared else self._noise_design(self.frame, True)
 
-    def _noise_design(self, shared: bool) -> NoiseDesign:
-        rows = self.rows
+    def noise_design_under(self, correlation: Correlation | None, *, whole: bool) -> NoiseDesign:
+        """One of the two in the frame of a correlation."""
+        design = self.whole_noise_design if whole else self.noise_design
+        if correlation is None or correlation.frame == self.frame:
+            return design
+        return self._noise_design(correlation.frame, design.shared)
+
+    def _noise_design(self, frame: int, shared: bool) -> NoiseDesign:
+        rows = self._layouts[frame]
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )
         last = self.solution.last
         several = len(last.residual) > 1
         unknowns = last.local if several else np.concatenate([last.local, last.common], axis=2)
-        return NoiseDesign(rows, cells.astype(np.int64) - 1, eliminate(unknowns).basis, shared)
+        return NoiseDesign(rows, cells.astype(np.int64) - 1, eliminate(unknowns).basis, shared, frame)
 
     def with_correlation(self, correlation: Correlation | None) -> Fit:
         """The fit with the noise of neighbours correlated as said."""
         if correlation is None:
             return replace(self, whitening=None)
-        return replace(self, whitening=Whitening(self.rows, correlation))
+        return replace(self, whitening=Whitening(self._layouts[correlation.frame], correlation))
 
     @cached_property
     def degrees_of_freedom(self) -> int:

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
-from monitor.discovery.machine.scene_columns import raw_columns
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
-from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
+from monitor.discovery.machine.shapes.curves import Curve
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
+from monitor.discovery.machine.sizes import size_of, spread_or_length
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -28,9 +28,6 @@ from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always, EachRun
-from monitor.effects.effect import ChainBasis
-from monitor.effects.shapes import Harmonics
-from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe, describe_bend
 from monitor.records import Array
 from monitor.units import Unit
@@ -52,7 +49,8 @@ class ChainMissing(Missing):
     ``unit`` is that of ``amplitude`` where it is not that of the coefficients: the weights of many links are one angle,
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
-    only what changes within runs shows it.
+    only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
+    is the absolute value of.
     """
 
     held_out_days_before: float | None
@@ -67,6 +65,7 @@ class ChainMissing(Missing):
     within_its_shape: tuple[str, ...] = ()
     unit: Unit | None = None
     within_runs: bool = False
+    largest: str | None = None
 
 
 @dataclass(frozen=True)
@@ -224,7 +223,7 @@ def _one_with_another(scene: ChainScene, refined: Sequence[Refined]) -> int | No
 
 def _is_small(effect: MachineEffect, coefficients: Array, covariance: Array) -> bool:
     """Whether a size is below twice its standard uncertainty."""
-    size, u = _amplitude(effect, coefficients, covariance)
+    size, u = spread_or_length(effect, coefficients, covariance)
     return u > 0 and abs(size) / u < SMALLEST_RATIO
 
 
@@ -236,26 +235,6 @@ def _likelihood_without(
     index = remaining - (without < remaining)
     best = refine(scene, rest, index).candidate
     return weigh_beside(scene, [best], except_for(rest, index))[0].likelihood
-
-
-def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) -> tuple[float, float]:
-    """The length of the coefficients, or the spread of sizes of the runs, with its standard uncertainty."""
-    if len(coefficients) == 1 or not isinstance(effect.driver, EachRun):
-        return length_of(coefficients, covariance)
-    # The spread of the sizes less what noise adds to it, and the uncertainty of a variance from R sizes.
-    noise = float(np.mean(np.diag(covariance)))
-    total = float(np.var(coefficients, ddof=1))
-    spread = float(np.sqrt(max(total - noise, 0.0)))
-    u_of_variance = total * float(np.sqrt(2.0 / (len(coefficients) - 1)))
-    return spread, u_of_variance / (2.0 * max(spread, float(np.sqrt(noise))))
-
-
-def largest_deviation(columns: Array, coefficients: Array, covariance: Array) -> tuple[float, float]:
-    """The largest deviation from its mean of an error with columns (n, k), and its standard uncertainty; in absolute
-    value, for the coefficients of several weights have no sign in common."""
-    apart = columns - columns.mean(axis=0)
-    row = apart[int(np.abs(apart @ coefficients).argmax())]
-    return abs(float(row @ coefficients)), float(np.sqrt(max(row @ covariance @ row, 0.0)))
 
 
 def _name(candidate: ChainCandidate) -> str:
@@ -277,23 +256,7 @@ def _missing(
     scene, surroundings = selection.scene, selection.surroundings
     coefficients, covariance = sizes
     candidate, effect = refined.candidate, refined.candidate.effect
-    amplitude, u = _amplitude(effect, coefficients, covariance)
-    unit, raw, curve = None, candidate.raw, None
-    if isinstance(effect, ChainEffect):
-        by_weights, by_lines = isinstance(effect.driver, LinkWeights), isinstance(effect.shape, Harmonics)
-        if by_weights or by_lines:
-            # Over a part of a turn low orders nearly cancel: what the joint does there is their sum.
-            columns = effect.basis(scene.fit.problem.context).columns
-            amplitude, u = largest_deviation(columns, coefficients, covariance)
-        unit = effect.term.unit if by_weights else None
-        raw = raw - raw.mean(axis=0) if by_lines else raw
-    if candidate.variant.nearest is not None and not is_curve(candidate):
-        curve = curve_of(scene.fit.problem.context, effect, coefficients, covariance)
-    if curve is not None:
-        # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
-        largest = int(np.abs(curve.size).argmax())
-        amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
-        raw = _beyond_base(candidate)
+    size = size_of(candidate, coefficients, covariance)
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
@@ -316,9 +279,9 @@ def _missing(
         units=(effect.unit,) * len(coefficients),
         coefficients=coefficients,
         covariance=covariance,
-        amplitude=amplitude,
-        u=u,
-        peak=float(np.linalg.norm(raw @ coefficients, axis=1).max()),
+        amplitude=size.amplitude,
+        u=size.u,
+        peak=float(np.linalg.norm(size.raw @ coefficients, axis=1).max()),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
@@ -337,19 +300,11 @@ def _missing(
         varies=isinstance(effect.driver, EachRun),
         within_runs=_shows_within_runs_alone(scene, effect),
         travelled_periods=travelled_periods,
-        unit=unit,
+        unit=size.unit,
         nearest=candidate.variant.nearest,
-        curve=curve,
+        curve=size.curve,
+        largest=size.largest,
     )
-
-
-def _beyond_base(candidate: ChainCandidate) -> Array:
-    """The displacement (n, d, k) in mm of a shape without what the base has of it already."""
-    effect, basis, fit = candidate.effect, candidate.basis, candidate.fit
-    if not isinstance(effect, ChainEffect) or not isinstance(basis, ChainBasis):
-        return candidate.raw
-    columns = beyond_base(fit.problem.context, effect)
-    return np.moveaxis(raw_columns(fit, replace(basis, columns=columns)), 0, 2)
 
 
 def _shows_within_runs_alone(scene: ChainScene, effect: MachineEffect) -> bool:

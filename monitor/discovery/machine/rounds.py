@@ -136,8 +136,9 @@ class ChainSearch:
 
         A reading that is left out is one with an offset of its own.
         """
-        under, design = latest.under, first.whole_noise_design
+        under = latest.under
         correlation = None if under.whitening is None else under.whitening.correlation
+        design = first.noise_design_under(correlation, whole=True)
         rest = without(orthonormal(under.nuisance.shared), under.white.reshape(-1, 1))
         free = first.degrees_of_freedom - under.degrees_of_freedom + 2 * (correlation is not None)
         families = len({variant.family for variant in self.variants})

@@ -26,10 +26,13 @@ from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
-from monitor.units import Unit, mistaken_for_mm
+from monitor.units import UNIT_WORDS, Unit, mistaken_for_mm
 
 #: Up to so many rows the derivatives of all stand side by side: 7 kB a row, 1 GB. Of more, those of ``ROWS_AT_ONCE``.
 MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 10_000
+
+# Units are further apart than a fifth; so far off is a gain that a fit of such readings ends at.
+NEAR_UNIT = 0.2
 
 
 @dataclass(frozen=True)
@@ -393,6 +396,16 @@ def _best_of(
     return min(solutions, key=lambda solution: float(np.sum(solution.last.residual**2)))
 
 
+def _mistaken_unit(problem: ChainProblem, gain: float) -> str:
+    """The unit that positions, or the readings of instruments, seem to be in under a gain, in words; else empty."""
+    # A tip truly moves by 1 + gain of the positions that were typed.
+    of_positions = mistaken_for_mm(1.0 / (1.0 + gain), NEAR_UNIT)
+    of_readings = () if problem.measured_joints else mistaken_for_mm(1.0 + gain, NEAR_UNIT)
+    mistakes = [f"its readings were {UNIT_WORDS[unit]}" for unit in of_readings]
+    mistakes += [f"its positions were {UNIT_WORDS[unit]}" for unit in of_positions]
+    return f"; it looks as if {' or '.join(mistakes)}" if mistakes else ""
+
+
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
     """DataError where a location angle or a gain comes out too large to be an error, or too much is left.
 
@@ -410,11 +423,7 @@ def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
         run, which = np.unravel_index(int(np.abs(errors).argmax()), errors.shape)
         (effect, column), error = limited[int(which)], float(errors[run, which])
         is_gain = isinstance(effect, ChainEffect) and effect.is_gain
-        # A tip that truly moves by 1 + gain of what was typed.
-        units = mistaken_for_mm(1.0 / (1.0 + error)) if is_gain and error > -1.0 else ()
-        looks = "".join(
-            f"; it looks as if the unit of its readings were {unit.name}, not mm" for unit in units
-        )
+        looks = _mistaken_unit(problem, error) if is_gain and error > -1.0 else ""
         others = int(too_large.any(axis=1).sum()) - 1
         alike = f" ({others} other run{'s' * (others > 1)} too)" if others else ""
         raise DataError(

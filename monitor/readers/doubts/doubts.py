@@ -19,9 +19,10 @@ from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.readers.doubts.zero_rows import zero_rows
 from monitor.readers.faults import and_of
+from monitor.readers.setups.file import FORMATS
 from monitor.records import Array, Campaign, Run
 from monitor.row_files import runs_in
-from monitor.units import MICROMETRE, UNIT_WORDS, nearness_to_bar
+from monitor.units import METRE, MICROMETRE, MICRORADIAN, UNIT_WORDS, nearness_to_bar
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
 SHORTEST_TRAVEL = 5.0
@@ -182,13 +183,27 @@ def _units_of_runs(campaign: Campaign) -> Iterator[str]:
         )
 
 
+def _uncertainties(campaign: Campaign) -> Iterator[str]:
+    """Standard uncertainties that no probe and no instrument has, by the key that states them."""
+    setups = campaign.artefact.setups
+    if not setups:
+        of_probe = campaign.probe.standard_uncertainty
+        if not PROBE_RANGE[0] <= of_probe <= PROBE_RANGE[1]:
+            u_um = f"{MICROMETRE.to_display(of_probe):g}"
+            yield f"the probe's standard uncertainty is {u_um} µm: is standard_uncertainty_um in µm?"
+    for setup in setups:
+        u, is_angle = setup.standard_uncertainty, FORMATS[setup.reading].angular
+        # An angle is as good as what it makes of a metre.
+        if u is None or PROBE_RANGE[0] <= u * (METRE.factor if is_angle else 1.0) <= PROBE_RANGE[1]:
+            continue
+        unit = MICRORADIAN if is_angle else MICROMETRE
+        key = f"standard_uncertainty_{'urad' if is_angle else 'um'}"
+        yield f"setup {setup.id}: {key} is {unit.to_display(u):g}: is it in {unit.name}?"
+
+
 def _statements(campaign: Campaign) -> Iterator[str]:
-    """Numbers of campaign.toml that no probe, ball or length standard has."""
-    u = campaign.probe.standard_uncertainty
-    if not PROBE_RANGE[0] <= u <= PROBE_RANGE[1]:
-        yield (
-            f"the probe's standard uncertainty is {MICROMETRE.to_display(u):g} µm: is standard_uncertainty_um in µm?"
-        )
+    """Numbers of campaign.toml that no probe, instrument, ball or length standard has."""
+    yield from _uncertainties(campaign)
     balls = {ball.id: ball for ball in campaign.artefact.balls}
     for ball in balls.values():
         if not BALL_RANGE[0] <= ball.diameter <= BALL_RANGE[1]:

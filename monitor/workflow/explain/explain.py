@@ -33,6 +33,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import refuse_exact_fits
+from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -116,7 +117,7 @@ def explained(
     of the setups that one contradicts all others."""
     answer = replace(machine_explanation(explanation), rate=rate)
     answer = with_plans(answer, explanation.missing, campaign, model)
-    answer = with_measurements(answer, campaign, as_model(model))
+    answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
     if explanation.mistakes:
         return answer
     final, ability = explanation.final, campaign_method(campaign).instruments
@@ -125,6 +126,16 @@ def explained(
     return (
         replace(answer, against_others=beside) if beside is not None and len(beside.suspects) == 1 else answer
     )
+
+
+def _with_blank_rows(answer: MachineExplanation, campaign: Campaign) -> MachineExplanation:
+    """An answer that names the rows of zeros among the readings that were left out."""
+    left_out = {(reading.run, reading.sequence) for reading in answer.suspect_data}
+    blank = (
+        f"{sentence[0].upper()}{sentence[1:]}."
+        for sentence in blank_words(left_out & blank_rows(campaign, or_axes=True))
+    )
+    return replace(answer, answer=" ".join((answer.answer, *blank)))
 
 
 def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:

@@ -63,7 +63,8 @@ class MachineMissing:
     ``travelled_periods`` of a harmonic is how many of its periods the axis turned, where they are fewer than 1.5 over
     a part of a turn: an offset, a tilt, flexure or another order looks alike there. ``within_its_shape`` are effects
     that stand out beside it but not beside its error in any shape: they cannot be separated from it. ``refers_to``
-    says in words what its coefficients are stated relative to, where it is an error of the chain.
+    says in words what its coefficients are stated relative to, where it is an error of the chain. ``largest`` is the
+    coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes.
     """
 
     rank: int
@@ -98,6 +99,7 @@ class MachineMissing:
     within_its_shape: tuple[str, ...] = ()
     ties: tuple[Tie, ...] = ()
     refers_to: str | None = field(default=None, metadata=OMITTED)
+    largest: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -169,6 +169,7 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         ),
         ties=ties_of(effect, rivals(effect), is_planned=is_planned),
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
+        largest=effect.largest,
     )
 
 

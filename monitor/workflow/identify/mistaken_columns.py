@@ -8,6 +8,7 @@ from monitor.exceptions import DataError, MistakenUnitError, TooFewReadingsError
 from monitor.methods.chain.parts import parts_of
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.suspects import with_suspects
+from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
 
@@ -30,12 +31,16 @@ def with_mistake(
 ) -> DataError:
     """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
 
-    Columns that the import saw exchanged are said again. Else the changes are tried that would let the readings fit,
-    which takes up to half a minute; where none does, what else the import noticed of the columns is said. Where the
-    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
+    Rows of zeros are named. Columns that the import saw exchanged are said again. Else the changes are tried that would
+    let the readings fit, which takes up to half a minute; where none does, what else the import noticed of the columns
+    is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is
+    tried.
     """
     if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
         return refusal
+    blank = tuple(blank_words(blank_rows(campaign)))
+    if blank:
+        return _with_sentences(refusal, blank)
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
         return _with_sentences(refusal, exchanged)

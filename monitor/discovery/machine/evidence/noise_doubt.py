@@ -36,7 +36,9 @@ class NoiseDoubt:
     def _fits(self) -> list[tuple[float, Fit]]:
         """The weight of every correlation that the residuals allow, and the fit with it."""
         fit = self._scene.fit
-        likelihoods = fit.noise_design.likelihoods(fit.solution.last.residual)
+        stated = None if fit.whitening is None else fit.whitening.correlation
+        design = fit.noise_design_under(stated, whole=False)
+        likelihoods = design.likelihoods(fit.solution.last.residual)
         best = sorted(likelihoods, key=lambda each: -each[1])[:MOST_CORRELATIONS]
         likely = [each for each in best if each[1] >= SMALLEST_WEIGHT * best[0][1]]
         total = sum(weight for _, weight in likely)

@@ -24,6 +24,7 @@ from monitor.discovery.machine.evidence.held_out import of_numbers, pose_blocks,
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import FEWEST_POSITIONS, HIGHEST, in_rows
+from monitor.discovery.machine.shapes.tables import occupied
 from monitor.discovery.search.candidate import Variant, side_by_side
 from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
@@ -49,6 +50,8 @@ SAME_LINE = 1.5
 LARGEST_RATIO = 40.0
 # Nodes of tables that are tried; a node needs some poses.
 NODES, POSES_A_NODE = (24, 36, 48, 60), 12
+# A node with fewer poses about it is the error of each of them.
+LEAST_POSES = 3
 # A table that is no curve of the lines must stand out so far from them.
 TABLE_LEVEL = 1e-4
 
@@ -171,13 +174,15 @@ class Pursuit:
         return nearly_cancelled(peak, removed, self.fit.readings, LARGEST_RATIO)
 
     def p_value(self, new: Array) -> float:
-        """The p-value of new columns, every pose counted as one observation."""
+        """The p-value of new columns, every pose counted as one observation; 1 where the model has all of them."""
         size = new.shape[1]
+        if size == 0:
+            return 1.0
         onto = new.T @ self.residual
         remainder = self.residual - new @ onto
         scores = np.column_stack([np.bincount(self.numbered, weights=column * remainder) for column in new.T])
-        statistic = float(onto @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ onto) / max(size, 1)
-        return float(special.fdtrc(size, len(scores) - size, statistic)) if size else 1.0
+        statistic = float(onto @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ onto) / size
+        return float(special.fdtrc(size, len(scores) - size, statistic))
 
 
 def columns_of(fit: Fit, texts: Sequence[str]) -> Array:
@@ -402,7 +407,8 @@ def _with_tables(
         best = pursuit.held_out(refined)
         reading = fit.problem.context.chain.joints[joint.index].sign * joint.position / DEGREE.factor
         for count in counts:
-            nodes = np.round(np.linspace(np.floor(reading.min()), np.ceil(reading.max()), count), 2)
+            even: Array = np.linspace(np.floor(reading.min()), np.ceil(reading.max()), count)
+            nodes = occupied(np.round(even, 2), reading, LEAST_POSES)
             # The zero of the joint is a base parameter: the ends are held, so that every other node has a number.
             text = nodes_text(nodes, nodes[[0, -1]])
             error = pursuit.held_out(pursuit.new(pursuit.columns([f"{joint.term}:{text}"])))

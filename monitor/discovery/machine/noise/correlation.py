@@ -8,7 +8,7 @@ independent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,10 +40,12 @@ SMALLEST_EIGENVALUE = 1e-9
 
 @dataclass(frozen=True)
 class Correlation:
-    """Correlation ``rho`` of the dependent part of two neighbours, and its ``share`` of the variance."""
+    """Correlation ``rho`` of the dependent part of two neighbours, and its ``share`` of the variance; ``frame`` counts
+    the layouts of directions in which they follow each other: as they are read (0), along a rotary axis."""
 
     rho: float
     share: float
+    frame: int = 0
 
 
 def slowness(correlation: Correlation) -> float:
@@ -171,13 +173,14 @@ class NoiseDesign:
     and an orthonormal ``basis`` (R, N, p) of what is unknown in every run.
 
     Of several runs only what they do not share counts, and their means take their part of the degrees of freedom; all
-    counts where ``shared`` is said to be noise too.
+    counts where ``shared`` is said to be noise too. ``frame`` is that of the correlations.
     """
 
     rows: Rows
     cells: npt.NDArray[np.int64]
     basis: Array
     shared: bool = False
+    frame: int = 0
 
     def correlation(self, residual: Array) -> Correlation | None:
         """The correlation of residuals (R, N); None where they are white."""
@@ -199,13 +202,19 @@ class NoiseDesign:
         # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
         # makes an effect.
         slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
-        return max((best, *slow), key=slowness)
+        return replace(max((best, *slow), key=slowness), frame=self.frame)
+
+    def least_criterion(self, residual: Array) -> float:
+        """Minus twice the logarithm, but for a constant, of the restricted likelihood of residuals (R, N) under the
+        likeliest correlation."""
+        return float(self._criteria(*self._parts_of(residual)).min())
 
     def likelihoods(self, residual: Array) -> list[tuple[Correlation | None, float]]:
         """Every correlation that is tried with the restricted likelihood of residuals (R, N), the largest of them 1."""
         criteria = self._criteria(*self._parts_of(residual))
         relative = np.exp(-0.5 * (criteria - criteria.min()))
-        return list(zip((None, *GRID[1:]), relative.tolist(), strict=True))
+        correlations = (replace(correlation, frame=self.frame) for correlation in GRID[1:])
+        return list(zip((None, *correlations), relative.tolist(), strict=True))
 
     def deviance(self, squares: float, correlation: Correlation | None) -> float:
         """Minus twice the logarithm, but for a constant, of the likelihood of what the unknowns of this design leave of
@@ -216,7 +225,7 @@ class NoiseDesign:
         alone. Restricted by all that each model has, the likelihoods would be of different numbers, in other units
         (Harville, J. Am. Stat. Assoc. 72 (1977) 320, section 4.2; Gurka, Am. Stat. 60 (2006) 19).
         """
-        index = GRID.index(GRID[0] if correlation is None else correlation)
+        index = GRID.index(GRID[0] if correlation is None else replace(correlation, frame=0))
         number = float(self._number[index])
         return float(self._share * self._whites.logarithm[index] + number * np.log(squares / number))
 

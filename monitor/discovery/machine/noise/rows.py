@@ -117,6 +117,31 @@ def neighbours_of(problem: ChainProblem, by_error: Array) -> Rows:
     return replace(rows, turned=sign[..., None], begins=new, order=order, steps=steps.astype(np.float64))
 
 
+def along_axes(problem: ChainProblem, by_error: Array, rows: Rows) -> list[Rows]:
+    """The same rows of directions, two numbers each, turned so that the first is what a rotary axis moves, for each
+    axis; none where rows are no directions.
+
+    Seeing and refraction go to the side and up, guiding and drives along the axes of an equatorial mount. Between them
+    turns the parallactic angle, and what follows itself in one frame seems independent in the other.
+    """
+    if rows.numbers != 2 or rows.order is not None or problem.measured_joints:
+        return []
+    chain = problem.context.chain
+    turned = []
+    for index, joint in enumerate(chain.joints):
+        if not joint.turns:
+            continue
+        moved = problem.observe(by_error[:, :, index, MOTION, 3 + joint.main])
+        length = np.linalg.norm(moved, axis=1, keepdims=True)
+        # A direction along the axis is not moved by it, and any is as good.
+        first = np.where(length > 1e-6 * length.max(), moved, (1.0, 0.0))
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        both = np.stack([first, np.stack([-first[:, 1], first[:, 0]], axis=1)], axis=1)
+        by_run = problem.padded(both.reshape(len(both), 4)[:, :, None])
+        turned.append(replace(rows, turned=by_run.reshape(*rows.weighted.shape, 2, 2)))
+    return turned
+
+
 def from_pose_to_pose(rows: Rows, pose: npt.NDArray[np.int64]) -> Rows:
     """Rows that follow each other from ``pose`` (M,) of every whitened number to pose."""
     of_touch = pose.reshape(len(rows.weighted), -1)[:, : rows.count : rows.numbers]

@@ -21,6 +21,7 @@ from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes import nodes_text
 from monitor.machine import MOTION
+from monitor.records import Array
 from monitor.units import DEGREE
 
 # Nodes of the tables that are tried.
@@ -61,11 +62,24 @@ def table_variants(scene: ChainScene, selected: Sequence[ChainCandidate]) -> lis
         for count in NODES:
             if positions < POSITIONS_A_NODE * count:
                 break
-            nodes = np.round(np.linspace(low, high, count), 1)
+            even: Array = np.linspace(low, high, count)
+            nodes = occupied(np.round(even, 1), reading)
             held = nodes[:1] if f"{symbol}:poly1" in sloping else nodes[[0, -1]]
             text = f"{symbol}:{nodes_text(nodes, held)}"
             variants.append(Variant(f"{symbol}:table", parse_effect(text, context.chain), len(NODES)))
     return variants
+
+
+def occupied(nodes: Array, reading: Array, least: int = 1) -> Array:
+    """The nodes (k,) without inner ones that fewer than ``least`` different readings (n,) are nearest to, the loneliest
+    left out first: where nothing was measured no node has a number, and a wider interval says so."""
+    places = np.unique(np.round(reading, 6))
+    while len(nodes) > 2:
+        near = np.bincount(np.digitize(places, (nodes[1:] + nodes[:-1]) / 2.0), minlength=len(nodes))[1:-1]
+        if near.min() >= least:
+            break
+        nodes = np.delete(nodes, 1 + int(near.argmin()))
+    return nodes
 
 
 def _score(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:

@@ -1,0 +1,93 @@
+"""How large an effect is that was found: one number with its standard uncertainty.
+
+A coefficient is its own size, and a cosine and a sine, or the components of gravity, have a length. Where coefficients
+nearly cancel or there are as many as one likes (lines over a part of a turn, weights of links, nodes of a table, parts
+of a free shape) the size is the largest value of the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from monitor.discovery.machine.joints.curve_findings import is_curve
+from monitor.discovery.machine.scene import ChainCandidate, MachineEffect
+from monitor.discovery.machine.scene_columns import raw_columns
+from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
+from monitor.discovery.search.amplitudes import length_of
+from monitor.effects import ChainEffect
+from monitor.effects.drivers import EachRun
+from monitor.effects.effect import ChainBasis
+from monitor.effects.shapes import Harmonics, Nodes
+from monitor.effects.weight import LinkWeights
+from monitor.records import Array
+from monitor.units import Unit
+
+
+@dataclass(frozen=True)
+class Size:
+    """The ``amplitude`` of an effect with its standard uncertainty ``u``, in ``unit`` (None: that of its coefficients),
+    and the displacements ``raw`` (n, d, k) in mm of a unit of each coefficient. ``curve`` is that of a free shape,
+    ``largest`` the node of a table that is its size."""
+
+    amplitude: float
+    u: float
+    raw: Array
+    unit: Unit | None = None
+    curve: Curve | None = None
+    largest: str | None = None
+
+
+def size_of(candidate: ChainCandidate, coefficients: Array, covariance: Array) -> Size:
+    """The size of an effect with coefficients (k,) and their covariance (k, k)."""
+    effect, raw, context = candidate.effect, candidate.raw, candidate.fit.problem.context
+    if candidate.variant.nearest is not None and not is_curve(candidate):
+        curve = curve_of(context, effect, coefficients, covariance)
+        if curve is not None:
+            # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
+            largest = int(np.abs(curve.size).argmax())
+            amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
+            return Size(amplitude, u, _beyond_base(candidate), curve=curve)
+    if isinstance(effect, ChainEffect):
+        if isinstance(effect.shape, Nodes) and not isinstance(effect.driver, EachRun):
+            # The length of all nodes grows with their number: what the axis errs by is the largest of them.
+            node = int(np.abs(coefficients).argmax())
+            u = float(np.sqrt(covariance[node, node]))
+            return Size(abs(float(coefficients[node])), u, raw, largest=effect.parameters(context)[node])
+        by_weights, by_lines = isinstance(effect.driver, LinkWeights), isinstance(effect.shape, Harmonics)
+        if by_weights or by_lines:
+            # Over a part of a turn low orders nearly cancel: what the joint does there is their sum.
+            size = largest_deviation(effect.basis(context).columns, coefficients, covariance)
+            unit = effect.term.unit if by_weights else None
+            return Size(*size, raw - raw.mean(axis=0) if by_lines else raw, unit)
+    return Size(*spread_or_length(effect, coefficients, covariance), raw)
+
+
+def spread_or_length(effect: MachineEffect, coefficients: Array, covariance: Array) -> tuple[float, float]:
+    """The length of the coefficients, or the spread of sizes of the runs, with its standard uncertainty."""
+    if len(coefficients) == 1 or not isinstance(effect.driver, EachRun):
+        return length_of(coefficients, covariance)
+    # The spread of the sizes less what noise adds to it, and the uncertainty of a variance from R sizes.
+    noise = float(np.mean(np.diag(covariance)))
+    total = float(np.var(coefficients, ddof=1))
+    spread = float(np.sqrt(max(total - noise, 0.0)))
+    u_of_variance = total * float(np.sqrt(2.0 / (len(coefficients) - 1)))
+    return spread, u_of_variance / (2.0 * max(spread, float(np.sqrt(noise))))
+
+
+def largest_deviation(columns: Array, coefficients: Array, covariance: Array) -> tuple[float, float]:
+    """The largest deviation from its mean of an error with columns (n, k), and its standard uncertainty; in absolute
+    value, for the coefficients of several weights have no sign in common."""
+    apart = columns - columns.mean(axis=0)
+    row = apart[int(np.abs(apart @ coefficients).argmax())]
+    return abs(float(row @ coefficients)), float(np.sqrt(max(row @ covariance @ row, 0.0)))
+
+
+def _beyond_base(candidate: ChainCandidate) -> Array:
+    """The displacement (n, d, k) in mm of a shape without what the base has of it already."""
+    effect, basis, fit = candidate.effect, candidate.basis, candidate.fit
+    if not isinstance(effect, ChainEffect) or not isinstance(basis, ChainBasis):
+        return candidate.raw
+    columns = beyond_base(fit.problem.context, effect)
+    return np.moveaxis(raw_columns(fit, replace(basis, columns=columns)), 0, 2)

@@ -1,0 +1,44 @@
+"""Rows of nothing but zeros that others contradict: no readings.
+
+Of readings that nobody contradicts ``zero_rows`` decides by their poses; a plate's first ball lies at its origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+import numpy as np
+
+from monitor.records import Campaign
+
+#: The columns of what is read as a vector.
+READ = ("point_", "direction_", "tracker_")
+#: One row may lie at the origin of its frame.
+FEWEST = 2
+
+
+def blank_rows(campaign: Campaign, *, or_axes: bool = False) -> frozenset[tuple[int, int]]:
+    """Run and sequence of the rows that read nothing but zeros, ``or_axes`` of which all axes stand at zero; empty
+    where there are fewer than ``FEWEST`` of them or they are most of the campaign."""
+    probings = campaign.probings
+    read = [values for name, values in probings.channels.items() if name.startswith(READ)]
+    blank = np.zeros(len(probings), dtype=bool)
+    for columns in (read, list(probings.readings.values()) if or_axes else []):
+        if columns:
+            numbers = np.column_stack(columns)
+            zeros = np.all((numbers == 0.0) | np.isnan(numbers), axis=1)
+            blank |= zeros & np.isfinite(numbers).any(axis=1)
+    if not FEWEST <= np.count_nonzero(blank) <= len(blank) // 2:
+        return frozenset()
+    return frozenset(zip(probings.run[blank].tolist(), probings.sequence[blank].tolist(), strict=True))
+
+
+def blank_words(rows: Collection[tuple[int, int]]) -> Iterator[str]:
+    """Yield the sentence on rows of zeros, of each run; none for none."""
+    for run in sorted({run for run, _ in rows}):
+        sequences = sorted(sequence for of_run, sequence in rows if of_run == run)
+        named = ", ".join(map(str, sequences[:12])) + (", ..." if len(sequences) > 12 else "")
+        yield (
+            f"run {run}, sequence {named}: all that was read, or all axes, are 0, as programs write where they got no "
+            "reading: leave these rows out"
+        )

@@ -1,0 +1,70 @@
+"""Rows of zeros among the points of a grid: `identify` and `explain` name them alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.exceptions import DataError
+from monitor.readers import read_campaign
+from monitor.readers.doubts.blank_rows import blank_rows
+from monitor.store import Database
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import ExplainRequest
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.intake.importing import ImportRequest, import_folders
+
+GRID = """format = 1
+campaign = "grid"
+method = "instruments"
+
+[machine]
+id = "mill"
+topology = "w X Y b Z t"
+
+[[setups]]
+id = "cmm"
+reading = "point"
+standard_uncertainty_um = 1.5
+known = ["targets", "scale"]
+"""
+
+
+def grid(folder: Path, zeros: tuple[int, ...]) -> Path:
+    """A part of 80 holes that a CMM measured in a frame of its own; some rows hold ``zeros``."""
+    rng = np.random.default_rng(1)
+    x, y = (axis.ravel() for axis in np.meshgrid(70.0 * np.arange(10), 60.0 * np.arange(8)))
+    points = np.stack([150.0 + x, -90.0 + y], axis=1) + rng.normal(0.0, 1.5e-3, (80, 2))
+    points[list(zeros)] = 0.0
+    folder.mkdir()
+    (folder / "campaign.toml").write_text(GRID, encoding="utf-8")
+    (folder / "runs.csv").write_text(
+        "run,started_at,day,warm_up,ambient_degC\n1,2026-06-01T08:00:00+00:00,1,false,20.0\n",
+        encoding="utf-8",
+    )
+    lines = ["run,sequence,time_s,setup,x_mm,y_mm,z_mm,point_x_mm,point_y_mm"]
+    lines += [
+        f"1,{row + 1},{12 * row},cmm,{x[row]:.3f},{y[row]:.3f},-20.000,{points[row, 0]:.4f},{points[row, 1]:.4f}"
+        for row in range(80)
+    ]
+    (folder / "probings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.slow
+def test_identify_and_explain_name_the_same_rows(tmp_path: Path) -> None:
+    """`identify` refused the readings, and `explain` said that nothing is missing, without a word of zeros."""
+    named = r"un 1, sequence 5, 6: all that was read, or all axes, are 0"
+    with Database(tmp_path / "zeros.duckdb") as db:
+        import_folders(db, ImportRequest([grid(tmp_path / "grid", (4, 5))]))
+        with pytest.raises(DataError, match=named):
+            identify(db, IdentifyRequest("grid"))
+        assert "R" + named in explain(db, ExplainRequest("grid")).explanation.answer
+
+
+def test_one_point_at_the_origin_is_a_reading(tmp_path: Path) -> None:
+    assert blank_rows(read_campaign(grid(tmp_path / "grid", (4,)))) == frozenset()
+    assert blank_rows(read_campaign(grid(tmp_path / "two", (4, 5)))) == {(1, 5), (1, 6)}
