@@ -131,6 +131,11 @@ class MeasuredChain(ABC):
         return self.measured_joints, np.ones(len(self.context), dtype=bool)
 
     @property
+    def stated_places(self) -> Array:
+        """What tells targets of one name apart (n, k), in mm: where the rows say that they are."""
+        return np.zeros((len(self.context), 0))
+
+    @property
     def extra_names(self) -> tuple[str, ...]:
         """Names of the e calibrated quantities that every run has besides its rows."""
         return ()

@@ -24,7 +24,7 @@ from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
-from monitor.methods.instruments.touched_points import brought_to_points
+from monitor.methods.instruments.touched_points import brought_to_points, stated_places
 from monitor.records import Array, Setup
 from monitor.sources import CommonQuantity
 
@@ -174,6 +174,11 @@ class InstrumentProblem(ChainProblem):
     def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
         """The linear axes, at the balls of plates."""
         return brought_to_points(self.context, self.parts)
+
+    @property
+    def stated_places(self) -> Array:
+        """Points of plates, behind their setups."""
+        return stated_places(self.context, self.parts)
 
     def can_show(self, effect: Effect) -> bool:
         """Nothing of targets that are touched or tracked; angles alone show no displacement."""
