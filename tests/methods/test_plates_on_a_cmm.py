@@ -13,6 +13,7 @@ from monitor.methods import campaign_method
 from monitor.methods.method import ChainMethod
 from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
+from monitor.workflow.tool_frames import tool_frames
 
 AXIS = '[[machine.tool_chain]]\nname = "{0}"\nkind = "linear"\nalong = "{0}"\n'
 SETUP = """[[setups]]
@@ -154,4 +155,4 @@ def test_a_ball_at_the_origin_of_its_plate_is_no_row_of_zeros(tmp_path: Path) ->
     table.write_text("\n".join([head, ",".join(cells), *lines, ",".join(elsewhere)]) + "\n", encoding="utf-8")
     campaign = read_campaign(folder)
     assert isinstance(campaign, Campaign)
-    assert not any("zeros" in doubt for doubt in doubts(campaign))
+    assert not any("zeros" in doubt for doubt in doubts(campaign, tool_frames(campaign)))

@@ -1,7 +1,8 @@
 """Rows of zeros among readings of directions and points: what programs write that got no answer.
 
-A tracker's 0, 0, 0 is refused; a direction may point along an axis and a point lie at a frame's origin. Zeros that
-stand in several rows of a setup whose axes differ there, or axes at zero whose targets differ, are no readings.
+A tracker's 0, 0, 0 is refused; a direction may point along an axis and a point lie at a frame's origin. Directions of
+zero that stand in several rows of a setup whose axes differ there, points of zero where the axes bring no point of the
+tool to one place, and axes at zero whose targets differ, are no readings.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.records import Array, Campaign
 from monitor.units import DEGREE
 
@@ -25,19 +27,25 @@ DIRECTION = (
     "the direction of azimuth 0 and elevation 0",
 )
 TARGETS = {"point": POINT, "pose": POINT, "direction": DIRECTION}
+#: A machine without its errors brings one point of the tool to one place within this part of its travel: zeros of a
+#: robot that are off by a degree move it by 1 % of its reach.
+OFF_SHARE = 0.02
+#: Of a plate whose balls stand where its certificate says one may be its origin, and lie anew: zeros at so many places,
+#: where no other point recurs, are no ball.
+FEWEST_OF_PLATE = 3
 #: So many sequence numbers are named.
 MOST_NAMED = 12
 
 
-def zero_rows(campaign: Campaign) -> Iterator[str]:
-    """A sentence for each setup of which some rows are zeros that no reading explains."""
+def zero_rows(campaign: Campaign, frames: ToolFrames | None = None) -> Iterator[str]:
+    """A sentence for each setup of which some rows are zeros that no reading explains; points only with ``frames``."""
     probings, channels = campaign.probings, campaign.probings.channels
     for index, setup in enumerate(campaign.artefact.setups if "setup" in channels else ()):
         if setup.reading not in TARGETS:
             continue
         columns, at_zero, same, target_word = TARGETS[setup.reading]
-        if "targets" in setup.known or not set(columns) <= channels.keys():
-            continue  # Balls of a plate stand where its certificate says, one of them at its origin.
+        if not set(columns) <= channels.keys():
+            continue
         mine = np.flatnonzero(channels["setup"] == index + 1)
         targets = np.column_stack([channels[name][mine] for name in columns])
         # Millimetres of linear axes count as radians do, each in its own tolerance.
@@ -51,20 +59,45 @@ def zero_rows(campaign: Campaign) -> Iterator[str]:
         )
         # Of one pose every run sees each point of the tool elsewhere.
         names = probings.target[mine] if setup.reading != "direction" else np.full(len(mine), "")
-        series = np.array([f"{run} {name}" for run, name in zip(probings.run[mine], names, strict=True)])
-        for zeros, others, tolerance, what in (
-            (np.all(targets == at_zero, axis=1), poses, SAME_DIRECTION, f"{target_word} at different poses"),
-            (np.all(poses == 0.0, axis=1), targets, same, "all axes at 0 and different targets"),
-        ):
-            if any(
-                _differ(others[series == each], zeros[series == each], tolerance)
-                for each in np.unique(series)
-            ):
-                where = mine[zeros]
-                yield (
-                    f"setup {setup.id}: {len(where)} rows have {what} ({_named(campaign, where)}): zeros that a "
-                    "program writes where it got no reading? Leave these rows out"
-                )
+        series = [f"{run} {name}" for run, name in zip(probings.run[mine], names, strict=True)]
+        of_series = [np.flatnonzero(np.array(series) == each) for each in np.unique(series)]
+        zeros = np.all(targets == at_zero, axis=1)
+        still = np.all(poses == 0.0, axis=1)
+        stated = "targets" in setup.known
+        if setup.reading == "direction":
+            wrong = any(_differ(poses[rows], zeros[rows], SAME_DIRECTION) for rows in of_series)
+        else:
+            wrong = (
+                frames is not None
+                and not (stated and _is_plate(targets, zeros))
+                and any(_at_places(frames, mine[rows], zeros[rows]) for rows in of_series)
+            )
+        if wrong:
+            yield _sentence(campaign, setup.id, mine[zeros], f"{target_word} at different poses")
+        if not stated and any(_differ(targets[rows], still[rows], same) for rows in of_series):
+            yield _sentence(campaign, setup.id, mine[still], "all axes at 0 and different targets")
+
+
+def _sentence(campaign: Campaign, setup: str, rows: npt.NDArray[np.int64], what: str) -> str:
+    return (
+        f"setup {setup}: {len(rows)} rows have {what} ({_named(campaign, rows)}): zeros that a program writes where it "
+        "got no reading? Leave these rows out"
+    )
+
+
+def _is_plate(points: Array, zeros: npt.NDArray[np.bool_]) -> bool:
+    """Whether points (m, 3) recur, or too few stand at zero to be no ball of a plate."""
+    others = points[~zeros]
+    return int(np.count_nonzero(zeros)) < FEWEST_OF_PLATE or len(np.unique(others, axis=0)) < len(others)
+
+
+def _at_places(frames: ToolFrames, rows: npt.NDArray[np.int64], zeros: npt.NDArray[np.bool_]) -> bool:
+    """Whether no point of the tool stands at one place in those of the rows (m,) that have ``zeros``."""
+    if np.count_nonzero(zeros) < 2:
+        return False
+    return apart(frames(rows[zeros])) > max(
+        SAME_POINT, OFF_SHARE * float(np.ptp(frames(rows)[:, :, 3], axis=0).max())
+    )
 
 
 def _differ(values: Array, rows: npt.NDArray[np.bool_], tolerance: float) -> bool:
