@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from monitor.effects import Context
 from monitor.methods.instruments.part import Part
@@ -19,6 +20,9 @@ from monitor.records import Array
 #: Of the rows of a plate that is touched again at least so many stand at a place that is already there. Below it a row
 #: may have been copied, or an instrument have told its last point again. Places that nobody touched twice show nothing.
 TOUCHED_AGAIN = 0.2
+#: Stated places lie farther apart than so many standard uncertainties of a reading. Points that were measured again lie
+#: nearer, and where the display is coarse many of them are equal.
+NEAR = 5.0
 
 
 def brought_to_points(
@@ -33,10 +37,22 @@ def brought_to_points(
     brought = np.zeros(len(context), dtype=bool)
     for part in parts:
         if joints and isinstance(part.reading, Point) and part.reading.holds("targets"):
-            points = np.column_stack([np.unique(part.rows.target, return_inverse=True)[1], _read(part)])
-            stands = len(np.unique(np.column_stack([points, context.positions[part.at]]), axis=0))
-            brought[part.at] = stands - len(np.unique(points, axis=0)) >= TOUCHED_AGAIN * len(part.at)
+            brought[part.at] = _are_touched(
+                part, context.positions[part.at], part.reading.setup.standard_uncertainty or 0.0
+            )
     return joints, brought
+
+
+def _are_touched(part: Part, stands: Array, u: float) -> bool:
+    """Whether the axes, which stand at (m, J), were brought to the points of a setup, a reading of which has ``u``."""
+    points = np.column_stack([np.unique(part.rows.target, return_inverse=True)[1], _read(part)])
+    places = np.unique(points, axis=0)
+    again = len(np.unique(np.column_stack([points, stands]), axis=0)) - len(places)
+    if again < TOUCHED_AGAIN * len(points):
+        return False
+    # Of a single place the next is infinitely far.
+    to_next = scipy.spatial.cKDTree(places).query(places, k=2)[0][:, 1]
+    return bool(np.median(to_next) > NEAR * u)
 
 
 def stated_places(context: Context, parts: Sequence[Part]) -> Array:
