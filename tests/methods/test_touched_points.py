@@ -118,25 +118,25 @@ def test_axes_that_are_told_where_to_go_stand_there(once: bool, tmp_path: Path) 
 
 
 def test_points_that_a_coarse_display_makes_equal_are_no_stated_places(tmp_path: Path) -> None:
-    """A tracker prints 0.01 mm and repeats within 4 µm; the scales of axes that were told read a micrometre beside."""
+    """A tracker prints 0.01 mm and repeats within 3 µm; the scales of axes that were told read a micrometre beside."""
     rng = np.random.default_rng(1)
     grid = 70.0 * np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3)
     told = np.concatenate([grid, grid[::-1], grid])
-    axes, points = told + rng.normal(0.0, 1e-3, told.shape), told + rng.normal(0.0, 4e-3, told.shape)
+    axes, points = told + rng.normal(0.0, 1e-3, told.shape), told + rng.normal(0.0, 3e-3, told.shape)
     lines = ["run,sequence,time_s,setup,target,x_mm,z_mm,y_mm,point_x_mm,point_y_mm,point_z_mm"]
     for row, ((x, y, z), seen) in enumerate(zip(axes, points, strict=True), start=1):
         read = "".join(f",{number:.2f}" for number in seen)
         lines.append(f"1,{row},{30 * row},xy,tip,{x:.6f},{z:.6f},{y:.6f}{read}")
     plates(tmp_path, 0)
     toml = (tmp_path / "campaign.toml").read_text(encoding="utf-8").split("[[setups]]")
-    head = "[[setups]]".join(toml[:2]).replace("uncertainty_um = 0.8", "uncertainty_um = 4.0")
+    head = "[[setups]]".join(toml[:2]).replace("uncertainty_um = 0.8", "uncertainty_um = 3.0")
     (tmp_path / "campaign.toml").write_text(head, encoding="utf-8")
     (tmp_path / "runs.csv").write_text(
         "run,started_at,day,warm_up\n1,2025-02-01T08:00:00+00:00,1,false\n", encoding="utf-8"
     )
     (tmp_path / "probings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     campaign = read_campaign(tmp_path)
-    assert not campaign_method(campaign).problem_of(campaign).stopping[1].any()
+    assert not campaign_method(campaign).problem_of(campaign).stopping.rows.any()
 
 
 def test_a_row_that_stands_twice_does_not_hide_that_axes_stop_at_balls(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_a_row_that_stands_twice_does_not_hide_that_axes_stop_at_balls(tmp_path:
     run, sequence, rest = last.split(",", 2)
     file.write_text(f"{text}{run},{int(sequence) + 1},{rest}\n", encoding="utf-8")
     campaign = read_campaign(tmp_path)
-    assert campaign_method(campaign).problem_of(campaign).stopping[1].all()
+    assert campaign_method(campaign).problem_of(campaign).stopping.rows.all()
 
 
 @pytest.mark.parametrize("digits", [3, 6])

@@ -15,7 +15,7 @@ from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sig
 from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
-from monitor.methods.chain.measured import Displaced
+from monitor.methods.chain.measured import Displaced, Stopping
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
@@ -24,7 +24,7 @@ from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
-from monitor.methods.instruments.touched_points import brought_to_points, stated_places
+from monitor.methods.instruments.touched_points import brought_to_points
 from monitor.records import Array, Setup
 from monitor.sources import CommonQuantity
 
@@ -171,14 +171,9 @@ class InstrumentProblem(ChainProblem):
         return True
 
     @property
-    def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
+    def stopping(self) -> Stopping:
         """The linear axes, at the balls of plates."""
         return brought_to_points(self.context, self.parts)
-
-    @property
-    def stated_places(self) -> Array:
-        """Points of plates, behind their setups."""
-        return stated_places(self.context, self.parts)
 
     def can_show(self, effect: Effect) -> bool:
         """Nothing of targets that are touched or tracked; angles alone show no displacement."""

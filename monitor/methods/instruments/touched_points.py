@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
 from monitor.effects import Context
+from monitor.methods.chain.measured import Stopping
 from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.readings.point import Point
 from monitor.records import Array
@@ -25,9 +25,7 @@ TOUCHED_AGAIN = 0.2
 NEAR = 5.0
 
 
-def brought_to_points(
-    context: Context, parts: Sequence[Part]
-) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
+def brought_to_points(context: Context, parts: Sequence[Part]) -> Stopping:
     """Return the linear joints, and the rows (n,) of setups whose known point of the tool they brought to places.
 
     A stated place recurs to the last digit from pass to pass, and the axes stop elsewhere each time. What is measured
@@ -35,12 +33,15 @@ def brought_to_points(
     """
     joints = tuple(index for index, joint in enumerate(context.chain.joints) if not joint.turns)
     brought = np.zeros(len(context), dtype=bool)
-    for part in parts:
+    places = np.zeros((len(context), 1 + 3))
+    for number, part in enumerate(parts):
         if joints and isinstance(part.reading, Point) and part.reading.holds("targets"):
-            brought[part.at] = _are_touched(
-                part, context.positions[part.at], part.reading.setup.standard_uncertainty or 0.0
-            )
-    return joints, brought
+            u = part.reading.setup.standard_uncertainty or 0.0
+            brought[part.at] = _are_touched(part, context.positions[part.at], u)
+            read = _read(part)
+            places[part.at, 0] = number
+            places[part.at, 1 : 1 + read.shape[1]] = read
+    return Stopping(joints, brought, places)
 
 
 def _are_touched(part: Part, stands: Array, u: float) -> bool:
@@ -53,17 +54,6 @@ def _are_touched(part: Part, stands: Array, u: float) -> bool:
     # Of a single place the next is infinitely far.
     to_next = scipy.spatial.cKDTree(places).query(places, k=2)[0][:, 1]
     return bool(np.median(to_next) > NEAR * u)
-
-
-def stated_places(context: Context, parts: Sequence[Part]) -> Array:
-    """Return the points (n, 4) that rows of points state, in mm, behind the number of their setup; else zeros."""
-    places = np.zeros((len(context), 4))
-    for number, part in enumerate(parts, start=1):
-        if isinstance(part.reading, Point):
-            read = _read(part)
-            places[part.at, 0] = number
-            places[part.at, 1 : 1 + read.shape[1]] = read
-    return places
 
 
 def _read(part: Part) -> Array:

@@ -22,5 +22,5 @@ def apart(frames: Array) -> float:
     turned, shifted = frames[:, :, :3], frames[:, :, 3]
     by_place = (turned - turned.mean(axis=0)).reshape(-1, 3)
     moved = (shifted - shifted.mean(axis=0)).reshape(-1)
-    place = np.linalg.lstsq(by_place, -moved, rcond=1e-9)[0]
-    return float(np.ptp((moved + by_place @ place).reshape(-1, 3), axis=0).max())
+    on_tool = np.linalg.lstsq(by_place, -moved, rcond=1e-9)[0]
+    return float(np.ptp((moved + by_place @ on_tool).reshape(-1, 3), axis=0).max())

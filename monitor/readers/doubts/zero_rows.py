@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
-from monitor.records import Array, Campaign
+from monitor.records import Array, Campaign, Setup
 from monitor.units import DEGREE
 
 #: Readings of one pose differ by less than this part of a radian, or so many mm; those of two poses by more.
@@ -39,43 +39,49 @@ MOST_NAMED = 12
 
 def zero_rows(campaign: Campaign, frames: ToolFrames | None = None) -> Iterator[str]:
     """A sentence for each setup of which some rows are zeros that no reading explains; points only with ``frames``."""
-    probings, channels = campaign.probings, campaign.probings.channels
+    channels = campaign.probings.channels
     for index, setup in enumerate(campaign.artefact.setups if "setup" in channels else ()):
-        if setup.reading not in TARGETS:
-            continue
-        columns, at_zero, same, target_word = TARGETS[setup.reading]
-        if not set(columns) <= channels.keys():
-            continue
-        mine = np.flatnonzero(channels["setup"] == index + 1)
-        targets = np.column_stack([channels[name][mine] for name in columns])
-        # Millimetres of linear axes count as radians do, each in its own tolerance.
-        unit = {
-            axis: SAME_DIRECTION / SAME_POINT
-            for axis in probings.readings
-            if campaign.machine.is_linear(axis)
-        }
-        poses = np.column_stack(
-            [unit.get(axis, 1.0) * values[mine] for axis, values in probings.readings.items()]
-        )
-        # Of one pose every run sees each point of the tool elsewhere.
-        names = probings.target[mine] if setup.reading != "direction" else np.full(len(mine), "")
-        series = [f"{run} {name}" for run, name in zip(probings.run[mine], names, strict=True)]
-        of_series = [np.flatnonzero(np.array(series) == each) for each in np.unique(series)]
-        zeros = np.all(targets == at_zero, axis=1)
-        still = np.all(poses == 0.0, axis=1)
-        stated = "targets" in setup.known
-        if setup.reading == "direction":
-            wrong = any(_differ(poses[rows], zeros[rows], SAME_DIRECTION) for rows in of_series)
-        else:
-            wrong = (
-                frames is not None
-                and not (stated and _is_plate(targets, zeros))
-                and any(_at_places(frames, mine[rows], zeros[rows]) for rows in of_series)
-            )
-        if wrong:
-            yield _sentence(campaign, setup.id, mine[zeros], f"{target_word} at different poses")
-        if not stated and any(_differ(targets[rows], still[rows], same) for rows in of_series):
-            yield _sentence(campaign, setup.id, mine[still], "all axes at 0 and different targets")
+        if setup.reading in TARGETS and set(TARGETS[setup.reading][0]) <= channels.keys():
+            yield from _of_setup(campaign, setup, np.flatnonzero(channels["setup"] == index + 1), frames)
+
+
+def _of_setup(
+    campaign: Campaign, setup: Setup, mine: npt.NDArray[np.int64], frames: ToolFrames | None
+) -> Iterator[str]:
+    """The sentences on one setup, whose rows are ``mine`` (m,)."""
+    probings = campaign.probings
+    columns, at_zero, same, target_word = TARGETS[setup.reading]
+    targets = np.column_stack([probings.channels[name][mine] for name in columns])
+    poses, series = _poses(campaign, mine), _series(campaign, setup, mine)
+    zeros, still = np.all(targets == at_zero, axis=1), np.all(poses == 0.0, axis=1)
+    stated = "targets" in setup.known
+    if setup.reading == "direction":
+        wrong = not stated and any(_differ(poses[rows], zeros[rows], SAME_DIRECTION) for rows in series)
+    else:
+        may_be_balls = stated and _is_plate(targets, zeros)
+        wrong = not may_be_balls and any(_at_places(frames, mine[rows], zeros[rows]) for rows in series)
+    if wrong:
+        yield _sentence(campaign, setup.id, mine[zeros], f"{target_word} at different poses")
+    if not stated and any(_differ(targets[rows], still[rows], same) for rows in series):
+        yield _sentence(campaign, setup.id, mine[still], "all axes at 0 and different targets")
+
+
+def _poses(campaign: Campaign, mine: npt.NDArray[np.int64]) -> Array:
+    """The readings (m, J) of the axes: millimetres count as radians do, each in its own tolerance."""
+    unit = {True: SAME_DIRECTION / SAME_POINT, False: 1.0}
+    readings = campaign.probings.readings.items()
+    return np.column_stack(
+        [unit[campaign.machine.is_linear(axis)] * values[mine] for axis, values in readings]
+    )
+
+
+def _series(campaign: Campaign, setup: Setup, mine: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
+    """Which of the rows (m,) are of one run and one point of the tool: of one pose each sees another target."""
+    run, name = campaign.probings.run[mine], campaign.probings.target[mine]
+    if setup.reading == "direction":
+        name = np.full(len(mine), "")
+    names = np.array([f"{number} {target}" for number, target in zip(run, name, strict=True)])
+    return [np.flatnonzero(names == each) for each in np.unique(names)]
 
 
 def _sentence(campaign: Campaign, setup: str, rows: npt.NDArray[np.int64], what: str) -> str:
@@ -91,9 +97,9 @@ def _is_plate(points: Array, zeros: npt.NDArray[np.bool_]) -> bool:
     return int(np.count_nonzero(zeros)) < FEWEST_OF_PLATE or len(np.unique(others, axis=0)) < len(others)
 
 
-def _at_places(frames: ToolFrames, rows: npt.NDArray[np.int64], zeros: npt.NDArray[np.bool_]) -> bool:
+def _at_places(frames: ToolFrames | None, rows: npt.NDArray[np.int64], zeros: npt.NDArray[np.bool_]) -> bool:
     """Whether no point of the tool stands at one place in those of the rows (m,) that have ``zeros``."""
-    if np.count_nonzero(zeros) < 2:
+    if frames is None or np.count_nonzero(zeros) < 2:
         return False
     return apart(frames(rows[zeros])) > max(
         SAME_POINT, OFF_SHARE * float(np.ptp(frames(rows)[:, :, 3], axis=0).max())

@@ -28,14 +28,14 @@ def _planned(problem: ChainProblem) -> Array:
 
     What is read of them holds the noise: rows that read alike by chance have noise alike, and no pose of their own.
     """
-    positions, (joints, stop) = problem.context.positions.copy(), problem.stopping
-    rows = np.flatnonzero(stop)
-    if not problem.measured_joints and len(rows):
-        touched = np.ix_(rows, np.array(joints, dtype=np.int64))
-        place = _numbered(problem.stated_places[rows])
-        lay = _linked(np.column_stack([2.0 * place, positions[touched] / SAME_LAY_MM]))
-        first, index = np.unique(lay, return_index=True, return_inverse=True)[1:]
-        positions[touched] = positions[touched][first[index]]
+    positions, stopping = problem.context.positions.copy(), problem.stopping
+    rows = np.flatnonzero(stopping.rows)
+    if stopping.places is not None and len(rows):
+        touched = np.ix_(rows, np.array(stopping.joints, dtype=np.int64))
+        of_place = _numbered(stopping.places[rows])
+        lay = _linked(np.column_stack([2.0 * of_place, positions[touched] / SAME_LAY_MM]))
+        first, of_lay = np.unique(lay, return_index=True, return_inverse=True)[1:]
+        positions[touched] = positions[touched][first[of_lay]]
     return positions[:, _posed(problem)]
 
 
