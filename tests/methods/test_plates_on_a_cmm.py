@@ -14,6 +14,7 @@ from monitor.methods import campaign_method
 from monitor.methods.method import ChainMethod
 from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
+from monitor.workflow.tool_frames import tool_frames
 
 AXIS = '[[machine.tool_chain]]\nname = "{0}"\nkind = "linear"\nalong = "{0}"\n'
 SETUP = """[[setups]]
@@ -141,16 +142,22 @@ def test_a_height_that_axes_measured_is_a_statement_and_one_they_were_told_is_no
     assert unknowns_of(campaign_of(tmp_path, [LYING], 1, "0.00000", told="150.0000")) == 3
 
 
+def without_known_tip(folder: Path) -> Path:
+    """The folder with the place of the tip unknown."""
+    setup = folder / "campaign.toml"
+    text = setup.read_text(encoding="utf-8").replace('known = ["scale", "targets"]', 'known = ["scale"]')
+    setup.write_text(text, encoding="utf-8")
+    return folder
+
+
 @pytest.mark.parametrize("jitter", [0.2e-3, 0.5e-3])
+@pytest.mark.parametrize("equal", [False, True])
 def test_a_height_that_was_written_beside_measured_points_is_none_though_z_jitters(
-    tmp_path: Path, jitter: float
+    tmp_path: Path, jitter: float, equal: bool
 ) -> None:
-    """Was: an error of Z (``EZZ:lag``), where nobody had touched across the plate."""
-    folder = campaign_of(tmp_path, [LYING], 1, "0.00000", told="150.0000")
-    setup, table = folder / "campaign.toml", folder / "probings.csv"
-    setup.write_text(
-        setup.read_text(encoding="utf-8").replace('known = ["scale", "targets"]', 'known = ["scale"]')
-    )
+    """Was: an error of Z (``EZZ:lag``), where nobody touched across the plate; also where two rows are ``equal``."""
+    folder = without_known_tip(campaign_of(tmp_path, [LYING], 1, "0.00000", told="150.0000"))
+    table = folder / "probings.csv"
     rng = np.random.default_rng(3)
     head, *lines = table.read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines):
@@ -158,8 +165,19 @@ def test_a_height_that_was_written_beside_measured_points_is_none_though_z_jitte
         cells[6] = f"{150.0 + rng.normal(0.0, jitter):.5f}"
         cells[7:9] = [f"{float(cell) + rng.normal(0.0, 0.5e-3):.5f}" for cell in cells[7:9]]
         lines[number] = ",".join(cells)
+    if equal:
+        lines.append(",".join(["1", "26", "260", *lines[-1].split(",")[3:]]))
     table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
     assert unknowns_of(folder) == 6  # One turn, two shifts, and the place of the tip.
+
+
+@pytest.mark.parametrize("placement", [LYING, STANDING_XZ])
+def test_a_height_that_axes_measured_once_is_a_statement_without_a_known_tip(
+    tmp_path: Path, placement: np.ndarray
+) -> None:
+    """Was: no number, where no ball was touched twice. Nobody tells axes to go along a plate that lies askew."""
+    folder = without_known_tip(campaign_of(tmp_path, [placement], 1, "0.00000"))
+    assert unknowns_of(folder) == 9
 
 
 def test_a_ball_at_the_origin_of_its_plate_is_no_row_of_zeros(tmp_path: Path) -> None:
@@ -172,4 +190,4 @@ def test_a_ball_at_the_origin_of_its_plate_is_no_row_of_zeros(tmp_path: Path) ->
     table.write_text("\n".join([head, ",".join(cells), *lines, ",".join(elsewhere)]) + "\n", encoding="utf-8")
     campaign = read_campaign(folder)
     assert isinstance(campaign, Campaign)
-    assert not any("zeros" in doubt for doubt in doubts(campaign))
+    assert not any("zeros" in doubt for doubt in doubts(campaign, tool_frames(campaign)))

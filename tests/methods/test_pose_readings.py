@@ -17,6 +17,7 @@ from monitor.readers import read_campaign
 from monitor.readers.doubts.doubts import column_doubts, doubts
 from monitor.records import Array
 from monitor.store.record_json import artefact_json, artefact_record
+from monitor.workflow.tool_frames import tool_frames
 from tests.simulator.robot import frames, point
 from tests.simulator.robot_campaign import ELBOW, JOINTS, errors_of_robot, lever_arms
 
@@ -128,7 +129,10 @@ def test_points_in_metres_are_refused_as_of_a_tracker(tmp_path: Path, reading: s
     folder = six_numbers(tmp_path / "six", 8, poses=40, edit=edits[reading], second=second)
     _altered(folder, lambda rows, _: rows / 1e3)
     campaign = read_campaign(folder)
-    assert any("point_x_mm, point_y_mm and point_z_mm span" in told for told in doubts(campaign))
+    assert any(
+        "point_x_mm, point_y_mm and point_z_mm span" in told
+        for told in doubts(campaign, tool_frames(campaign))
+    )
     with pytest.raises(DataError, match=r"99\d times as large .* units of point_x_mm, .* of setup probe"):
         campaign_method(campaign).problem_of(campaign)
 
@@ -137,7 +141,7 @@ def test_points_of_other_poses_do_not_belong_to_the_joints(tmp_path: Path) -> No
     folder = six_numbers(tmp_path / "six", 9, poses=60)
     _altered(folder, lambda rows, rng: rng.permutation(rows))
     campaign = read_campaign(folder)
-    assert doubts(campaign) == ()
+    assert doubts(campaign, tool_frames(campaign)) == ()
     with pytest.raises(
         DataError, match=r"do not belong together row by row: .* of setup probe stands beside"
     ):
@@ -161,13 +165,15 @@ def test_points_at_zero_are_named_by_their_rows(tmp_path: Path) -> None:
     folder = six_numbers(tmp_path / "six", 12, poses=40)
     is_zero = np.isin(np.arange(40), [10, 11, 12])
     _altered(folder, lambda rows, _: np.where(is_zero[:, None], 0.0, rows))
-    (told,) = column_doubts(read_campaign(folder))
+    campaign = read_campaign(folder)
+    (told,) = column_doubts(campaign, tool_frames(campaign))
     assert told.startswith(
         "setup probe: 3 rows have the point 0, 0, 0 at different poses (run 1, sequence 11, 12, 13)"
     )
     once = six_numbers(tmp_path / "once", 12, poses=40)
     _altered(once, lambda rows, _: np.where((np.arange(40) == 10)[:, None], 0.0, rows))
-    assert column_doubts(read_campaign(once)) == ()
+    campaign = read_campaign(once)
+    assert column_doubts(campaign, tool_frames(campaign)) == ()
 
 
 def _altered(folder: Path, alter: Callable[[Array, np.random.Generator], Array]) -> None:

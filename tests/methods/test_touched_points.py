@@ -9,6 +9,7 @@ import pytest
 
 from monitor.discovery import explain
 from monitor.discovery.machine.fit import fit
+from monitor.discovery.machine.noise.plan_cells import plan_cells, revisited_cells
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.shown_cycles import is_shown
 from monitor.discovery.machine.shapes.variants import (
@@ -46,12 +47,20 @@ PLATES = (
 
 
 def plates(
-    folder: Path, seed: int, *, cycle: float = 0.0, commanded: bool = False
+    folder: Path,
+    seed: int,
+    *,
+    cycle: float = 0.0,
+    commanded: bool = False,
+    once: bool = False,
+    clamped: bool = False,
+    digits: int = 6,
 ) -> tuple[InstrumentProblem, np.ndarray]:
     """The problem of balls 70 mm apart, touched forth and back in two runs; the noise (n, 3) mm of X, Z, Y.
 
-    Each plate lies anew within 2 mm in each run; ``cycle`` mm repeat every 35 mm along X. Axes that are ``commanded``
-    stand at the same positions in both runs, and the noise is that of the points.
+    Each plate lies anew within 2 mm in each run, unless it stays ``clamped``; ``cycle`` mm repeat every 35 mm along X.
+    Axes that are ``commanded`` stand at the same positions in both runs, or at each ``once`` only, and the noise is
+    that of the points. The display of the axes has ``digits``.
     """
     rng = np.random.default_rng(seed)
     lines = ["run,sequence,time_s,setup,target,x_mm,z_mm,y_mm,point_x_mm,point_y_mm,point_z_mm"]
@@ -61,8 +70,9 @@ def plates(
         for name, corner, u, v, count in PLATES:
             row, column = np.divmod(np.arange(count**2), count)
             place = np.array(corner) + 70.0 * np.outer(column, u) + 70.0 * np.outer(row, v)
-            place = np.concatenate([place, place[::-1]])
-            lay = np.zeros(3) if commanded else rng.uniform(-1.0, 1.0, 3)
+            place = place if once else np.concatenate([place, place[::-1]])
+            lay = np.zeros(3) if commanded or clamped else rng.uniform(-1.0, 1.0, 3)
+            lay += 3.0 * run if once else 0.0
             noise = rng.normal(0.0, 0.8e-3, place.shape)
             axes = place + lay - [0.0, 250.0, 0.0]
             point = place - place.mean(axis=0)
@@ -74,7 +84,8 @@ def plates(
             noises.append(noise)
             for (x, y, z), seen in zip(axes, point, strict=True):
                 sequence += 1
-                numbers = ",".join(f"{number:.6f}" for number in (x, z, y, *seen))
+                numbers = ",".join(f"{number:.{digits}f}" for number in (x, z, y))
+                numbers += "".join(f",{number:.6f}" for number in seen)
                 lines.append(f"{run},{sequence},{30.0 * sequence},{name},tip,{numbers}")
     axes_text = "".join(AXIS.format(name=name) for name in "XZY")
     setups = "".join(SETUP.format(name=plate[0]) for plate in PLATES)
@@ -99,9 +110,62 @@ def test_effects_look_at_where_a_ball_is_and_not_at_what_was_read(tmp_path: Path
     assert np.all(np.std(taken - noise, axis=0) < 0.25 * np.std(noise, axis=0))
 
 
-def test_axes_that_are_told_where_to_go_stand_there(tmp_path: Path) -> None:
-    problem, _ = plates(tmp_path, 0, commanded=True)
+@pytest.mark.parametrize("once", [False, True])
+def test_axes_that_are_told_where_to_go_stand_there(once: bool, tmp_path: Path) -> None:
+    """Was: where each position was read once, the axes were taken as brought to balls, and reversals as noise."""
+    problem, _ = plates(tmp_path, 0, commanded=True, once=once)
     assert problem.for_search() is problem
+
+
+def test_points_that_a_coarse_display_makes_equal_are_no_stated_places(tmp_path: Path) -> None:
+    """A tracker prints 0.01 mm and repeats within 3 µm; the scales of axes that were told read a micrometre beside."""
+    rng = np.random.default_rng(1)
+    grid = 70.0 * np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3)
+    told = np.concatenate([grid, grid[::-1], grid])
+    axes, points = told + rng.normal(0.0, 1e-3, told.shape), told + rng.normal(0.0, 3e-3, told.shape)
+    lines = ["run,sequence,time_s,setup,target,x_mm,z_mm,y_mm,point_x_mm,point_y_mm,point_z_mm"]
+    for row, ((x, y, z), seen) in enumerate(zip(axes, points, strict=True), start=1):
+        read = "".join(f",{number:.2f}" for number in seen)
+        lines.append(f"1,{row},{30 * row},xy,tip,{x:.6f},{z:.6f},{y:.6f}{read}")
+    plates(tmp_path, 0)
+    toml = (tmp_path / "campaign.toml").read_text(encoding="utf-8").split("[[setups]]")
+    head = "[[setups]]".join(toml[:2]).replace("uncertainty_um = 0.8", "uncertainty_um = 3.0")
+    (tmp_path / "campaign.toml").write_text(head, encoding="utf-8")
+    (tmp_path / "runs.csv").write_text(
+        "run,started_at,day,warm_up\n1,2025-02-01T08:00:00+00:00,1,false\n", encoding="utf-8"
+    )
+    (tmp_path / "probings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    campaign = read_campaign(tmp_path)
+    assert not campaign_method(campaign).problem_of(campaign).stopping.rows.any()
+
+
+def test_a_row_that_stands_twice_does_not_hide_that_axes_stop_at_balls(tmp_path: Path) -> None:
+    plates(tmp_path, 0)
+    file = tmp_path / "probings.csv"
+    text = file.read_text(encoding="utf-8")
+    last = text.splitlines()[-1]
+    run, sequence, rest = last.split(",", 2)
+    file.write_text(f"{text}{run},{int(sequence) + 1},{rest}\n", encoding="utf-8")
+    campaign = read_campaign(tmp_path)
+    assert campaign_method(campaign).problem_of(campaign).stopping.rows.all()
+
+
+@pytest.mark.parametrize("digits", [3, 6])
+def test_rows_of_a_plate_that_stays_clamped_are_of_one_cell_whatever_the_display(
+    digits: int, tmp_path: Path
+) -> None:
+    """Was: of a display of 1 µm rows were of one cell whose noise agrees: repeatability 0.17 µm in place of 0.8."""
+    problem, _ = plates(tmp_path, 0, clamped=True, digits=digits)
+    once = len(problem.context) // 2
+    assert len(np.unique(plan_cells(problem))) == once
+    assert np.array_equal(plan_cells(problem)[:once], plan_cells(problem)[once:])
+    # A row of a run may be turned round at: its second touch shows the probe alone.
+    assert len(np.unique(revisited_cells(problem))) == once // 2 + len(PLATES)
+
+
+def test_a_plate_that_is_laid_anew_has_other_cells(tmp_path: Path) -> None:
+    problem, _ = plates(tmp_path, 0, digits=3)
+    assert len(np.unique(plan_cells(problem))) == len(problem.context)
 
 
 def test_a_plate_that_is_laid_anew_is_a_grid_in_each_run(tmp_path: Path) -> None:

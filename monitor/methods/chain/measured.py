@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,16 @@ LARGEST_ERROR = 0.1
 # leaves an uncertainty as large as that says nothing of the effect.
 LARGEST_DISPLACEMENT = 50e-3
 LARGEST_ANGLE = 1e-3
+
+
+class Stopping(NamedTuple):
+    """Indices of the ``joints`` that stop where a target is, and the ``rows`` (n,) at which they do: what is read of
+    such a joint holds the noise of the row. ``places`` (n, k), in mm, tell targets of one name apart, None where the
+    name says which one it is."""
+
+    joints: tuple[int, ...]
+    rows: npt.NDArray[np.bool_]
+    places: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -125,10 +135,9 @@ class MeasuredChain(ABC):
         return ()
 
     @property
-    def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
-        """Indices of the joints that stop where a target is, and the rows (n,) at which they do: what is read of such a
-        joint holds the noise of the row."""
-        return self.measured_joints, np.ones(len(self.context), dtype=bool)
+    def stopping(self) -> Stopping:
+        """What stops where a target is: the measured joints, in every row."""
+        return Stopping(self.measured_joints, np.ones(len(self.context), dtype=bool))
 
     @property
     def extra_names(self) -> tuple[str, ...]:

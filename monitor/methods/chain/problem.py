@@ -47,8 +47,8 @@ class ChainProblem(MeasuredChain):
         better than chance (J. B. Ramsey, J. R. Stat. Soc. B 31 (1969) 350, tests models so). At the readings
         themselves sin(2 pi x / 10 mm) at points 10 mm apart is the noise in another unit.
         """
-        joints, rows = self.stopping
-        if self.context.expected is not None or not joints or not rows.any():
+        stopping = self.stopping
+        if self.context.expected is not None or not stopping.joints or not stopping.rows.any():
             return self
         bare = replace(self, added=())
         return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
@@ -291,15 +291,15 @@ class ChainProblem(MeasuredChain):
 def stops(problem: ChainProblem, solution: Solution) -> Array:
     """Where the joints that are stopping do so (n, J) under a solution: the readings less the shortest move that would
     do away with a row's residual."""
-    chain, (joints, rows) = problem.context.chain, problem.stopping
-    measured = list(joints)
+    chain, stopping = problem.context.chain, problem.stopping
+    measured = list(stopping.joints)
     pose = problem.evaluated(solution.local, solution.common, jacobian=True)
     assert pose.by_error is not None
     along = np.array([chain.joints[index].direction for index in measured])
     moved = problem.observe(np.einsum("nrac,ac->nra", pose.by_error[:, :, measured, MOTION, :3], along))
     positions = problem.context.positions.copy()
     shift = np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(pose.residual))
-    positions[:, measured] -= np.where(rows[:, None], shift, 0.0)
+    positions[:, measured] -= np.where(stopping.rows[:, None], shift, 0.0)
     return positions
 
 

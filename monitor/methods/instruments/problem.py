@@ -15,7 +15,7 @@ from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sig
 from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, evaluate_with_sides, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
-from monitor.methods.chain.measured import Displaced
+from monitor.methods.chain.measured import Displaced, Stopping
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
@@ -171,7 +171,7 @@ class InstrumentProblem(ChainProblem):
         return True
 
     @property
-    def stopping(self) -> tuple[tuple[int, ...], npt.NDArray[np.bool_]]:
+    def stopping(self) -> Stopping:
         """The linear axes, at the balls of plates."""
         return brought_to_points(self.context, self.parts)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.readers.faults import and_of
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 from monitor.units import DEGREE
 
 #: A full turn in radians, with room for the last printed digit.
@@ -20,6 +21,9 @@ SHORTER_BY = 45.0
 NEAR_END = 30.0
 #: Degrees within which two angles are one.
 SAME_PLACE = 1e-3
+#: An axis that follows scans or a path usually moves by at most so many degrees, makes so many moves at least, and over
+#: the end of its column at most so many usual ones. Poses in any order (a robot's) move by 120 degrees.
+USUAL_DEG, FEWEST_MOVES, OVER_END = 45.0, 4, 2.0
 
 
 def radians(campaign: Campaign) -> Iterator[str]:
@@ -67,6 +71,9 @@ def angles_begun_anew(campaign: Campaign) -> Iterator[str]:
         turned = 360.0 - float(np.diff(around)[widest])
         if largest - least - turned < SHORTER_BY:
             continue
+        added = np.where(degrees < around[widest + 1], degrees + 360.0, degrees)
+        if not _goes_on(degrees, added, probings.run):
+            continue
         row = int(jumps[0])
         yield (
             f"{axis.lower()}_deg goes from {degrees[row]:.6g} to {degrees[row + 1]:.6g} (run {probings.run[row]}, "
@@ -74,3 +81,19 @@ def angles_begun_anew(campaign: Campaign) -> Iterator[str]:
             f"{end:.0f} there, its angles span {turned:.4g} degrees and not {largest - least:.4g}: then add 360 to "
             f"those below {around[widest + 1]:.6g}, because wind-up, cables and gravity follow the way that it turned"
         )
+
+
+def _goes_on(degrees: Array, added: Array, runs: npt.NDArray[np.int64]) -> bool:
+    """Whether an axis that follows scans or a path stood at the angles (n,) with 360 ``added``.
+
+    Passes that really went from -170 to 170 degrees, and back at once, jump less often as they stand than with 360
+    added, where each is cut in the middle.
+    """
+    within = np.diff(runs) == 0
+    jumped, step = np.abs(np.diff(degrees)[within]) > 180.0, np.abs(np.diff(added)[within])
+    moves = step[step > SAME_PLACE]
+    if len(moves) < FEWEST_MOVES or np.count_nonzero(step > 180.0) >= np.count_nonzero(jumped):
+        return False
+    usual = float(np.median(moves))
+    over_end = step[jumped & (np.abs(step - np.ptp(added)) > SAME_PLACE)]
+    return usual <= USUAL_DEG and bool(len(over_end)) and bool(np.median(over_end) <= OVER_END * usual)

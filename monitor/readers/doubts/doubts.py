@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
 from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.repeated_rows import repeated_rows
+from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.readers.doubts.zero_rows import zero_rows
 from monitor.readers.faults import and_of
@@ -46,36 +47,42 @@ CLOCKS = timedelta(hours=1)
 BALL_RANGE = (0.1, 300.0)
 
 
-def doubts(campaign: Campaign) -> tuple[str, ...]:
-    """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
+def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, ...]:
+    """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns.
+
+    Where the points that instruments read should have moved is asked only with the ``frames`` of the tool.
+    """
     return tuple(
-        sentence
-        for check in (
-            _short_runs,
-            _travel,
-            radians,
-            angles_begun_anew,
-            _places,
-            exchanged_columns,
-            _units_of_runs,
-            _statements,
-            _temperatures,
-            _pressure_and_humidity,
-            _days,
-            _to_come,
-            repeated_rows,
-            zero_rows,
+        chain(
+            _short_runs(campaign),
+            _travel(campaign, frames),
+            radians(campaign),
+            angles_begun_anew(campaign),
+            _places(campaign),
+            exchanged_columns(campaign),
+            _units_of_runs(campaign),
+            _statements(campaign),
+            _temperatures(campaign),
+            _pressure_and_humidity(campaign),
+            _days(campaign),
+            _to_come(campaign),
+            repeated_rows(campaign),
+            zero_rows(campaign, frames),
         )
-        for sentence in check(campaign)
     )
 
 
-def column_doubts(campaign: Campaign) -> tuple[str, ...]:
+def column_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, ...]:
     """The sentences on columns exchanged, of other sign or unit, or of zeros, each of which refutes a fit."""
     return tuple(
-        sentence
-        for check in (_travel, radians, _places, exchanged_columns, _units_of_runs, zero_rows)
-        for sentence in check(campaign)
+        chain(
+            _travel(campaign, frames),
+            radians(campaign),
+            _places(campaign),
+            exchanged_columns(campaign),
+            _units_of_runs(campaign),
+            zero_rows(campaign, frames),
+        )
     )
 
 
@@ -99,7 +106,7 @@ def _spans(columns: dict[str, Array]) -> dict[str, float]:
     return {name: float(np.ptp(values)) for name, values in columns.items() if len(values)}
 
 
-def _travel(campaign: Campaign) -> Iterator[str]:
+def _travel(campaign: Campaign, frames: ToolFrames | None) -> Iterator[str]:
     """Columns in metres: nothing moves by more than a few millimetres."""
     machine, probings = campaign.machine, campaign.probings
     groups = (
@@ -109,7 +116,7 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             if machine.is_linear(axis)
         },
         {name: values for name, values in probings.channels.items() if name.startswith("tracker_")},
-        *_points_of_setups(campaign),
+        *(() if frames is None else _points_of_setups(campaign, frames)),
     )
     for columns in groups:
         spans = _spans(columns)
@@ -120,17 +127,24 @@ def _travel(campaign: Campaign) -> Iterator[str]:
             )
 
 
-def _points_of_setups(campaign: Campaign) -> Iterator[dict[str, Array]]:
-    """The columns of points that each setup read, of its own rows."""
-    channels = campaign.probings.channels
+def _points_of_setups(campaign: Campaign, frames: ToolFrames) -> Iterator[dict[str, Array]]:
+    """The columns of points that each setup read, of its own rows, where the axes moved every point of the tool.
+
+    Axes that turn a head about its tip keep that in place (ISO 10791-6): a camera reads micrometres there.
+    """
+    probings, channels = campaign.probings, campaign.probings.channels
     for index, setup in enumerate(campaign.artefact.setups if "setup" in channels else ()):
-        if setup.reading in ("point", "pose"):
-            of_setup = {
-                name: values[channels["setup"] == index + 1]
-                for name, values in channels.items()
-                if name.startswith("point_")
-            }
-            yield {name: values[np.isfinite(values)] for name, values in of_setup.items()}
+        if setup.reading not in ("point", "pose"):
+            continue
+        mine = np.flatnonzero(channels["setup"] == index + 1)
+        columns = {name: values[mine] for name, values in channels.items() if name.startswith("point_")}
+        columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
+        short = 0.0 < max(_spans(columns).values(), default=0.0) < SHORTEST_TRAVEL
+        if short and any(
+            apart(frames(mine[probings.run[mine] == run])) > SHORTEST_TRAVEL
+            for run in np.unique(probings.run[mine])
+        ):
+            yield columns
 
 
 def _places(campaign: Campaign) -> Iterator[str]:

@@ -11,6 +11,7 @@ from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
+from monitor.workflow.tool_frames import tool_frames
 
 
 def refusal_of(
@@ -54,7 +55,11 @@ def with_mistake(
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
     mistakes = find_mistakes(part, problem_of, None)
-    said = (mistake_sentence(mistakes_found(mistakes)),) if mistakes else column_doubts(campaign)
+    said = (
+        (mistake_sentence(mistakes_found(mistakes)),)
+        if mistakes
+        else column_doubts(campaign, tool_frames(campaign))
+    )
     return _with_sentences(refusal, said) if said else refusal
 
 

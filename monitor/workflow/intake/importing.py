@@ -36,6 +36,7 @@ from monitor.workflow.intake.checked_tolerances import check_tolerances
 from monitor.workflow.intake.copied_runs import check_copies
 from monitor.workflow.intake.curve_base import check_base
 from monitor.workflow.intake.gross_doubts import gross_doubts
+from monitor.workflow.tool_frames import tool_frames
 from monitor.workflow.true_values import is_truth
 
 
@@ -193,7 +194,12 @@ def _read(db: Database, source: _Source) -> _Reading:
 
         check_sources(campaign)
     check_tolerances(campaign)
-    notes = (*notes, *check_copies(db, campaign), *doubts(campaign), *gross_doubts(campaign))
+    notes = (
+        *notes,
+        *check_copies(db, campaign),
+        *doubts(campaign, tool_frames(campaign)),
+        *gross_doubts(campaign),
+    )
     return _Reading(campaign, notes, understood)
 
 

@@ -27,8 +27,11 @@ from monitor.sources import SCALE
 # a plane nearly, and off it by more than so many mm. Nearer than that axes lie where they are told to go.
 PROGRAMMED = 5e-5
 # Where x and y are measured and not stated, nobody may have touched across the plane, and scales jitter: the axes lie
-# off it by more than so many stated standard uncertainties there.
-JITTER = 2.0
+# off it by more than so many stated standard uncertainties there, or it is a plane along which nobody tells axes to go:
+# it lies askew, and the least that a direction of the machine spreads is so many times what they lie off it.
+JITTER, ASKEW = 2.0, 5.0
+# Of stated places so many rows at least are at one that another row has. Two measured ones may be equal by chance.
+STATED_AGAIN = 0.2
 
 
 @dataclass(frozen=True)
@@ -146,9 +149,8 @@ def _without_constant(rows: Rows, setup: Setup) -> Array:
 
 def _is_flat(rows: Rows, setup: Setup) -> bool:
     """Whether in some run the axes found the points in a plane as nearly as they measure, and not exactly."""
-    nearest = PROGRAMMED
-    if not _are_stated(rows, setup):
-        nearest = float("inf") if setup.standard_uncertainty is None else JITTER * setup.standard_uncertainty
+    u = float("inf") if setup.standard_uncertainty is None else setup.standard_uncertainty
+    jitter = 0.0 if _are_stated(rows, setup) else JITTER * u
     count = len(rows)
     none = np.zeros((count, len(rows.chain.joints), 2, 6))
     targets = np.unique(rows.target)
@@ -157,7 +159,9 @@ def _is_flat(rows: Rows, setup: Setup) -> bool:
     for run in np.unique(rows.run):
         arms = points[rows.run == run]
         spread = np.linalg.svd(arms - arms.mean(axis=0), compute_uv=False) / np.sqrt(len(arms))
-        if len(spread) == 3 and nearest < spread[2] < FLAT * spread[1]:
+        if len(spread) < 3 or not PROGRAMMED < spread[2] < FLAT * spread[1]:
+            continue
+        if spread[2] > jitter or arms.std(axis=0).min() > ASKEW * spread[2]:
             return True
     return False
 
@@ -165,7 +169,8 @@ def _is_flat(rows: Rows, setup: Setup) -> bool:
 def _are_stated(rows: Rows, setup: Setup) -> bool:
     """Whether the points are places of a plate to which the axes were brought: they recur to the last digit, or the tip
     that is brought to them is known."""
-    return "targets" in setup.known or len(np.unique(rows.measured[:, :2], axis=0)) < len(rows)
+    again = len(rows) - len(np.unique(rows.measured[:, :2], axis=0))
+    return "targets" in setup.known or again >= STATED_AGAIN * len(rows)
 
 
 def _stated_places(setup: Setup, rows: Rows, targets: Sequence[str] | npt.NDArray[np.str_]) -> Array:
