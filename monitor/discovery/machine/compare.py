@@ -53,14 +53,14 @@ def pure_error(fit: Fit) -> tuple[float, float, float]:
     In a single run the readings of poses to which it came back are compared: the fit is the same at each, so that no
     degree of freedom of theirs is lost.
     """
-    weighted = ~fit.left_out
+    weighted, read = ~fit.left_out, fit.has_weight
     white = fit.vectors[weighted] / fit.problem.sigma[weighted]
     if len(fit.problem.runs) == 1:
-        error, lack, repeated = split(white, revisited_cells(fit.problem)[weighted])
-        return error, float(repeated * white.shape[1]), lack
-    error, lack, repeated = split(white, plan_cells(fit.problem)[weighted])
-    # The runs' own unknowns take their part of the scatter in proportion to the rows.
-    return error, repeated / len(white) * fit.degrees_of_freedom, lack
+        error, lack, repeated = split(white, revisited_cells(fit.problem)[weighted], read[weighted])
+        return error, float(repeated), lack
+    error, lack, repeated = split(white, plan_cells(fit.problem)[weighted], read[weighted])
+    # The runs' own unknowns take their part of the scatter in proportion to the numbers.
+    return error, repeated / fit.readings * fit.degrees_of_freedom, lack
 
 
 def lack_of_fit(fit: Fit) -> tuple[LackOfFit | None, float | None]:
