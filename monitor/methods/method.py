@@ -184,6 +184,19 @@ class SharesOf(Protocol):
     ) -> tuple[tuple[InstrumentShare, ...], Array]: ...
 
 
+class ContrastsOf(Protocol):
+    """Gives what each setup of a ``run`` says against all others; ``white`` makes numbers (..., R, N) of all runs
+    independent where neighbours resemble each other, with None they are."""
+
+    def __call__(
+        self,
+        problem: ChainProblem,
+        solution: Solution,
+        run: int,
+        white: Callable[[Array], Array] | None = None,
+    ) -> tuple[Contrast, ...]: ...
+
+
 class ContrastKind(StrEnum):
     """What is held against all others: a setup, an instrument of several, or a number that several setups share and
     that is stated beforehand (the length of a bar)."""
@@ -252,7 +265,7 @@ class Instruments(Able):
     they are set up for, without a fit."""
 
     shares: SharesOf
-    contrasts: Callable[[ChainProblem, Solution, int], tuple[Contrast, ...]]
+    contrasts: ContrastsOf
     contrast: Callable[[ChainProblem, Solution, int, str], Contrast | None]
     scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]

@@ -44,7 +44,7 @@ from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
-from monitor.workflow.instruments.against_others import against_others
+from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
@@ -125,14 +125,21 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     # A search that has not the memory is refused before minutes of fitting.
     first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
+    beside = None
+    if not explanation.mistakes:
+        beside = contradiction_in(explanation.final, campaign_method(campaign).instruments)
+    comparison = explanation.comparison
+    is_explained = comparison.verdict is Verdict.EXPLAINED
+    if beside is not None and is_explained:
+        # As `compare` judges: the residual of many rows hides what one setup of few says against all others.
+        explanation = replace(
+            explanation, comparison=replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
+        )
     answer = with_plans(machine_explanation(explanation), explanation.missing, campaign, model)
     answer = with_measurements(answer, campaign, as_model(model))
-    if not explanation.mistakes:
-        final, ability = explanation.final, campaign_method(campaign).instruments
-        beside = against_others(final.problem, final.solution, ability)
-        # Where several may be the wrong one, or none alone, the effects come first.
-        if beside is not None and len(beside.suspects) == 1:
-            answer = replace(answer, against_others=beside)
+    # Where several may be the wrong one, or none alone, the effects come first.
+    if beside is not None and (is_explained or len(beside.suspects) == 1):
+        answer = replace(answer, against_others=beside)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.
