@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -15,7 +15,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.scene_columns import raw_columns
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
-from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
+from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of, without_powers
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
@@ -26,7 +26,7 @@ from monitor.discovery.search.missing import Missing, Rival
 from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
-from monitor.effects import ChainEffect
+from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
 from monitor.effects.shapes import Harmonics
@@ -293,7 +293,7 @@ def _missing(
         # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
         largest = int(np.abs(curve.size).argmax())
         amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
-        raw = _beyond_base(candidate)
+        raw = _of_shape(candidate, beyond_base)
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
@@ -318,7 +318,7 @@ def _missing(
         covariance=covariance,
         amplitude=amplitude,
         u=u,
-        peak=float(np.linalg.norm(raw @ coefficients, axis=1).max()),
+        peak=_peak(scene, candidate, raw, coefficients),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
@@ -343,12 +343,36 @@ def _missing(
     )
 
 
-def _beyond_base(candidate: ChainCandidate) -> Array:
-    """The displacement (n, d, k) in mm of a shape without what the base has of it already."""
+def _peak(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficients: Array) -> float:
+    """The largest displacement in mm where points were measured, of displacements ``raw`` (n, d, k); no more than what
+    an error of an axis that follows no driver makes beyond the constant and the slope that the base takes up.
+
+    Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
+    """
+    is_length = scene.fit.problem.is_length
+    rows = is_length if is_length.any() else ~is_length
+
+    def largest(displacement: Array) -> float:
+        return float(np.linalg.norm(displacement[rows] @ coefficients, axis=1).max())
+
+    effect = candidate.effect
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+        return largest(raw)
+    seen = {each.family for each in scene.candidates if each.visible}
+    error = candidate.family.partition(":")[0]
+    powers = [power for power, shape in enumerate(("const", "poly1")) if f"{error}:{shape}" not in seen]
+    return min(
+        largest(raw),
+        largest(_of_shape(candidate, lambda context, of: without_powers(context, of, powers))),
+    )
+
+
+def _of_shape(candidate: ChainCandidate, columns_of: Callable[[Context, ChainEffect], Array]) -> Array:
+    """The displacement (n, d, k) in mm of an error of an axis with other columns of its shape."""
     effect, basis, fit = candidate.effect, candidate.basis, candidate.fit
     if not isinstance(effect, ChainEffect) or not isinstance(basis, ChainBasis):
         return candidate.raw
-    columns = beyond_base(fit.problem.context, effect)
+    columns = columns_of(fit.problem.context, effect)
     return np.moveaxis(raw_columns(fit, replace(basis, columns=columns)), 0, 2)
 
 
