@@ -184,19 +184,6 @@ class SharesOf(Protocol):
     ) -> tuple[tuple[InstrumentShare, ...], Array]: ...
 
 
-class ContrastsOf(Protocol):
-    """Gives what each setup of a ``run`` says against all others; ``white`` makes numbers (..., R, N) of all runs
-    independent where neighbours resemble each other, with None they are."""
-
-    def __call__(
-        self,
-        problem: ChainProblem,
-        solution: Solution,
-        run: int,
-        white: Callable[[Array], Array] | None = None,
-    ) -> tuple[Contrast, ...]: ...
-
-
 class ContrastKind(StrEnum):
     """What is held against all others: a setup, an instrument of several, or a number that several setups share and
     that is stated beforehand (the length of a bar)."""
@@ -260,12 +247,12 @@ class SetupDrift:
 @dataclass(frozen=True)
 class Instruments(Able):
     """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``contrasts`` what
-    each setup says against all others and ``contrast`` what one of them does, by its name, ``scatters`` what its
-    readings scatter, ``drifts`` which setups run off with the time, ``misread`` which ones read something else than
+    each setup says against all others (of a problem, a solution, a run, and what makes numbers (..., R, N) of all runs
+    independent, if anything) and ``contrast`` what one of them does, by its name, ``scatters`` what its readings scatter, ``drifts`` which setups run off with the time, ``misread`` which ones read something else than
     they are set up for, without a fit."""
 
     shares: SharesOf
-    contrasts: ContrastsOf
+    contrasts: Callable[..., tuple[Contrast, ...]]
     contrast: Callable[[ChainProblem, Solution, int, str], Contrast | None]
     scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]

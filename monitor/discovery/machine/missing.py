@@ -358,9 +358,9 @@ def _peak(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficients
     effect = candidate.effect
     if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
         return largest(raw)
-    seen = {each.family for each in scene.candidates if each.visible}
+    visible = {each.family for each in scene.candidates if each.visible}
     error = candidate.family.partition(":")[0]
-    powers = [power for power, shape in enumerate(("const", "poly1")) if f"{error}:{shape}" not in seen]
+    powers = [power for power, shape in enumerate(("const", "poly1")) if f"{error}:{shape}" not in visible]
     return min(
         largest(raw),
         largest(_of_shape(candidate, lambda context, of: without_powers(context, of, powers))),
