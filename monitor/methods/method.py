@@ -247,12 +247,13 @@ class SetupDrift:
 @dataclass(frozen=True)
 class Instruments(Able):
     """Several instruments measure one machine; ``shares`` says what each of them does for a run, ``contrasts`` what
-    each setup says against all others and ``contrast`` what one of them does, by its name, ``scatters`` what its
-    readings scatter, ``drifts`` which setups run off with the time, ``misread`` which ones read something else than
-    they are set up for, without a fit."""
+    each setup says against all others (of a problem, a solution, a run, and what makes numbers (..., R, N) of all runs
+    independent, if anything) and ``contrast`` what one of them does, by its name, ``scatters`` what its readings
+    scatter, ``drifts`` which setups run off with the time, ``misread`` which ones read something else than they are set
+    up for, without a fit."""
 
     shares: SharesOf
-    contrasts: Callable[[ChainProblem, Solution, int], tuple[Contrast, ...]]
+    contrasts: Callable[..., tuple[Contrast, ...]]
     contrast: Callable[[ChainProblem, Solution, int, str], Contrast | None]
     scatters: Callable[[ChainProblem, Solution, int], tuple[SetupScatter, ...]]
     drifts: Callable[[ChainProblem, Solution], tuple[SetupDrift, ...]]

@@ -15,7 +15,10 @@ from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.search.comparison import split
+from monitor.methods import campaign_method
 from monitor.methods.samba.method import problem_of
+from monitor.readers import read_campaign
+from tests.simulator import four_instruments as shop
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd" / "linear"
 
@@ -135,6 +138,35 @@ def test_lack_of_fit_has_the_stated_level_where_nothing_is_hidden(virtual_campai
         assert repeatability == pytest.approx(1e-3, rel=0.25)
         p_values.append(test.p_value)
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+
+
+def _with_r_test(folder: Path, seed: int, runs: int = 1):
+    """Lasers there and back twice beside an R-test, one and three numbers a row; nothing is hidden."""
+    rng, chain = np.random.default_rng(seed), shop.machine(0.0)
+    rows = []
+    for run in range(1, runs + 1):
+        parts = [shop.laser(chain, rng, 2), shop.r_test(chain, rng)]
+        rows += [{"run": run, **row} for _, of in parts for row in of]
+    started = [f"2026-03-{day:02d}T08:00:00+00:00" for day in range(1, runs + 1)]
+    campaign = read_campaign(
+        chain.write(folder / f"{seed}", "".join(text for text, _ in parts), rows, started=started)
+    )
+    return fit(campaign_method(campaign).problem_of(campaign))
+
+
+def test_repeats_of_one_number_beside_rows_of_three_count_once(tmp_path):
+    """A laser's reading is one number, also where an R-test of the same campaign reads three."""
+    test, _ = lack_of_fit(_with_r_test(tmp_path, 3))
+    # Of each axis nine stops inside come back three times, both ends twice: what is read again where the axis turns
+    # round is no return. The R-test does not come back.
+    assert test.pure_error_degrees_of_freedom == 3 * (9 * 3 + 2 * 2)
+
+
+def test_p_values_of_lasers_beside_an_r_test_are_uniform(tmp_path, seeds):
+    """Of 40 campaigns of one run (a sample: 12); F is about 1, and repeats scatter as stated."""
+    tests = [lack_of_fit(_with_r_test(tmp_path, seed)) for seed in seeds(40, 12)]
+    assert stats.kstest([test.p_value for test, _ in tests], "uniform").pvalue > 1e-3
+    assert np.mean([test.f for test, _ in tests]) == pytest.approx(1.0, abs=0.25)
 
 
 def test_one_run_has_no_repeatability(virtual_campaigns):

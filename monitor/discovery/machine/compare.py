@@ -8,14 +8,16 @@ regression analysis, section 2.1: F of lack of fit over pure error), the total a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
 from monitor.discovery.machine.noise.plan_cells import plan_cells, readings_a_visit, revisited_cells
 from monitor.discovery.search.comparison import (
+    LACK_OF_FIT_LEVEL,
     Comparison,
     LackOfFit,
     Part,
@@ -53,14 +55,14 @@ def pure_error(fit: Fit) -> tuple[float, float, float]:
     In a single run the readings of poses to which it came back are compared: the fit is the same at each, so that no
     degree of freedom of theirs is lost.
     """
-    weighted = ~fit.left_out
+    weighted, read = ~fit.left_out, fit.has_weight
     white = fit.vectors[weighted] / fit.problem.sigma[weighted]
     if len(fit.problem.runs) == 1:
-        error, lack, repeated = split(white, revisited_cells(fit.problem)[weighted])
-        return error, float(repeated * white.shape[1]), lack
-    error, lack, repeated = split(white, plan_cells(fit.problem)[weighted])
-    # The runs' own unknowns take their part of the scatter in proportion to the rows.
-    return error, repeated / len(white) * fit.degrees_of_freedom, lack
+        error, lack, repeated = split(white, revisited_cells(fit.problem)[weighted], read[weighted])
+        return error, float(repeated), lack
+    error, lack, repeated = split(white, plan_cells(fit.problem)[weighted], read[weighted])
+    # The runs' own unknowns take their part of the scatter in proportion to the numbers.
+    return error, repeated / fit.readings * fit.degrees_of_freedom, lack
 
 
 def lack_of_fit(fit: Fit) -> tuple[LackOfFit | None, float | None]:
@@ -104,6 +106,9 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
 def compare(fit: Fit, campaign: str, model: str) -> ChainComparison:
     """Compare a fitted model with its campaign."""
     test, repeatability = lack_of_fit(fit)
+    if test is not None and test.p_value < LACK_OF_FIT_LEVEL and fit.correlation() is not None:
+        # Readings that resemble their neighbours are fewer than they count for: the verdict is by what is left of them.
+        test = replace(test, p_value=max(test.p_value, beyond_neighbours(fit) or 0.0))
     excess = excess_p_value(fit.sum_of_squares, fit.degrees_of_freedom)
     return ChainComparison(
         rms=fit.rms,

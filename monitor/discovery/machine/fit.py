@@ -153,6 +153,10 @@ class Fit:
 
         Of several runs only what they do not share counts: an effect that the model lacks makes neighbours alike too.
         """
+        return self._correlation
+
+    @cached_property
+    def _correlation(self) -> Correlation | None:
         return self.noise_design.correlation(self.solution.last.residual)
 
     @cached_property

@@ -18,7 +18,7 @@ from monitor.discovery.machine.shapes.curves import Curve
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
-from monitor.discovery.machine.sizes import size_of, spread_or_length
+from monitor.discovery.machine.sizes import peak_of, size_of, spread_or_length
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -281,7 +281,7 @@ def _missing(
         covariance=covariance,
         amplitude=size.amplitude,
         u=size.u,
-        peak=float(np.linalg.norm(size.raw @ coefficients, axis=1).max()),
+        peak=peak_of(scene, candidate, size.raw, coefficients),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,

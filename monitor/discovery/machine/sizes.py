@@ -7,17 +7,18 @@ of a free shape) the size is the largest value of the error.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from monitor.discovery.machine.joints.curve_findings import is_curve
-from monitor.discovery.machine.scene import ChainCandidate, MachineEffect
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect
 from monitor.discovery.machine.scene_columns import raw_columns
-from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of
+from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of, without_powers
 from monitor.discovery.search.amplitudes import length_of
-from monitor.effects import ChainEffect
-from monitor.effects.drivers import EachRun
+from monitor.effects import ChainEffect, Context
+from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
 from monitor.effects.shapes import Harmonics, Nodes
 from monitor.effects.weight import LinkWeights
@@ -48,7 +49,7 @@ def size_of(candidate: ChainCandidate, coefficients: Array, covariance: Array) -
             # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
             largest = int(np.abs(curve.size).argmax())
             amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
-            return Size(amplitude, u, _beyond_base(candidate), curve=curve)
+            return Size(amplitude, u, _of_shape(candidate, beyond_base), curve=curve)
     if isinstance(effect, ChainEffect):
         if isinstance(effect.shape, Nodes) and not isinstance(effect.driver, EachRun):
             # The length of all nodes grows with their number: what the axis errs by is the largest of them.
@@ -84,10 +85,34 @@ def largest_deviation(columns: Array, coefficients: Array, covariance: Array) ->
     return abs(float(row @ coefficients)), float(np.sqrt(max(row @ covariance @ row, 0.0)))
 
 
-def _beyond_base(candidate: ChainCandidate) -> Array:
-    """The displacement (n, d, k) in mm of a shape without what the base has of it already."""
+def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficients: Array) -> float:
+    """The largest displacement in mm where points were measured, of displacements ``raw`` (n, d, k); no more than what
+    an error of an axis that follows no driver makes beyond the constant and the slope that the base takes up.
+
+    Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
+    """
+    is_length = scene.fit.problem.is_length
+    rows = is_length if is_length.any() else ~is_length
+
+    def largest(displacement: Array) -> float:
+        return float(np.linalg.norm(displacement[rows] @ coefficients, axis=1).max())
+
+    effect = candidate.effect
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+        return largest(raw)
+    visible = {each.family for each in scene.candidates if each.visible}
+    error = candidate.family.partition(":")[0]
+    powers = [power for power, shape in enumerate(("const", "poly1")) if f"{error}:{shape}" not in visible]
+    return min(
+        largest(raw),
+        largest(_of_shape(candidate, lambda context, of: without_powers(context, of, powers))),
+    )
+
+
+def _of_shape(candidate: ChainCandidate, columns_of: Callable[[Context, ChainEffect], Array]) -> Array:
+    """The displacement (n, d, k) in mm of an error of an axis with other columns of its shape."""
     effect, basis, fit = candidate.effect, candidate.basis, candidate.fit
     if not isinstance(effect, ChainEffect) or not isinstance(basis, ChainBasis):
         return candidate.raw
-    columns = beyond_base(fit.problem.context, effect)
+    columns = columns_of(fit.problem.context, effect)
     return np.moveaxis(raw_columns(fit, replace(basis, columns=columns)), 0, 2)

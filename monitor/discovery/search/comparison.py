@@ -68,16 +68,21 @@ def part_of(residual: Array) -> Part:
     return Part(float(np.sqrt(np.mean(residual**2))), float(np.abs(residual).max()), len(residual))
 
 
-def split(residual: Array, cells: npt.NDArray[np.int64]) -> tuple[float, float, int]:
+def split(
+    residual: Array, cells: npt.NDArray[np.int64], read: npt.NDArray[np.bool_] | None = None
+) -> tuple[float, float, int]:
     """Split the sum of squares of residuals (n, d) into that about the mean of their cell and that of these means.
 
-    Return both, and the number of rows (n - cells) that the first rests on.
+    Return both, and how many numbers the first rests on: those that were ``read`` (n, d) less one a cell and column.
+    What was not read has the residual 0. None: all were.
     """
-    _, cell, count = np.unique(cells, return_inverse=True, return_counts=True)
+    cell = np.unique(cells, return_inverse=True)[1].reshape(-1)
+    present = np.ones(residual.shape) if read is None else read.astype(np.float64)
     total = np.stack([np.bincount(cell, weights=column) for column in residual.T], axis=1)
-    mean = total / count[:, None]
-    scatter = float(np.sum((residual - mean[cell]) ** 2))
-    return scatter, float(np.sum(count[:, None] * mean**2)), len(residual) - len(count)
+    count = np.stack([np.bincount(cell, weights=column) for column in present.T], axis=1)
+    mean = total / np.maximum(count, 1.0)
+    scatter = float(np.sum(present * (residual - mean[cell]) ** 2))
+    return scatter, float(np.sum(count * mean**2)), int(present.sum()) - int(np.count_nonzero(count))
 
 
 def lack_of_fit_test(

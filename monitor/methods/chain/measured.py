@@ -116,6 +116,11 @@ class MeasuredChain(ABC):
         return np.ones(self.sigma.shape, dtype=bool)
 
     @property
+    def is_length(self) -> npt.NDArray[np.bool_]:
+        """Which rows (n,) say where a point is, in mm; the others say angles alone."""
+        return np.ones(len(self.context), dtype=bool)
+
+    @property
     def series(self) -> npt.NDArray[np.int64]:
         """Which series (n,) a row belongs to: readings resemble those of one instrument before them, no others."""
         return np.zeros(len(self.context), dtype=np.int64)

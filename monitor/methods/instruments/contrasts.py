@@ -14,7 +14,7 @@ and is known beforehand (the length of a bar) may be the wrong one as well: with
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +32,13 @@ from monitor.records import Array
 ASKED = 0.1
 
 
-def contrasts(problem: ChainProblem, solution: Solution, run: int) -> tuple[Contrast, ...]:
-    """What every setup and every instrument of several setups says against all others, in a run."""
-    return contrasts_of(run_rows(problem, solution, run))
+def contrasts(
+    problem: ChainProblem, solution: Solution, run: int, white: Callable[[Array], Array] | None = None
+) -> tuple[Contrast, ...]:
+    """What every setup and every instrument of several setups says against all others, in a run; ``white`` takes out
+    of numbers (..., R, N) what neighbours share."""
+    at = run_rows(problem, solution, run)
+    return contrasts_of(at if white is None else at.made_independent(white))
 
 
 def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:

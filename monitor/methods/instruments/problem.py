@@ -86,19 +86,17 @@ class InstrumentProblem(ChainProblem):
     @cached_property
     def own_start(self) -> Array:
         """The first guesses (R, q): zeros, slopes and spheres as a machine without errors leaves them."""
-        runs = len(self.runs)
-        start = np.zeros((runs, len(self.own_names)))
+        start = np.zeros((len(self.runs), len(self.own_names)))
         for part, columns in zip(self.parts, self.own_columns, strict=True):
-            start[:, columns] = first_guess(part, runs, self._nominal)
+            start[:, columns] = first_guess(part, len(start), self._nominal)
         return start
 
     @property
     def components(self) -> tuple[str, ...]:
         """The numbers of a row: by their names where there is one kind, else counted."""
         names = {part.reading.numbers for part in self.parts}
-        if len(names) == 1:
-            return next(iter(names))
-        return tuple(f"number {number + 1}" for number in range(self.sigma.shape[1]))
+        counted = tuple(f"number {number + 1}" for number in range(self.sigma.shape[1]))
+        return names.pop() if len(names) == 1 else counted
 
     @cached_property
     def is_number(self) -> npt.NDArray[np.bool_]:
@@ -107,6 +105,12 @@ class InstrumentProblem(ChainProblem):
         for part in self.parts:
             numbers[part.at, : len(part.reading.numbers)] = True
         return numbers
+
+    @property
+    def is_length(self) -> npt.NDArray[np.bool_]:
+        """The rows (n,) of setups in mm."""
+        angles = [row for part in self.parts if part.reading.angular for row in part.at]
+        return ~np.isin(np.arange(len(self.context)), angles)
 
     @property
     def series(self) -> npt.NDArray[np.int64]:

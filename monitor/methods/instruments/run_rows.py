@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +81,16 @@ class RunRows:
                 rows.setdefault(name, []).append(self.extras + number)
                 setups[name] = frozenset(part.id for part in parts)
         return {name: (np.array(of_name), setups[name]) for name, of_name in rows.items()}
+
+    def made_independent(self, white: Callable[[Array], Array]) -> Self:
+        """The rows with numbers that ``white`` (..., R, N) makes independent within every setup; what is nominal says
+        only what can be separated, which that does not change."""
+        index = int(np.searchsorted(self.problem.runs, self.run))
+        columns = np.column_stack([self.jacobian, self.residual]).T
+        of_runs = np.zeros((len(columns), len(self.problem.runs), columns.shape[1]))
+        of_runs[:, index] = columns
+        independent = white(of_runs)[:, index].T
+        return replace(self, jacobian=independent[:, :-1], residual=independent[:, -1])
 
     @cached_property
     def sizes(self) -> Array:

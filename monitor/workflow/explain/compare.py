@@ -20,7 +20,7 @@ from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
 from monitor.workflow.identify.mistaken_setups import mistaken_setups
-from monitor.workflow.instruments.against_others import against_others
+from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.instruments.drifting import running_with_time
 from monitor.workflow.instruments.instruments import disagreement
 from monitor.workflow.models import label
@@ -61,7 +61,7 @@ def _compare_machine(fit: Fit, campaign: Campaign, model: StoredModel) -> tuple[
         return comparison_figures(comparison, fit, folder)
 
     apart = disagreement(fit.problem, fit.solution, ability)
-    beside = against_others(fit.problem, fit.solution, ability)
+    beside = contradiction_in(fit, ability)
     drifting = running_with_time(fit.problem, fit.solution, ability)
     if beside is not None and comparison.verdict is Verdict.EXPLAINED:
         # The residual of many rows hides what one setup of few says against all others.

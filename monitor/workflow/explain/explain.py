@@ -46,7 +46,7 @@ from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
-from monitor.workflow.instruments.against_others import against_others
+from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 
@@ -115,17 +115,22 @@ def explained(
 ) -> MachineExplanation:
     """An explanation at a ``rate`` as it is said and stored, whoever asked: its ties are asked of the plan first, and
     of the setups that one contradicts all others."""
+    beside = None
+    if not explanation.mistakes:
+        beside = contradiction_in(explanation.final, campaign_method(campaign).instruments)
+    comparison = explanation.comparison
+    is_explained = comparison.verdict is Verdict.EXPLAINED
+    if beside is not None and is_explained:
+        # As `compare` judges: the residual of many rows hides what one setup of few says against all others.
+        comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
+        explanation = replace(explanation, comparison=comparison)
     answer = replace(machine_explanation(explanation), rate=rate)
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
-    if explanation.mistakes:
-        return answer
-    final, ability = explanation.final, campaign_method(campaign).instruments
-    beside = against_others(final.problem, final.solution, ability)
     # Where several may be the wrong one, or none alone, the effects come first.
-    return (
-        replace(answer, against_others=beside) if beside is not None and len(beside.suspects) == 1 else answer
-    )
+    if beside is not None and (is_explained or len(beside.suspects) == 1):
+        answer = replace(answer, against_others=beside)
+    return answer
 
 
 def _with_blank_rows(answer: MachineExplanation, campaign: Campaign) -> MachineExplanation:

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 
+from monitor.discovery import Fit
+from monitor.discovery.machine.noise.by_setup import whitening_by_setup
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, Instruments, Unable
+from monitor.records import Array
 from monitor.workflow.instruments.answer import AgainstOthers, Suspect
+
+
+def contradiction_in(fit: Fit, ability: Instruments | Unable) -> AgainstOthers | None:
+    """Who contradicts all others in the last run of a fit, with the noise of neighbours allowed for.
+
+    Noise that follows itself moves whole setups: taken for independent, chance seems to make next to none of it.
+    """
+    beside = against_others(fit.problem, fit.solution, ability)
+    white = None if beside is None else whitening_by_setup(fit)
+    return beside if white is None else against_others(fit.problem, fit.solution, ability, white=white)
 
 
 def against_others(
@@ -18,13 +33,15 @@ def against_others(
     ability: Instruments | Unable,
     run: int | None = None,
     doubtful: float = DOUBTFUL,
+    white: Callable[[Array], Array] | None = None,
 ) -> AgainstOthers | None:
     """Who contradicts all others of a run, the last one without ``run``, the least likely; None where chance makes as
-    much more often than ``doubtful``, or nothing is compared."""
+    much more often than ``doubtful``, or nothing is compared. ``white`` takes out of numbers (..., R, N) what
+    neighbours share."""
     if not isinstance(ability, Instruments):
         return None
     run = int(problem.runs[-1]) if run is None else run
-    contradiction = who_contradicts(ability.contrasts(problem, solution, run), doubtful)
+    contradiction = who_contradicts(ability.contrasts(problem, solution, run, white), doubtful)
     if contradiction is None:
         return None
     suspects, comparisons = contradiction.suspects, contradiction.comparisons

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,10 +52,15 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
 def beyond_base(context: Context, effect: ChainEffect) -> Array:
     """The columns (n, k) of a shape without what the base has already, which is no part of the shape: a constant, and
     a slope where a linear axis shifts something (its gain, a squareness)."""
+    has_slope = not effect.joint.turns and not effect.term.is_rotation
+    return without_powers(context, effect, (0, 1) if has_slope else (0,))
+
+
+def without_powers(context: Context, effect: ChainEffect, powers: Sequence[int]) -> Array:
+    """The columns (n, k) of a shape without powers of the position of its axis."""
     columns, at = (
         effect.shape.columns(context, effect.term.joint),
         context.places[:, effect.term.joint],
     )
-    has_slope = not effect.joint.turns and not effect.term.is_rotation
-    plain = np.column_stack([np.ones(len(at)), at] if has_slope else [np.ones(len(at))])
+    plain = np.power(at[:, None], np.asarray(powers, dtype=np.int64))
     return np.asarray(columns - plain @ np.linalg.lstsq(plain, columns, rcond=None)[0])

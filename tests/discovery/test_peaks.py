@@ -1,0 +1,70 @@
+"""How far a missing effect moves the points that were measured, beyond what the base model takes up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.discovery import fit
+from monitor.discovery.machine.scene import ChainScene, scene_of
+from monitor.discovery.machine.shapes.variants import variants_of
+from monitor.discovery.machine.sizes import peak_of
+from monitor.effects import parse_effect
+from monitor.methods import campaign_method
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+
+#: Length of the tool, and where X was measured, far from the zero of its scale, mm.
+TOOL, PLACES = 80.0, [*np.arange(500.0, 901.0, 50.0), *np.arange(900.0, 499.0, -50.0)]
+EFFECTS = ("EXX:poly1", "EXX:poly2", "EBX:poly1", "EBX:reversal")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> ChainScene:
+    """A laser and an autocollimator along X, which carries a tool of one length."""
+    ways = {"Z": (0.0, 0.0, 1.0), "X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0)}
+    chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in ways.items()))
+    laser = (
+        '\n[[setups]]\nid = "laser"\nreading = "displacement"\ninstrument = "laser"\nstandard_uncertainty_um = 0.3\n'
+        f'tool_point_mm = [0.0, 0.0, {-TOOL}]\ndirection = "X"\n'
+    )
+    angle = (
+        '\n[[setups]]\nid = "ac"\nreading = "angle"\ninstrument = "autocollimator"\n'
+        'standard_uncertainty_urad = 1.0\ntool_point_mm = [0.0, 0.0, 0.0]\ndirection = "Y"\n'
+    )
+    rng, rows = np.random.default_rng(3), []
+    for setup, column in (("laser", "reading_um"), ("ac", "reading_urad")):
+        for place in PLACES:
+            read = rng.normal(0.0, 0.3) + (1e3 * place if setup == "laser" else 0.0)
+            rows.append({"setup": setup, "X": place, "Y": 0.0, "Z": 0.0, column: read})
+    campaign = read_campaign(
+        chain.write(Path(tmp_path_factory.mktemp("peaks")) / "peaks", laser + angle, rows)
+    )
+    assert isinstance(campaign, Campaign)
+    problem = campaign_method(campaign).problem_of(campaign)
+    effects = [parse_effect(text, problem.context.chain) for text in EFFECTS]
+    return scene_of(fit(problem), [variant for effect in effects for variant in variants_of(effect)])
+
+
+def _peak_of(scene: ChainScene, text: str, size: float) -> float:
+    """The peak in mm of an effect that moves something by ``size`` times its column."""
+    (candidate,) = (each for each in scene.candidates if each.effect.text == text)
+    return peak_of(scene, candidate, candidate.raw, np.array([size]))
+
+
+def test_a_bow_is_as_high_as_it_stands_beyond_a_straight_line(scene: ChainScene) -> None:
+    """Counted from the zero of the axis it would be more than five times as high."""
+    (candidate,) = (each for each in scene.candidates if each.effect.text == "EXX:poly2")
+    at = np.array(PLACES)
+    length = candidate.raw[: len(at), 0, 0]
+    bow = length - np.polyval(np.polyfit(at, length, 1), at)
+    assert _peak_of(scene, "EXX:poly2", 1.0) == pytest.approx(np.abs(bow).max(), rel=1e-6)
+    assert np.abs(length).max() > 5.0 * np.abs(bow).max()
+
+
+def test_a_tilt_moves_the_tip_by_its_lever_whatever_measures_angles(scene: ChainScene) -> None:
+    """Was: a microradian counted as a micrometre where an autocollimator took part."""
+    assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * TOOL, rel=1e-6)
