@@ -36,6 +36,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.off_alike import off_alike
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
@@ -132,6 +133,13 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     curves, latest = _search_with_curves(first, search)
+    as_given = compare(first, campaign.name, model)
+    alike = () if as_given.verdict is not Verdict.SOMETHING_IS_MISSING else off_alike(latest.under)
+    if any(not latest.under.left_out[point.row] for point in alike):
+        # All runs agree on them, so that no search leaves them out, and effects are asked what they do.
+        certain = Suspects(certain.bad | {point.row: point for point in alike})
+        first, search = fit(foreseen, certain.left_out(foreseen), first), replace(search, gross=certain)
+        curves, latest = _search_with_curves(first, search)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     if suspects.varying:
@@ -142,14 +150,15 @@ def explain(
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
     unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
-    as_given = compare(first, campaign.name, model)
     points = sorted(suspects.bad.values(), key=lambda point: point.row)
     recur = recurring(latest.under, points)
-    single = [point for point in points if point.row not in recur]
+    in_all = {point.row for point in alike}
+    again = [point for point in points if point.row in recur - in_all]
+    single = [point for point in points if point.row not in recur | in_all]
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
-    if not (missing or unfollowed or recur or unchecked):
+    if not (missing or unfollowed or again or alike or unchecked):
         verdict = compare(latest.under, campaign.name, model).verdict
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
@@ -167,7 +176,7 @@ def explain(
         scatter=tuple(suspects.scatter.values()),
         apart=_apart(latest, variants, varies=bool(suspects.varying)),
         not_followed=unfollowed,
-        recurring=tuple(point for point in points if point.row in recur),
+        recurring=(*again, *alike),
         unchecked=unchecked,
     )
 
