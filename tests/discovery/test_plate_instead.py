@@ -77,7 +77,7 @@ def explained(folder: Path) -> Explanation:
 
 @pytest.mark.parametrize(
     ("seed", "runs", "held"),
-    [(1, 1, (0.0, 0.0)), pytest.param(2, 4, (0.0, 0.0), marks=pytest.mark.slow), (3, 1, (630.0, 210.0))],
+    [(21, 1, (0.0, 0.0)), pytest.param(2, 4, (0.0, 0.0), marks=pytest.mark.slow), (3, 1, (630.0, 210.0))],
 )
 def test_two_axes_that_grow_alike_are_the_part(
     tmp_path: Path, seed: int, runs: int, held: tuple[float, float]
