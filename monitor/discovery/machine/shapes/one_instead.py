@@ -36,10 +36,10 @@ def one_instead(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tuple
     new in it."""
     selected = before = result.candidates
     while True:
-        found = next(_instead(scene, selected, accepts), None)
-        if found is None:
+        better = next(_instead(scene, selected, accepts), None)
+        if better is None:
             break
-        selected = found
+        selected = better
         # A shape that was never to be found by itself is at its odds here; its namesake is no rival of it.
         families = {candidate.family for candidate in selected}
         rest = tuple(each for each in scene.candidates if each.family not in families)
@@ -61,13 +61,13 @@ def _instead(
             for several in combinations(mine, size):
                 if size == 1 and not as_it_appears(several[0].effect, scene.fit.problem.context):
                     continue
-                others = [each for each in selected if all(each is not one for one in several)]
+                others = [each for each in selected if all(each is not other for other in several)]
                 worth = priced(scene, several, others)
                 for evidence in _shapes_of_error(scene, several[0], others):
-                    one = evidence.candidate
-                    better = evidence.score >= worth + (WORTH_EXCHANGING if size == 1 else 0.0)
-                    if better and accepts(others, one):
-                        yield [*others, one]
+                    single = evidence.candidate
+                    outdoes = evidence.score >= worth + (WORTH_EXCHANGING if size == 1 else 0.0)
+                    if outdoes and accepts(others, single):
+                        yield [*others, single]
 
 
 def _shapes_of_error(

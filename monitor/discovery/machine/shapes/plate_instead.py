@@ -38,7 +38,7 @@ def plate_instead(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tup
     these, for that several causes come together so has to be shown."""
     selected = result.candidates
     for several in [some for size in (3, 2, 1) for some in combinations(selected, size)]:
-        others = [each for each in selected if all(each is not one for one in several)]
+        others = [each for each in selected if all(each is not other for other in several)]
         margin = -UNDECIDED * (len(several) - 1) if len(several) > 1 else WORTH_EXCHANGING
         worth = priced(scene, several, others) + margin
         held = [_held(scene, plate, others) for plate in _plates(scene, several)]
@@ -82,27 +82,29 @@ def _held(
     middle = np.array([float(reading.min() + reading.max()) / 2.0 for _, reading in axes])
     travel = np.array([float(np.ptp(reading)) for _, reading in axes])
 
-    def at(place: Array, tries: int = 1) -> ChainCandidate:
+    def at(readings: Array, tries: int = 1) -> ChainCandidate:
         effect = plate.effect
         assert isinstance(effect, InstrumentEffect)
         assert isinstance(effect.change, PlateExpansion)
-        held = tuple((name, round(value, 1)) for (name, _), value in zip(axes, place.tolist(), strict=True))
+        held = tuple(
+            (name, round(value, 1)) for (name, _), value in zip(axes, readings.tolist(), strict=True)
+        )
         moved = replace(effect, change=replace(effect.change, held=held))
         return scene_of(scene.fit, [Variant(moved.text, moved, tries)]).candidates[0]
 
     about = at(middle)
     columns = [about.columns]
     for axis in range(len(axes)):
-        place = middle.copy()
-        place[axis] += ARM_MM
-        columns.append(at(place).columns - about.columns)
+        beside = middle.copy()
+        beside[axis] += ARM_MM
+        columns.append(at(beside).columns - about.columns)
     together = replace(about, columns=np.concatenate(columns, axis=1))
     growth, *shifts = amplitudes(scene, [*others, together]).estimate[-len(columns) :]
     if not growth:
         return None
-    place = middle + ARM_MM * np.array(shifts) / growth
-    if np.any(np.abs(place - middle) > WITHIN_TRAVELS * travel):
+    best = middle + ARM_MM * np.array(shifts) / growth
+    if np.any(np.abs(best - middle) > WITHIN_TRAVELS * travel):
         return None
     # Each number of the place is at the price of a coefficient: half the logarithm of the degrees of freedom a try.
     dof = scene.degrees_of_freedom
-    return at(place, round(dof ** (len(axes) / 2.0)))
+    return at(best, round(dof ** (len(axes) / 2.0)))

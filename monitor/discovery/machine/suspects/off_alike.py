@@ -43,7 +43,7 @@ def off_alike(fit: Fit, *, alpha: float = 0.01) -> tuple[BadPoint, ...]:
     places = np.flatnonzero(in_all)
     if len(places) < FEWEST_PLACES:
         return ()
-    members = np.array([np.flatnonzero(cells == place) for place in places])
+    members = np.array([np.flatnonzero(cells == cell) for cell in places])
     means = off[members].mean(axis=1)
     numbers = fit.vectors.shape[1]
     squares = _scaled(np.sum(means**2, axis=1), numbers)
