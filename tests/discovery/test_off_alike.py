@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import Explanation, Verdict, explain
+from monitor.discovery import Explanation, Verdict, explain, fit
+from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.workflow.explain.machine_answer import machine_explanation
@@ -33,8 +34,11 @@ HOLES = [(x, y) for y in np.linspace(0.0, 420.0, 8) for x in np.linspace(0.0, 63
 WRONG = 37
 
 
-def explained(folder: Path, seed: int, turns: list[float], off: tuple[float, float]) -> Explanation:
-    """The explanation of 80 holes of parts that lie turned so in rad, hole 38 ``off`` by so many mm in each."""
+def explained(
+    folder: Path, seed: int, turns: list[float], off: tuple[float, float], *, is_gross: bool = False
+) -> Explanation:
+    """The explanation of 80 holes of parts that lie turned so in rad, hole 38 ``off`` by so many mm in each, and left
+    out from the beginning if it ``is_gross``."""
     rng = np.random.default_rng(seed)
     rows: list[dict[str, object]] = []
     for run, turn in enumerate(turns, start=1):
@@ -50,13 +54,24 @@ def explained(folder: Path, seed: int, turns: list[float], off: tuple[float, flo
     started = [f"2026-03-{day:02d}T20:00:00+00:00" for day in range(2, 2 + len(turns))]
     campaign = read_campaign(CHAIN.write(folder, SETUP, rows, started=started))
     problem = campaign_method(campaign).problem_of(campaign)
-    return explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
+    gross = [
+        BadPoint(80 * (run - 1) + WRONG, run, 80 * (run - 1) + WRONG + 1, "", "x", off[0], 1e-9)
+        for run in range(1, len(turns) + 1)
+        if is_gross
+    ]
+    first = fit(problem.for_search(), np.isin(np.arange(80 * len(turns)), [point.row for point in gross]))
+    return explain(campaign, problem, "instruments", rng=np.random.default_rng(1), first=first, gross=gross)
 
 
-@pytest.mark.parametrize("turns", [[0.001, -0.002, 0.0, 0.001], [-2.1, 0.4, 1.3, 2.6]])
-def test_a_hole_that_is_off_alike_in_all_parts_recurs(tmp_path: Path, turns: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("turns", "is_gross"),
+    [([0.001, -0.002, 0.0, 0.001], False), ([-2.1, 0.4, 1.3, 2.6], False), ([-2.1, 0.4, 1.3, 2.6], True)],
+)
+def test_a_hole_that_is_off_alike_in_all_parts_recurs(
+    tmp_path: Path, turns: list[float], is_gross: bool
+) -> None:
     """Nothing was named of parallel parts, and of turned ones four bad points beside which all is explained."""
-    found = explained(tmp_path / "parts", 5, turns, (30e-3, -20e-3))
+    found = explained(tmp_path / "parts", 5, turns, (30e-3, -20e-3), is_gross=is_gross)
     assert found.comparison.verdict is Verdict.SOMETHING_IS_MISSING
     assert found.missing == found.suspect == ()
     for axis, size in (("x", 30e-3), ("y", -20e-3)):

@@ -170,8 +170,9 @@ def explain(
 
 
 def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:
-    """What all runs have off alike, where something is missing."""
-    return off_alike(latest.under) if as_given.verdict is Verdict.SOMETHING_IS_MISSING else ()
+    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before."""
+    doubtful = as_given.verdict is Verdict.SOMETHING_IS_MISSING or latest.suspects.bad
+    return off_alike(latest.under) if doubtful else ()
 
 
 def _single_and_recurring(
