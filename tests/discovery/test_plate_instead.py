@@ -92,7 +92,7 @@ def test_two_axes_that_grow_alike_are_the_part(
 
 @pytest.mark.slow
 def test_axes_that_grow_each_by_its_own_stay(tmp_path: Path) -> None:
-    """A screw of X alone, and two of which one grows three times as much, are no part: 17 of 20 were right (27 November 2026)."""
+    """A screw of X alone, and two of which one grows three times as much, are no part: 17 of 20 were right."""
     right = 0
     for seed in range(10):
         for per_kelvin, names in (
