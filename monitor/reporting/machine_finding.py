@@ -142,7 +142,7 @@ NOT_FOLLOWED = (
 RECURRING = (
     "{count} readings are off alike in most runs at nearly the same places: they are no bad points, the model lacks "
     "something there. They were left out of the search for effects; see whether a small move decides there from which "
-    "side an axis came."
+    "side an axis came, or whether the part or plate, or a place stated of it, is off there."
 )
 UNCHECKED = (
     "They lie where no other run read, and are so many that they may be an error which the model lacks."

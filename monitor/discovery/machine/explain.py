@@ -36,6 +36,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.off_alike import off_alike
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
@@ -131,25 +132,21 @@ def explain(
     surroundings = surroundings_of(campaign, foreseen)
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
+    as_given = compare(first, campaign.name, model)
     curves, latest = _search_with_curves(first, search)
+    alike = _off_alike(as_given, latest)
+    if not latest.under.left_out[[point.row for point in alike]].all():
+        first, search = _without(alike, first, search)
+        curves, latest = _search_with_curves(first, search)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
-    if suspects.varying:
-        effects = [*suspects.move_effects(foreseen), *latest.effects]
-        weighed = suspects.weighed(foreseen)
-        steady, _ = fit_those_possible(weighed, effects, latest.under.left_out, first)
-        steady = steady.with_correlation(correlation_under(latest.under))
-        varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
-        missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
+    missing += _varying(first, search, latest, surroundings, len(missing))
     unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
-    as_given = compare(first, campaign.name, model)
-    points = sorted(suspects.bad.values(), key=lambda point: point.row)
-    recur = recurring(latest.under, points)
-    single = [point for point in points if point.row not in recur]
+    single, again = _single_and_recurring(latest, alike)
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
-    if not (missing or unfollowed or recur or unchecked):
+    if not (missing or unfollowed or again or unchecked):
         verdict = compare(latest.under, campaign.name, model).verdict
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
@@ -167,9 +164,48 @@ def explain(
         scatter=tuple(suspects.scatter.values()),
         apart=_apart(latest, variants, varies=bool(suspects.varying)),
         not_followed=unfollowed,
-        recurring=tuple(point for point in points if point.row in recur),
+        recurring=again,
         unchecked=unchecked,
     )
+
+
+def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:
+    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before."""
+    doubtful = as_given.verdict is Verdict.SOMETHING_IS_MISSING or latest.suspects.bad
+    return off_alike(latest.under) if doubtful else ()
+
+
+def _single_and_recurring(
+    latest: ChainRound, alike: Sequence[BadPoint]
+) -> tuple[list[BadPoint], tuple[BadPoint, ...]]:
+    """The suspect points that stand for themselves, and those that most runs share, what is off ``alike`` in all of
+    them included."""
+    points = sorted(latest.suspects.bad.values(), key=lambda point: point.row)
+    in_all = {point.row for point in alike}
+    recur = recurring(latest.under, points) | in_all
+    again = [point for point in points if point.row in recur - in_all]
+    return [point for point in points if point.row not in recur], (*again, *alike)
+
+
+def _without(points: Sequence[BadPoint], first: Fit, search: ChainSearch) -> tuple[Fit, ChainSearch]:
+    """A fit and a search without points on which all runs agree: no search leaves them out by itself, and effects would
+    be asked what they do."""
+    gross = Suspects(search.gross.bad | {point.row: point for point in points})
+    return fit(search.problem, gross.left_out(search.problem), first), replace(search, gross=gross)
+
+
+def _varying(
+    first: Fit, search: ChainSearch, latest: ChainRound, surroundings: Surroundings, before: int
+) -> tuple[ChainMissing, ...]:
+    """What varies from run to run, ranked after so many effects ``before`` it."""
+    suspects, problem = latest.suspects, search.problem
+    if not suspects.varying:
+        return ()
+    effects = [*suspects.move_effects(problem), *latest.effects]
+    steady, _ = fit_those_possible(suspects.weighed(problem), effects, latest.under.left_out, first)
+    steady = steady.with_correlation(correlation_under(latest.under))
+    varying = varying_effects(steady, suspects.varying, search.variants, search.rate, surroundings)
+    return tuple(replace(effect, rank=effect.rank + before) for effect in varying)
 
 
 def _missing(

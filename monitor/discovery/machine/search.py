@@ -13,6 +13,8 @@ from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.shapes.one_instead import one_instead
+from monitor.discovery.machine.shapes.plate_instead import plate_instead
 from monitor.discovery.machine.shapes.several_instead import several_instead
 from monitor.discovery.machine.shapes.shapes_of_model import (
     beside_free_shapes,
@@ -67,11 +69,13 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
                 scene, result = with_tables(scene, result, scanned)
             result = with_base_instead(scene, result, rate)
             plain, catalogued = scene, standing_out(scene, result)
-            return several_instead(
+            scene, result = several_instead(
                 plain,
                 with_unknown_shapes(plain, catalogued),
                 partial(_in_their_own_shapes, plain, catalogued, drivers, rate),
             )
+            accepts = ChainAcceptance(scene, drivers, rate).accepts
+            return plate_instead(*one_instead(scene, result, accepts), accepts)
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
 
 

@@ -438,8 +438,7 @@ class InstrumentProblem(ChainProblem):
 
     def displaced(self, local: Array) -> tuple[Displaced, ...]:
         """Work points that the unknowns (p,) of a run put elsewhere than stated."""
-        first = len(self.base_names)
-        unknowns = (local[first + columns] for columns in self.own_columns)
+        unknowns = (local[len(self.base_names) + columns] for columns in self.own_columns)
         return tuple(displaced_work_points(self.parts, unknowns))
 
     def contradiction(self, solution: Solution) -> str | None:

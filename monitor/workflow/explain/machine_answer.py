@@ -315,7 +315,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 mistakes=mistakes_found(explanation.mistakes),
                 unseen=explanation.together is Verdict.EXPLAINED,
                 not_followed=explanation.not_followed,
-                recurring=len(recurring_data),
+                recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
             )

@@ -35,26 +35,33 @@ def cycle_instead(
     """The cycle of a searched pitch, alone, that says beside others at least as much at its price as a free shape or a
     table of a linear axis; none where none does, or where it is none of these."""
     effect = free.effect
-    if (
-        not isinstance(effect, ChainEffect)
-        or not isinstance(effect.shape, Free | Nodes)
-        or effect.joint.turns
-    ):
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free | Nodes):
+        return []
+    cycle = best_cycle(scene, free, others)
+    if not cycle:
+        return []
+    teeth = TeethOfError(scene, effect).beside(others)
+    best = max([cycle, *([teeth] if teeth else [])], key=score)
+    return best if score(best) >= score([free]) else []
+
+
+def best_cycle(
+    scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
+) -> list[ChainCandidate]:
+    """The cycle of a searched pitch, alone, that says most beside others of the error of which a candidate is a shape;
+    none where that turns, or travels too little for any. Of pitches up to half of the travel."""
+    effect = shape.effect
+    if not isinstance(effect, ChainEffect) or effect.joint.turns:
         return []
     context = scene.fit.problem.context
     travel = float(np.ptp(context.positions[:, effect.term.joint]))
     if travel < FEWEST_PERIODS * SHORTEST_PITCH_MM:
         return []
-    symbol = error_of(free)
+    symbol = error_of(shape)
     texts = [f"{symbol}:cyclic{pitch:.6g}mm" for pitch in pitches_over(travel, travel / FEWEST_PERIODS)]
     variants = [Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(texts)) for text in texts]
     cycles = [
         cycle for cycle in scene_of(scene.fit, resolvable(variants, context)).candidates if cycle.visible
     ]
     weighed = weigh_beside(scene, cycles, others)
-    if not weighed:
-        return []
-    plain = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
-    teeth = TeethOfError(scene, effect).beside(others)
-    best = max([[plain], *([teeth] if teeth else [])], key=score)
-    return best if score(best) >= score([free]) else []
+    return [refine(scene, [*others, weighed[0].candidate], len(others)).candidate] if weighed else []

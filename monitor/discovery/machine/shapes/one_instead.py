@@ -1,56 +1,106 @@
-"""One shape of an error in place of several that follow it together.
+"""One shape of an error in place of several of it, where it explains as much at its price.
 
-A scan weighs widths and pitches on a grid: between two of its widths a play is a reversal and the wind-up of the next
-width together, and one that dies away exponentially, which no entry is, takes a third. At its best width the one
-wind-up may be the whole, or the error is of free shape. A width that was sought and does not do alone says that the
-shape is another one; what is in the catalogue as it stands, a reversal beside a wave, say, is left as it is.
+At five angles two harmonics follow whatever a table does, and at ten positions two cycles a third one between them. A
+step by step search meets the two first: each takes more alone than what the one leaves beside the base, or the one is
+not asked for at all, as over a part of a turn, with many periods or with a long pitch. Told as two it would be an error
+too many, and a search for two causes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
-from monitor.discovery.machine.shapes.bends import foretells_poses, score_beside
+from monitor.discovery.machine.shapes.cycles import best_cycle
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.free_parts import (
-    of_parts,
-    parts_worth_keeping,
-    price_of_parts,
-    whole_basis,
-)
-from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.search.scan import WORTH_EXCHANGING
+from monitor.discovery.machine.shapes.free_parts import is_free, priced
+from monitor.discovery.machine.shapes.shown_cycles import is_cycle
+from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.variants import as_it_appears
+from monitor.discovery.machine.shapes.waves import many_periods
+from monitor.discovery.search.evidence import Evidence, weigh_beside
+from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
+from monitor.effects import ChainEffect
+from monitor.effects.drivers import Always
+from monitor.machine import MOTION
+
+#: Whether the second is believed beside the first.
+Accepts = Callable[[Sequence[ChainCandidate], ChainCandidate], bool]
 
 
-def one_instead(
-    scene: ChainScene, several: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
-) -> ChainCandidate | None:
-    """The one shape, at its best value or free, that says beside ``others`` more than ``several`` of its error at the
-    price of the choice of each; None where none does, or where nothing of them was sought."""
-    if len(several) < 2 or all(shape.variant.tries == 1 for shape in several):
-        return None
-    choice = 2.0 * float(np.log(scene.families))
-    worth = score_beside(scene, several, others) - choice * len(several) + WORTH_EXCHANGING
-    sought = [shape for shape in several if shape.variant.tries > 1]
-    ones = [refine(scene, [*others, shape], len(others)).candidate for shape in sought]
-    ones += _free(scene, several, others)
+def one_instead(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tuple[ChainScene, ChainScan]:
+    """The findings with one shape of the catalogue in place of several of the same error, most of them first, wherever
+    it says at least as much at its price and is accepted, and with the best pitch of a cycle; the scene with what is
+    new in it."""
+    selected = before = result.candidates
+    while True:
+        better = next(_instead(scene, selected, accepts), None)
+        if better is None:
+            break
+        selected = better
+        # A shape that was never to be found by itself is at its odds here; its namesake is no rival of it.
+        families = {candidate.family for candidate in selected}
+        rest = tuple(each for each in scene.candidates if each.family not in families)
+        scene = replace(scene, candidates=(*rest, *selected))
+    if selected is before:
+        return scene, result
+    return scene, ScanResult(findings_of(scene, selected))
 
-    def score(shape: ChainCandidate) -> float:
-        return score_beside(scene, [shape], others) - (price_of_parts(shape) or choice)
 
-    best = max(ones, key=score)
-    return best if score(best) > worth and foretells_poses(scene, [best], others) else None
+def _instead(
+    scene: ChainScene, selected: Sequence[ChainCandidate], accepts: Accepts
+) -> Iterator[list[ChainCandidate]]:
+    """The selected effects with one in place of several of an error, or of a lead that looks longer at its positions:
+    the scan weighs so long pitches on a grid, on which the best one may say less than what a lead looks like."""
+    shapes = [candidate for candidate in selected if _is_motion(candidate)]
+    for symbol in dict.fromkeys(map(error_of, shapes)):
+        mine = [shape for shape in shapes if error_of(shape) == symbol]
+        for size in range(len(mine), 0, -1):
+            for several in combinations(mine, size):
+                if size == 1 and not as_it_appears(several[0].effect, scene.fit.problem.context):
+                    continue
+                others = [each for each in selected if all(each is not other for other in several)]
+                worth = priced(scene, several, others)
+                for evidence in _shapes_of_error(scene, several[0], others):
+                    single = evidence.candidate
+                    outdoes = evidence.score >= worth + (WORTH_EXCHANGING if size == 1 else 0.0)
+                    if outdoes and accepts(others, single):
+                        yield [*others, single]
 
 
-def _free(
-    scene: ChainScene, several: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
-) -> list[ChainCandidate]:
-    """The error of several shapes in free shape, where that has no more parts than they have coefficients."""
-    symbol = error_of(several[0])
-    parts = parts_worth_keeping(scene, whole_basis(scene, symbol, several[0]), others)
-    if not 0 < len(parts) <= sum(shape.columns.shape[1] for shape in several):
-        return []
-    return [of_parts(scene, symbol, parts, several, others)]
+def _shapes_of_error(
+    scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
+) -> list[Evidence[ChainCandidate]]:
+    """The evidence for single shapes of the error of which a candidate is one, beside others; the most convincing
+    first."""
+    taken = {other.family for other in others}
+    shapes = [
+        _at_even_odds(each)
+        for each in scene.candidates
+        if _is_motion(each) and not is_free(each) and error_of(each) == error_of(shape)
+    ]
+    waves = many_periods(scene, [shape, *shapes])
+    able = [
+        each
+        for each in (*shapes, *waves, *best_cycle(scene, shape, others))
+        if each.visible and each.family not in taken
+    ]
+    return weigh_beside(scene, able, others)
+
+
+def _is_motion(candidate: ChainCandidate) -> bool:
+    """Whether a candidate is an error motion of an axis that follows no driver."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect) and isinstance(effect.driver, Always) and effect.term.stage == MOTION
+    )
+
+
+def _at_even_odds(candidate: ChainCandidate) -> ChainCandidate:
+    """A candidate without odds against it beforehand: what it takes the place of are shapes of the same error, which
+    bend no less than it. A cycle keeps those of a pitch that repeats at no positions."""
+    if is_cycle(candidate):
+        return candidate
+    return replace(candidate, variant=replace(candidate.variant, odds=1.0))

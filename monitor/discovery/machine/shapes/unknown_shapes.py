@@ -32,7 +32,7 @@ from monitor.discovery.machine.shapes.inside_shapes import (
     standing_beside,
     with_those_outside,
 )
-from monitor.discovery.machine.shapes.one_instead import one_instead
+from monitor.discovery.machine.shapes.refined_instead import refined_instead
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -208,7 +208,7 @@ def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chain
             bends = bends_instead(scene, symbol, score_beside(scene, [free], others) - price, others)
             selected = [*others, *(bends or [free])]
             scene = scene if bends else _with_candidate(scene, free)
-        elif (single := one_instead(scene, mine, others)) is not None:
+        elif (single := refined_instead(scene, mine, others)) is not None:
             selected, scene = [*others, single], _with_candidate(scene, single)
     return scene, selected
 

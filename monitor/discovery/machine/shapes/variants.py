@@ -196,23 +196,26 @@ def constants_of(driver: Driver) -> tuple[float, ...]:
 
 
 def cycles_of_unknown_pitch(context: Context) -> tuple[ChainVariant, ...]:
-    """Positioning errors of every linear axis with every pitch of the grid."""
-    travels = {
-        f"E{COMPONENTS[joint.main]}{joint.name}": max(
-            float(np.ptp(context.positions[:, index])), SHORT_TRAVEL_MM
-        )
-        for index, joint in enumerate(context.chain.joints)
-        if joint.kind == "linear"
-    }
-    return _cycles_over(context.chain, tuple(travels.items()))
+    """Positioning errors of every linear axis with every pitch of the grid; where its positions stand so far apart that
+    they show hardly any of these, with pitches up to half of its travel."""
+    limits = _pitch_limits(context)
+    travels: list[tuple[str, float, float]] = []
+    for joint in context.chain.joints:
+        if joint.kind == "linear":
+            shortest, travel = limits[joint.name]
+            coarse = LONGEST_PITCH_MM < 2.0 * shortest < float("inf")
+            longest = max(LONGEST_PITCH_MM, travel / FEWEST_PERIODS if coarse else 0.0)
+            term = f"E{COMPONENTS[joint.main]}{joint.name}"
+            travels.append((term, max(travel, SHORT_TRAVEL_MM), longest))
+    return _cycles_over(context.chain, tuple(travels))
 
 
 @lru_cache(maxsize=16)
-def _cycles_over(chain: Chain, travels: tuple[tuple[str, float], ...]) -> tuple[ChainVariant, ...]:
-    """Those of positioning errors, each with the travel of its axis in mm."""
+def _cycles_over(chain: Chain, travels: tuple[tuple[str, float, float], ...]) -> tuple[ChainVariant, ...]:
+    """Those of positioning errors, each with the travel of its axis and the longest pitch in mm."""
     variants: list[ChainVariant] = []
-    for term, travel in travels:
-        pitches = pitches_over(travel, LONGEST_PITCH_MM)
+    for term, travel, longest in travels:
+        pitches = pitches_over(travel, longest)
         for pitch in pitches:
             text = f"{term}:cyclic{pitch:.6g}mm"
             variants.append(Variant(f"{term}:cyclic", parse_effect(text, chain), len(pitches)))
