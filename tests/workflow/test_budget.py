@@ -14,6 +14,7 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.discovery import fit
 from monitor.exceptions import CampaignError, DataError, InputError
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign, read_linear_axes, read_sources_file
@@ -28,7 +29,7 @@ from monitor.workflow.certificate.request import CertificateRequest, RemakeReque
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.evaluation import evaluate, evaluate_fit, fit
+from monitor.workflow.uncertainty.evaluation import evaluate, evaluate_fit
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import RunUncertainty
 from monitor.workflow.uncertainty.stating import statement

@@ -8,16 +8,14 @@ regression analysis, section 2.1: F of lack of fit over pure error), the total a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
 from monitor.discovery.machine.noise.plan_cells import plan_cells, readings_a_visit, revisited_cells
 from monitor.discovery.search.comparison import (
-    LACK_OF_FIT_LEVEL,
     Comparison,
     LackOfFit,
     Part,
@@ -106,9 +104,6 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
 def compare(fit: Fit, campaign: str, model: str) -> ChainComparison:
     """Compare a fitted model with its campaign."""
     test, repeatability = lack_of_fit(fit)
-    if test is not None and test.p_value < LACK_OF_FIT_LEVEL and fit.correlation() is not None:
-        # Readings that resemble their neighbours are fewer than they count for: the verdict is by what is left of them.
-        test = replace(test, p_value=max(test.p_value, beyond_neighbours(fit) or 0.0))
     excess = excess_p_value(fit.sum_of_squares, fit.degrees_of_freedom)
     return ChainComparison(
         rms=fit.rms,
