@@ -22,7 +22,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.likeness import Likeness
 from monitor.readers import read_campaign, write_campaign
 from monitor.records import Array, Campaign, CurveCampaign
-from monitor.reporting import messages
+from monitor.reporting import rehearsal_words
 from monitor.stopping import checkpoint
 from monitor.store import Database, load_campaign
 from monitor.units import MICROMETRE
@@ -199,13 +199,13 @@ def _simulated(request: LikeRequest, pattern: Campaign, progress: Callable[[str]
                 truth += _hidden(dated, likeness, request.effect, request.hidden_um)
     file = request.out / TRUTH
     write_truth(file, truth)
-    message = messages.likenesses_written(
+    message = rehearsal_words.likenesses_written(
         request.out, len(folders), len(request.machines), (pattern.name, method.name), TRUTH
     )
     if request.effect is not None:
-        message += messages.hidden_in_all(request.effect, request.hidden_um)
-    if sight is not None and request.effect is not None and not sight.is_certain:
-        message += messages.hardly_seen(request.effect, sight.standard_deviations, sight.certain_from_um)
+        message += rehearsal_words.hidden_in_all(request.effect, request.hidden_um)
+    if sight is not None and request.effect is not None:
+        message += sight.words(request.effect, request.hidden_um)
     return LikeAnswer(tuple(folders), str(file), request.seed, message, sight)
 
 

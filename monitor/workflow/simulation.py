@@ -14,7 +14,7 @@ from monitor.exceptions import InputError, did_you_mean
 from monitor.methods import Rehearsal, campaign_method, methods
 from monitor.readers import write_campaign
 from monitor.records import Campaign
-from monitor.reporting import messages
+from monitor.reporting import rehearsal_words
 from monitor.units import MICROMETRE
 from monitor.workflow.sight import EffectSight, effect_sight
 
@@ -107,14 +107,13 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
     write_campaign(as_virtual(campaign), request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
     hidden = (request.effect, request.peak) if request.effect else None
-    message = messages.virtual_written(request.out, runs, probings // runs, hidden)
+    message = rehearsal_words.virtual_written(request.out, runs, probings // runs, hidden)
     sight = None
     if request.effect is not None:
         method = campaign_method(campaign)
         problem = method.problem_of(campaign, method.own_model)
         sight = effect_sight(problem, request.effect, MICROMETRE.to_internal(request.peak))
-        if not sight.is_certain:
-            message += messages.hardly_seen(request.effect, sight.standard_deviations, sight.certain_from_um)
+        message += sight.words(request.effect, request.peak)
     return SimulateAnswer(
         folder=str(request.out),
         campaign=campaign.name,
@@ -215,5 +214,7 @@ def simulate_machine(request: SimulateMachineRequest) -> SimulateMachineAnswer:
         seed=request.seed,
         runs=runs,
         probings=probings,
-        message=messages.virtual_machine_written(request.out, runs, probings // runs, list(request.errors)),
+        message=rehearsal_words.virtual_machine_written(
+            request.out, runs, probings // runs, list(request.errors)
+        ),
     )

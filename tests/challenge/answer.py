@@ -22,10 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from monitor.discovery import explain, fit
+from monitor.discovery import Fit, explain, fit
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.missing import Missing
+from monitor.effects import parse_effect
 from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 
@@ -210,11 +213,21 @@ def ours(folder: Path) -> Effects:
         {
             "effect": effect.effect,
             "rivals": [rival.effect for rival in effect.rivals],
-            "peak_um": 1e3 * effect.peak,
-            "u_um": 1e3 * effect.peak * effect.u / effect.amplitude if effect.amplitude else 0.0,
+            "peak_um": 1e3 * peak_by_itself(explanation.final, effect),
+            "u_um": 1e3 * peak_by_itself(explanation.final, effect) * effect.u / effect.amplitude
+            if effect.amplitude
+            else 0.0,
         }
         for effect in explanation.missing
     ]
+
+
+def peak_by_itself(fitted: Fit, effect: Missing) -> float:
+    """The largest displacement in mm that an effect causes at any probing; ours tells what of it goes beyond the base
+    model."""
+    variant = Variant(effect.effect, parse_effect(effect.effect, fitted.problem.context.chain))
+    (candidate,) = scene_of(fitted, [variant]).candidates
+    return float(np.linalg.norm(candidate.raw @ effect.coefficients, axis=1).max())
 
 
 def answer(folder: Path, programs: Sequence[str]) -> dict[str, dict[str, Any]]:

@@ -174,6 +174,21 @@ def test_what_a_plan_shows_of_an_effect_is_its_size_over_its_standard_uncertaint
     assert sight.certain_from_um == pytest.approx(8.0 * 5.0 / shown, rel=2e-3)
 
 
+@pytest.mark.parametrize(("effect", "axis"), [("EXX:poly2", "X"), ("EYY:poly2", "Y")])
+def test_a_bow_is_told_by_what_differs_from_a_straight_line(effect: str, axis: str) -> None:
+    """A line through the squares of the positions by least squares, by itself."""
+    pattern = read_campaign(EXAMPLES / "r-test")
+    sight = effect_sight(Likeness(pattern, campaign_method(pattern)).problem, effect, 5e-3)
+    at = pattern.probings.readings[axis]
+    bow = at**2
+    straight = np.polynomial.Polynomial.fit(at, bow, 1)(at)
+    told = 5.0 * np.abs(bow - straight).max() / bow.max()
+    assert sight.told_um == pytest.approx(told, rel=1e-3)
+    assert (" differ from the straight line " in sight.words(effect, 5.0)) == (
+        told < 4.5 and sight.is_certain
+    )
+
+
 def test_a_hidden_effect_that_the_plan_cannot_see_is_called_so(tmp_path: Path) -> None:
     like = str(EXAMPLES / "tilting-table")
 
