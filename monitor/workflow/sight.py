@@ -11,8 +11,7 @@ from monitor.discovery.machine.scene import DETECTABLE, scene_of
 from monitor.discovery.machine.sizes import peak_of
 from monitor.discovery.search.candidate import Variant
 from monitor.documents import OMITTED
-from monitor.effects import ChainEffect, parse_effect
-from monitor.machine import MOTION
+from monitor.effects import parse_effect
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.reporting import rehearsal_words
@@ -58,10 +57,8 @@ def effect_sight(problem: ChainProblem, text: str, peak: float) -> EffectSight:
     All coefficients of the effect are alike. Noise is taken as white, with the stated uncertainties. Raises EffectError
     for an effect that the machine does not have.
     """
-    chain = problem.context.chain
-    effect = parse_effect(text, chain)
-    fitted = fit(problem)
-    scene = scene_of(fitted, [Variant(text, effect)])
+    effect = parse_effect(text, problem.context.chain)
+    scene = scene_of(fit(problem), [Variant(text, effect)])
     if not scene.candidates or not scene.candidates[0].visible:
         return EffectSight(0.0, None)
     candidate = scene.candidates[0]
@@ -71,11 +68,8 @@ def effect_sight(problem: ChainProblem, text: str, peak: float) -> EffectSight:
     shown = peak * float(np.linalg.norm(remaining))
     if shown < NOTHING:
         return EffectSight(0.0, None)
-    told_um = peak / MICROMETRE.factor
-    if isinstance(effect, ChainEffect) and effect.term.stage == MOTION:
-        powers = [f"{text.partition(':')[0]}:{power}" for power in ("const", "poly1")]
-        beside = scene_of(fitted, [Variant(power, parse_effect(power, chain)) for power in powers])
-        told_um *= peak_of(beside, candidate, candidate.raw, np.ones(candidate.raw.shape[2])) / largest
+    of_one = peak_of(scene, candidate, candidate.raw, np.ones(candidate.raw.shape[2]))
+    told_um = peak * of_one / largest / MICROMETRE.factor
     return EffectSight(shown, peak * DETECTABLE / shown / MICROMETRE.factor, told_um)
 
 

@@ -147,7 +147,8 @@ def test_an_axis_that_stands_still_shows_no_lead(tmp_path: Path) -> None:
 def test_a_plate_that_grows_is_no_screw_that_warms_up(seed: int, tmp_path: Path) -> None:
     """Was: EYY:poly1@run_time alone."""
     (finding,) = missing(plate(tmp_path, seed, lambda x: np.zeros((len(x), 2)), growth=25e-6))
-    assert finding.effect == "instrument:plate:expansion@run_time"
+    assert finding.effect.partition("(")[0].partition("@")[0] == "instrument:plate:expansion"
+    assert finding.effect.endswith("@run_time")
     assert abs(finding.amplitude - 25e-6) < 4.0 * finding.u
 
 

@@ -13,15 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.discovery.machine.joints.curve_findings import is_curve
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
 from monitor.discovery.machine.scene_columns import raw_columns
 from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of, without_powers
 from monitor.discovery.search.amplitudes import length_of
-from monitor.effects import ChainEffect, Context
+from monitor.discovery.search.candidate import Variant
+from monitor.effects import ChainEffect, Context, parse_effect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
-from monitor.effects.shapes import Harmonics, Nodes
+from monitor.effects.shapes import Harmonics, Nodes, Poly
 from monitor.effects.weight import LinkWeights
+from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.units import Unit
 
@@ -87,7 +89,7 @@ def largest_deviation(columns: Array, coefficients: Array, covariance: Array) ->
 
 def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficients: Array) -> float:
     """The largest displacement in mm where points were measured, of displacements ``raw`` (n, d, k); no more than what
-    an error of an axis that follows no driver makes beyond the constant and the slope that the base takes up.
+    a power of the position of an axis makes beyond the constant and the slope that the base takes up.
 
     Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
     """
@@ -98,15 +100,24 @@ def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficien
         return float(np.linalg.norm(displacement[rows] @ coefficients, axis=1).max())
 
     effect = candidate.effect
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Poly):
         return largest(raw)
-    visible = {each.family for each in scene.candidates if each.visible}
-    error = candidate.family.partition(":")[0]
-    powers = [power for power, shape in enumerate(("const", "poly1")) if f"{error}:{shape}" not in visible]
+    if not isinstance(effect.driver, Always) or effect.term.stage != MOTION:
+        return largest(raw)
+    powers = _powers_of_base(scene, effect)
     return min(
         largest(raw),
         largest(_of_shape(candidate, lambda context, of: without_powers(context, of, powers))),
     )
+
+
+def _powers_of_base(scene: ChainScene, effect: ChainEffect) -> list[int]:
+    """The powers of the position of an axis which the base takes up of one of its errors: its place and its gain."""
+    chain = scene.fit.problem.context.chain
+    texts = (f"{effect.term.symbol}:const", f"{effect.term.symbol}:poly1")
+    variants = [Variant(text, parse_effect(text, chain)) for text in texts]
+    visible = {each.family: each.visible for each in scene_of(scene.fit, variants).candidates}
+    return [power for power, text in enumerate(texts) if not visible.get(text, True)]
 
 
 def _of_shape(candidate: ChainCandidate, columns_of: Callable[[Context, ChainEffect], Array]) -> Array:

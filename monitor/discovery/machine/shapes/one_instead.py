@@ -59,7 +59,7 @@ def _instead(
         mine = [shape for shape in shapes if error_of(shape) == symbol]
         for size in range(len(mine), 0, -1):
             for several in combinations(mine, size):
-                if size == 1 and not as_it_appears(several[0].effect, scene.fit.problem.context):
+                if size == 1 and not _may_be_another(scene, several[0]):
                     continue
                 others = [each for each in selected if all(each is not other for other in several)]
                 worth = priced(scene, several, others)
@@ -68,6 +68,14 @@ def _instead(
                     outdoes = evidence.score >= worth + (WORTH_EXCHANGING if size == 1 else 0.0)
                     if outdoes and accepts(others, single):
                         yield [*others, single]
+
+
+def _may_be_another(scene: ChainScene, shape: ChainCandidate) -> bool:
+    """Whether one shape is asked against others of its error: a lead that looks longer, and the free shape of a turning
+    axis, of which one part may follow at a few angles what takes a cosine and a sine."""
+    effect = shape.effect
+    turns = isinstance(effect, ChainEffect) and effect.joint.turns
+    return (is_free(shape) and turns) or bool(as_it_appears(effect, scene.fit.problem.context))
 
 
 def _shapes_of_error(
