@@ -26,6 +26,8 @@ from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.machine import MOTION
 
+#: Scores that differ by less differ by rounding.
+DECIMALS = 6
 #: Whether the second is believed beside the first.
 Accepts = Callable[[Sequence[ChainCandidate], ChainCandidate], bool]
 
@@ -82,7 +84,7 @@ def _shapes_of_error(
     scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> list[Evidence[ChainCandidate]]:
     """The evidence for single shapes of the error of which a candidate is one, beside others; the most convincing
-    first."""
+    first, and of waves that are one at the angles visited the slowest."""
     taken = {other.family for other in others}
     shapes = [
         _at_even_odds(each)
@@ -95,7 +97,11 @@ def _shapes_of_error(
         for each in (*shapes, *waves, *best_cycle(scene, shape, others))
         if each.visible and each.family not in taken
     ]
-    return weigh_beside(scene, able, others)
+    position = {each.family: index for index, each in enumerate(able)}
+    return sorted(
+        weigh_beside(scene, able, others),
+        key=lambda evidence: (-round(evidence.score, DECIMALS), position[evidence.candidate.family]),
+    )
 
 
 def _is_motion(candidate: ChainCandidate) -> bool:
