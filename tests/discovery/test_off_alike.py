@@ -12,24 +12,8 @@ from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.workflow.explain.machine_answer import machine_explanation
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.parts_on_a_cmm import CHAIN, SETUP
 
-CHAIN = SimulatedChain(
-    (SimulatedAxis("Z", "linear", (0.0, 0.0, 1.0)),),
-    (
-        SimulatedAxis("Y", "linear", (0.0, 1.0, 0.0), sign=-1),
-        SimulatedAxis("X", "linear", (1.0, 0.0, 0.0), sign=-1),
-    ),
-)
-SETUP = """
-[[setups]]
-id = "cmm"
-reading = "point"
-instrument = "CMM"
-standard_uncertainty_um = 1.5
-scale_standard_uncertainty_um_per_m = 0.3
-known = ["targets"]
-"""
 HOLES = [(x, y) for y in np.linspace(0.0, 420.0, 8) for x in np.linspace(0.0, 630.0, 10)]
 WRONG = 37
 

@@ -13,18 +13,10 @@ from monitor.discovery import Explanation, explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.parts_on_a_cmm import SETUP
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 VECTOR = ("dx_um", "dy_um", "dz_um")
-PART = """
-[[setups]]
-id = "cmm"
-reading = "point"
-instrument = "CMM"
-standard_uncertainty_um = 1.5
-scale_standard_uncertainty_um_per_m = 0.3
-known = ["targets"]
-"""
 BALL = """
 [[setups]]
 id = "{name}"
@@ -60,7 +52,7 @@ def part_with_a_wave(folder: Path, seed: int) -> Path:
                 {"setup": "cmm", "X": x, "Y": y, "Z": -20.0}
                 | {"point_x_mm": round(at[0], 4), "point_y_mm": round(at[1], 4), "point_z_mm": None}
             )
-    return chain.write(folder, PART, rows)
+    return chain.write(folder, SETUP, rows)
 
 
 @pytest.mark.parametrize("seed", range(4))

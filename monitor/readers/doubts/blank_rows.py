@@ -5,7 +5,7 @@ Of readings that nobody contradicts ``zero_rows`` decides by their poses; a plat
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from monitor.records import Campaign
 READ = ("point_", "direction_", "tracker_")
 #: One row may lie at the origin of its frame.
 FEWEST = 2
+#: So many sequence numbers are named.
+MOST_NAMED = 12
 
 
 def blank_rows(campaign: Campaign, *, or_axes: bool = False) -> frozenset[tuple[int, int]]:
@@ -33,12 +35,17 @@ def blank_rows(campaign: Campaign, *, or_axes: bool = False) -> frozenset[tuple[
     return frozenset(zip(probings.run[blank].tolist(), probings.sequence[blank].tolist(), strict=True))
 
 
+def named_rows(run: int, sequences: Sequence[int]) -> str:
+    """Run and sequence numbers of rows of one run, the first of many."""
+    more = ", ..." if len(sequences) > MOST_NAMED else ""
+    return f"run {run}, sequence {', '.join(map(str, sequences[:MOST_NAMED]))}{more}"
+
+
 def blank_words(rows: Collection[tuple[int, int]]) -> Iterator[str]:
     """Yield the sentence on rows of zeros, of each run; none for none."""
     for run in sorted({run for run, _ in rows}):
         sequences = sorted(sequence for of_run, sequence in rows if of_run == run)
-        named = ", ".join(map(str, sequences[:12])) + (", ..." if len(sequences) > 12 else "")
         yield (
-            f"run {run}, sequence {named}: all that was read, or all axes, are 0, as programs write where they got no "
+            f"{named_rows(run, sequences)}: all that was read, or all axes, are 0, as programs write where they got no "
             "reading: leave these rows out"
         )

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from monitor.readers.doubts.blank_rows import named_rows
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.records import Array, Campaign, Setup
 from monitor.units import DEGREE
@@ -33,8 +34,6 @@ OFF_SHARE = 0.02
 #: Of a plate whose balls stand where its certificate says one may be its origin, and lie anew: zeros at so many places,
 #: where no other point recurs, are no ball.
 FEWEST_OF_PLATE = 3
-#: So many sequence numbers are named.
-MOST_NAMED = 12
 
 
 def zero_rows(campaign: Campaign, frames: ToolFrames | None = None) -> Iterator[str]:
@@ -116,9 +115,8 @@ def _differ(values: Array, rows: npt.NDArray[np.bool_], tolerance: float) -> boo
 
 def _named(campaign: Campaign, rows: npt.NDArray[np.int64]) -> str:
     """Run and sequence numbers of rows, the first of many."""
-    probings, named = campaign.probings, []
-    for run in np.unique(probings.run[rows]):
-        numbers = probings.sequence[rows[probings.run[rows] == run]].tolist()
-        more = ", ..." if len(numbers) > MOST_NAMED else ""
-        named.append(f"run {run}, sequence {', '.join(map(str, numbers[:MOST_NAMED]))}{more}")
-    return "; ".join(named)
+    probings = campaign.probings
+    return "; ".join(
+        named_rows(run, probings.sequence[rows[probings.run[rows] == run]].tolist())
+        for run in np.unique(probings.run[rows]).tolist()
+    )
