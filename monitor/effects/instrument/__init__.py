@@ -23,7 +23,8 @@ def parse_instrument(body: str) -> InstrumentChange:
         raise EffectError(
             f"there is no effect '{body}' of an instrument; after instrument: and the id of a setup there are "
             ":scale, :cosine and :dead_path@... (laser), :length (bar), :lobing2 and :lobing3 (probe, sphere), "
-            ":expansion@... and :expansion(X=120,Y=80)@... (points of a plate, held there), :drift@... (lengths) and :tilt@... (angles), as in "
+            ":expansion@... and :expansion(X=120,Y=80)@... (points of a plate, held there), "
+            ":drift@... (lengths) and :tilt@... (angles), as in "
             "instrument:laser-x:scale"
         )
     return change
