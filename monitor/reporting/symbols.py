@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from decimal import Decimal
 
 from monitor.reporting.texts import Texts, texts_of
 
@@ -18,6 +19,7 @@ _DIRECTIONS = {
 #: An error of a table at a node, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
+_TEETH = re.compile(r"sawtooth(?P<pitch>[\d.]+)mm\((?P<edge>-?[\d.]+)\)")
 #: ``J2`` is a joint of a robot, ``DEC`` an axis of a mount: such names do not say along which direction an axis lies.
 _SYMBOL = re.compile(
     r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+|[A-Z]{2,}\d*)(?::(?P<rest>.+))?"
@@ -52,8 +54,16 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
         kind = _motion(match["direction"], axis, turns, rest)
     else:
         kind = "turn" if turns else "displacement"  # the name does not say which are its roll and its tilts
-    shape = "" if kind == "gain" or not rest else f" ({rest})"
+    shape = "" if kind == "gain" or not rest else f" ({_in_words(rest, say)})"
     return say(f"terms.{kind}", direction=direction, axis=named) + shape
+
+
+def _in_words(shape: str, say: Texts) -> str:
+    """A shape as written; of teeth what their number is the size of."""
+    if (teeth := _TEETH.fullmatch(shape)) is None:
+        return shape
+    pitch, edge = (say.number(Decimal(teeth[name])) for name in ("pitch", "edge"))
+    return say("terms.teeth", pitch=pitch, edge=edge)
 
 
 def _location(direction: str, axis: str, turns: bool) -> str:

@@ -62,6 +62,11 @@ class Texts:
         return written(number, self.decimal_sign)
 
 
+def breakable(name: str) -> Markup:
+    """The name of an effect for a narrow column, which goes on in the next line behind the name of its error."""
+    return Markup(str(escape(name)).replace(":", ":<wbr>"))
+
+
 def with_subscripts(text: str) -> Markup:
     """A sentence for a page, its symbols (``k_q``) set with subscripts; text that is no markup is escaped.
 

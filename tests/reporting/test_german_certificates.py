@@ -85,7 +85,7 @@ def phrases(written: Any) -> list[str]:
 
 def read_aloud(page: str) -> str:
     """The text of a page of HTML or XML, what stands for its pictures with it."""
-    plain = re.sub(r"<style>.*?</style>|<meta[^>]*>", " ", page, flags=re.DOTALL)
+    plain = re.sub(r"<style>.*?</style>|<meta[^>]*>", " ", page.replace("<wbr>", ""), flags=re.DOTALL)
     spoken = re.findall(r'(?:alt|aria-label)="([^"]*)"', plain)
     return html.unescape(re.sub(r"<[^>]*>", " ", plain) + " ".join(spoken))
 

@@ -28,6 +28,10 @@ from monitor.reporting.symbols import describe
         ("EXX:cyclic20mm", "positioning error of axis X (cyclic20mm)"),
         ("EXX:poly1@x_axis_degC", "positioning error of axis X (poly1@x_axis_degC)"),
         ("EYX:poly2", "straightness error in Y of axis X (poly2)"),
+        (
+            "EXX:sawtooth84.34mm(-157.25)",
+            "positioning error of axis X (step of teeth of 84.34 mm, one at −157.25 mm)",
+        ),
         ("EAX", "roll of axis X"),
         ("EBX", "tilt about Y of axis X"),
         ("EBB:harmonic2", "angular positioning error of axis B (harmonic2)"),

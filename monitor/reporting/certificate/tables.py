@@ -17,7 +17,7 @@ from monitor.reporting.texts import Texts
 #: Letters of the tables, and what a column of the results needs besides its letters.
 LETTERS_PT, _PADDING_MM = 8.0, 3.2
 #: Longer symbols are broken.
-_MOST_NAME_MM = 46.0
+_MOST_NAME_MM = 48.0
 #: Width of a digit and of the decimal signs in DejaVu Sans, in em (1303 and 651 of 2048 units).
 _DIGIT_EM, _POINT_EM = 1303 / 2048, 651 / 2048
 

@@ -45,7 +45,7 @@ from monitor.reporting.pdf.layout_engine import (
 )
 from monitor.reporting.resources import FONT_FILES, font_bytes, report_text
 from monitor.reporting.svg.letter_widths import in_mm
-from monitor.reporting.texts import with_bound_units, with_subscripts
+from monitor.reporting.texts import breakable, with_bound_units, with_subscripts
 
 PDF_VARIANT = "pdf/a-3u"
 _FONT_SCHEME = "font:"
@@ -236,6 +236,7 @@ def _environment() -> Environment:
     )
     environment.tests["wider_than"] = lambda text, mm: in_mm(text, LETTERS_PT) > mm
     environment.filters["subscripts"] = with_subscripts
+    environment.filters["breakable"] = breakable
     environment.filters["bound"] = with_bound_units
     environment.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     return environment
