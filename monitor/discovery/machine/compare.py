@@ -3,23 +3,19 @@
 Two yardsticks, because each is blind to something. Repeatability, the scatter of the same probing's residual
 over the runs, does not see what varies from run to run as an error; the probe's stated standard uncertainty
 does, but is only as good as the statement. Lack of fit is tested against the first (Draper and Smith, Applied
-regression analysis, section 2.1: F of lack of fit over pure error), the total against the second. That F counts
-readings as independent; where it says that something is missing, runs of one plan are asked again in numbers that a
-filter made independent.
+regression analysis, section 2.1: F of lack of fit over pure error), the total against the second.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.noise.beyond_noise import beyond_neighbours
 from monitor.discovery.machine.noise.plan_cells import plan_cells, readings_a_visit, revisited_cells
 from monitor.discovery.search.comparison import (
-    LACK_OF_FIT_LEVEL,
     Comparison,
     LackOfFit,
     Part,
@@ -106,16 +102,8 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
 
 
 def compare(fit: Fit, campaign: str, model: str) -> ChainComparison:
-    """Compare a fitted model with its campaign.
-
-    A p-value of lack of fit below ``LACK_OF_FIT_LEVEL`` is the one with the noise of neighbours allowed for.
-    """
+    """Compare a fitted model with its campaign."""
     test, repeatability = lack_of_fit(fit)
-    if test is not None and test.p_value < LACK_OF_FIT_LEVEL:
-        # Neighbours that resemble each other scatter together; asked only where it decides, which costs nothing else.
-        among_neighbours = beyond_neighbours(fit)
-        if among_neighbours is not None:
-            test = replace(test, p_value=max(test.p_value, among_neighbours))
     excess = excess_p_value(fit.sum_of_squares, fit.degrees_of_freedom)
     return ChainComparison(
         rms=fit.rms,
