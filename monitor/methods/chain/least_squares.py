@@ -39,7 +39,7 @@ MOST_ITERATIONS = 50
 # halving would stop short of the point.
 SMALLEST_HALVED, ROUNDING_OF_SUM = 1e-3, 1e-11
 # Halved steps take a tenth off the rest where whole ones take a fifth.
-DAMPED_TIMES = 4
+MOST_STEPS = 4 * MOST_ITERATIONS
 MOST_HALVINGS, STALLED = 12, 1e-6
 # A step of this part of the radius of a confidence region is none, where no more is left than this many times what
 # is stated.
@@ -177,19 +177,19 @@ def solve(
     linearise: Callable[[Array, Array], Linearisation],
     local: Array,
     common: Array,
-    most: int = MOST_ITERATIONS,
+    most: int = MOST_STEPS,
 ) -> Solution:
     """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
 
-    Raises NotConvergedError if it does not converge in ``most`` steps, which means readings that contradict the machine
-    file (a wrong sign, a wrong axis or a ball confused with another).
+    Raises NotConvergedError if it does not converge in ``most`` steps, 50 where they are whole, which means readings
+    that contradict the machine file (a wrong sign, a wrong axis or a ball confused with another).
     """
     current = linearise(local, common)
     cost = float(np.sum(current.residual**2))
     space, spanned = eliminate(current.local), current.local
     before, damping = np.inf, 1.0
-    for iteration in range(1, DAMPED_TIMES * most + 1):
-        if damping < STALLED or (iteration > most and damping == 1.0):
+    for iteration in range(1, most + 1):
+        if damping < STALLED or (iteration > MOST_ITERATIONS and damping == 1.0):
             break
         checkpoint()
         if current.local is not spanned:
@@ -218,8 +218,8 @@ def solve(
     if _is_settled(size, current, int(np.sum(space.rank)) + of_common.rank):
         return _solution(local, common, current, space, of_common, iteration)
     raise NotConvergedError(
-        f"the identification did not converge in {most} steps: the readings contradict the machine file; "
-        "check the axis signs, the topology, the order of the targets and the units"
+        f"the identification did not converge in {min(most, MOST_ITERATIONS)} steps: the readings contradict the "
+        "machine file; check the axis signs, the topology, the order of the targets and the units"
     )
 
 

@@ -21,7 +21,7 @@ from monitor.exceptions import DataError, NotConvergedError
 from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.condensed import triangles
-from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
+from monitor.methods.chain.least_squares import MOST_STEPS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
@@ -311,7 +311,7 @@ def solve_problem(
     problem: ChainProblem,
     local: Array | None = None,
     common: Array | None = None,
-    most: int = MOST_ITERATIONS,
+    most: int = MOST_STEPS,
 ) -> Solution:
     """The least-squares point of a problem, from ``local`` (R, p) and ``common`` (c,) or from no errors at all.
 
@@ -359,7 +359,7 @@ def _solved(
     linearise: Callable[[Array, Array], Linearisation],
     begin: Array,
     common: Array,
-    most: int = MOST_ITERATIONS,
+    most: int = MOST_STEPS,
 ) -> Solution:
     """The point of one search; what stays for a session is one number in its runs."""
     stays = problem.stays

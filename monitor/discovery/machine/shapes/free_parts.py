@@ -17,6 +17,7 @@ from monitor.discovery.machine.shapes.waves import worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.products import Products
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import Free
@@ -68,11 +69,40 @@ def of_parts(
     others: Sequence[ChainCandidate],
 ) -> ChainCandidate:
     """The effect of some parts, from 0, of a flexible basis; nearest to it is the best of ``shapes``."""
+    return with_nearest(scene, of_parts_alone(scene, symbol, parts), shapes, others)
+
+
+def of_parts_alone(scene: ChainScene, symbol: str, parts: Sequence[int]) -> ChainCandidate:
+    """The effect of some parts, from 0, of a flexible basis, without what comes nearest to it."""
     name = f"{symbol}:free({','.join(str(part + 1) for part in sorted(parts))})"
-    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
     effect = parse_effect(name, scene.fit.problem.context.chain)
-    variant = Variant(f"{symbol}:free", effect, 1, 1.0, nearest.family)
-    return scene_of(scene.fit, [variant]).candidates[0]
+    return scene_of(scene.fit, [Variant(f"{symbol}:free", effect)]).candidates[0]
+
+
+def with_nearest(
+    scene: ChainScene,
+    free: ChainCandidate,
+    shapes: Sequence[ChainCandidate],
+    others: Sequence[ChainCandidate],
+) -> ChainCandidate:
+    """A free shape and the best of ``shapes`` beside others, which is nearest to it."""
+    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    return replace(free, variant=replace(free.variant, nearest=nearest.family))
+
+
+def most_together(
+    scene: ChainScene,
+    free: ChainCandidate,
+    leading: Sequence[ChainCandidate],
+    may_stay: Sequence[ChainCandidate],
+) -> float:
+    """A bound that the score of leading effects, a free shape and whichever of others stay is not above, whatever these
+    cost: what all of them leave together is the least that some of them leave."""
+    before, beside = (scene.remainders.beside(some) for some in (leading, [*leading, *may_stay]))
+    columns = orthonormal(without(beside.basis, free.columns))
+    left = float(beside.residual @ beside.residual - np.sum((columns.T @ beside.residual) ** 2))
+    gain = np.log(float(before.residual @ before.residual) / max(left, 1e-300))
+    return priced(scene, leading) + before.degrees_of_freedom * float(gain) - price_of_parts(free)
 
 
 def parts_worth_keeping(

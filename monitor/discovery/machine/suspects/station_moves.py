@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
+from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.suspects.wander import wander
 from monitor.discovery.search.candidate import Variant
@@ -92,6 +94,18 @@ def _change_of(candidate: ChainCandidate) -> Moved:
     return effect.change
 
 
+# A scan is repeated beside more effects: the same moments are asked for again under the same fit.
+@lru_cache(maxsize=4)
+def _moves(fit: Fit, moves: Sequence[Moved], tries: int) -> tuple[ChainCandidate, ...]:
+    """Moves, of which so many are tried, as the data of a fit see them."""
+    variants = []
+    for move in moves:
+        effect = ArtefactEffect(move, Always(), "")
+        odds = ODDS_OF_BASE if isinstance(move, BaseMoved) else 1.0
+        variants.append(Variant(effect.text, effect, tries, odds))
+    return scene_of(fit, variants).candidates
+
+
 def _likeliest(
     scene: ChainScene, steady: Sequence[ChainCandidate], kind: type[Moved]
 ) -> Evidence[ChainCandidate] | None:
@@ -104,10 +118,8 @@ def _likeliest(
     tries = sum(map(len, moments.values()))
 
     def best_of(run: int, sequences: Iterable[int]) -> Evidence[ChainCandidate] | None:
-        moves = (ArtefactEffect(kind(run, int(sequence)), Always(), "") for sequence in sequences)
-        odds = ODDS_OF_BASE if kind is BaseMoved else 1.0
-        variants = [Variant(move.text, move, tries, odds) for move in moves]
-        weighed = weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
+        moves = tuple(kind(run, int(sequence)) for sequence in sequences)
+        weighed = weigh_beside(scene, _moves(scene.fit, moves, tries), steady)
         return weighed[0] if weighed else None
 
     of_runs = []
