@@ -39,7 +39,7 @@ MOST_ITERATIONS = 50
 # halving would stop short of the point.
 SMALLEST_HALVED, ROUNDING_OF_SUM = 1e-3, 1e-11
 # Halved steps take a tenth off the rest where whole ones take a fifth.
-MOST_STEPS = 4 * MOST_ITERATIONS
+DAMPED_TIMES = 4
 MOST_HALVINGS, STALLED = 12, 1e-6
 # A step of this part of the radius of a confidence region is none, where no more is left than this many times what
 # is stated.
@@ -177,19 +177,21 @@ def solve(
     linearise: Callable[[Array, Array], Linearisation],
     local: Array,
     common: Array,
-    most: int = MOST_STEPS,
+    most: int = MOST_ITERATIONS,
+    squares: Callable[[Array, Array], float | None] = lambda *_: None,
 ) -> Solution:
-    """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
+    """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,). ``squares`` gives
+    the sum of squares without derivatives, None where these cost nothing to speak of.
 
-    Raises NotConvergedError if it does not converge in ``most`` steps, 50 where they are whole, which means readings
-    that contradict the machine file (a wrong sign, a wrong axis or a ball confused with another).
+    Raises NotConvergedError if it does not converge in ``most`` steps, which means readings that contradict the machine
+    file (a wrong sign, a wrong axis or a ball confused with another).
     """
     current = linearise(local, common)
     cost = float(np.sum(current.residual**2))
     space, spanned = eliminate(current.local), current.local
     before, damping = np.inf, 1.0
-    for iteration in range(1, most + 1):
-        if damping < STALLED or (iteration > MOST_ITERATIONS and damping == 1.0):
+    for iteration in range(1, DAMPED_TIMES * most + 1):
+        if damping < STALLED or (iteration > most and damping == 1.0):
             break
         checkpoint()
         if current.local is not spanned:
@@ -203,23 +205,29 @@ def solve(
         size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
         factor, shrinks = damping, damping == 1.0 and size < min(1.0, before / 2.0)
         for _ in range(MOST_HALVINGS):
-            trial = linearise(local + factor * step_local, common + factor * of_common.step)
-            trial_cost = float(np.sum(trial.residual**2))
+            at = local + factor * step_local, common + factor * of_common.step
+            # A step that was halved is halved again as a rule.
+            trial_cost = None if factor == damping else squares(*at)
+            trial = linearise(*at) if trial_cost is None else None
+            if trial is not None:
+                trial_cost = float(np.sum(trial.residual**2))
+            assert trial_cost is not None
             if trial_cost <= cost * (1.0 + ROUNDING_OF_SUM) or shrinks or size < SMALLEST_HALVED:
                 break
             factor /= 2.0
         if size < 1.0:
             damping = factor
         local, common = local + factor * step_local, common + factor * of_common.step
-        current, cost = trial, trial_cost
+        current = linearise(*at) if trial is None else trial
+        cost = float(np.sum(current.residual**2))
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
             return _solution(local, common, current, space, of_common, iteration)
         before = size
     if _is_settled(size, current, int(np.sum(space.rank)) + of_common.rank):
         return _solution(local, common, current, space, of_common, iteration)
     raise NotConvergedError(
-        f"the identification did not converge in {min(most, MOST_ITERATIONS)} steps: the readings contradict the "
-        "machine file; check the axis signs, the topology, the order of the targets and the units"
+        f"the identification did not converge in {most} steps: the readings contradict the machine file; "
+        "check the axis signs, the topology, the order of the targets and the units"
     )
 
 

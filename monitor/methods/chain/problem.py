@@ -21,7 +21,7 @@ from monitor.exceptions import DataError, NotConvergedError
 from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.condensed import triangles
-from monitor.methods.chain.least_squares import MOST_STEPS, Linearisation, Solution, solve
+from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
@@ -243,6 +243,10 @@ class ChainProblem(MeasuredChain):
         of_rows = Linearisation(*map(self.padded, self.of_rows(local, common)))
         return self.with_calibrated(of_rows, local)
 
+    def squares(self, local: Array, common: Array) -> float | None:
+        """The sum of squares of the whitened residuals at (R, p) and (c,); None where a linearisation is as quick."""
+        return None
+
     def of_rows(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Whitened residuals (n, d) at (R, p) and (c,), and derivatives (n, d, p) and (n, d, c), row by row."""
         pose = self.evaluated(local, common, jacobian=True)
@@ -311,7 +315,7 @@ def solve_problem(
     problem: ChainProblem,
     local: Array | None = None,
     common: Array | None = None,
-    most: int = MOST_STEPS,
+    most: int = MOST_ITERATIONS,
 ) -> Solution:
     """The least-squares point of a problem, from ``local`` (R, p) and ``common`` (c,) or from no errors at all.
 
@@ -359,12 +363,12 @@ def _solved(
     linearise: Callable[[Array, Array], Linearisation],
     begin: Array,
     common: Array,
-    most: int = MOST_STEPS,
+    most: int = MOST_ITERATIONS,
 ) -> Solution:
     """The point of one search; what stays for a session is one number in its runs."""
     stays = problem.stays
     if stays is None:
-        return solve(linearise, begin, common, most)
+        return solve(linearise, begin, common, most, problem.squares)
     return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 

@@ -17,7 +17,7 @@ from monitor.records import Campaign
 CURED_SHARE, CURED_TIMES = 0.05, 20.0
 #: What is left at the noise is a cure as well, where the residual was little more to begin with.
 NOISE_TIMES, WORTH_SHARE = 1.3, 0.5
-#: Readings that fit converge in some eight steps, halved ones among them; a trial that does not is none.
+#: Readings that fit converge in some eight steps; a trial that does not is none.
 MOST_STEPS = 15
 #: A gross reading is one of many; of a target or a run that loses more of its rows all of it may be wrong.
 MOST_GROSS = 0.1
