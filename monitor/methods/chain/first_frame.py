@@ -99,8 +99,8 @@ def _places(
         mine = at == number
         if kinds == 3:
             # Each row says where the place is; all of them say it equally well.
-            seen = points[mine] @ turn.T + shift - origin[mine]
-            better[number] = np.einsum("nji,nj->i", rotation[mine], seen) / len(seen)
+            arms = points[mine] @ turn.T + shift - origin[mine]
+            better[number] = np.einsum("nji,nj->i", rotation[mine], arms) / len(arms)
             continue
         columns = np.einsum("ai,nij->naj", turn.T[:kinds], rotation[mine])
         shown = (np.einsum("nij,j->ni", rotation[mine], places[number]) + origin[mine] - shift) @ turn

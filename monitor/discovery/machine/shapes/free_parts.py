@@ -100,8 +100,8 @@ def most_together(
     cost: what all of them leave together is the least that some of them leave."""
     before, beside = (scene.remainders.beside(some) for some in (leading, [*leading, *may_stay]))
     columns = orthonormal(without(beside.basis, free.columns))
-    left = float(beside.residual @ beside.residual - np.sum((columns.T @ beside.residual) ** 2))
-    gain = np.log(float(before.residual @ before.residual) / max(left, 1e-300))
+    remaining = float(beside.residual @ beside.residual - np.sum((columns.T @ beside.residual) ** 2))
+    gain = np.log(float(before.residual @ before.residual) / max(remaining, 1e-300))
     return priced(scene, leading) + before.degrees_of_freedom * float(gain) - price_of_parts(free)
 
 

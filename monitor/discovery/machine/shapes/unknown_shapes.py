@@ -349,10 +349,26 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
                 staying = standing_beside(scene, beside, may_stay)
                 score = priced(scene, [*leading, *new, *staying])
-                if score > worth and (not is_free(new[0]) or foretells_poses(scene, new, leading)):
-                    new = [with_nearest(scene, new[0], shapes, leading)] if is_free(new[0]) else new
-                    best, worth = [*leading, *new, *staying], score
+                if score > worth and _foretells_if_free(scene, new, leading):
+                    best, worth = [*leading, *_named(scene, new, shapes, leading), *staying], score
     return best
+
+
+def _foretells_if_free(
+    scene: ChainScene, new: Sequence[ChainCandidate], leading: Sequence[ChainCandidate]
+) -> bool:
+    """Whether a free shape foretells poses; of others it was asked before."""
+    return not is_free(new[0]) or foretells_poses(scene, new, leading)
+
+
+def _named(
+    scene: ChainScene,
+    new: list[ChainCandidate],
+    shapes: Sequence[ChainCandidate],
+    leading: Sequence[ChainCandidate],
+) -> list[ChainCandidate]:
+    """A free shape with what comes nearest to it; others as they are."""
+    return [with_nearest(scene, new[0], shapes, leading)] if is_free(new[0]) else new
 
 
 def _of_error(
