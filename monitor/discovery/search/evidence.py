@@ -116,19 +116,17 @@ class Pool(Generic[CandidateT]):
     @cached_property
     def lengths(self) -> Array:
         """Length (K,) of every column; 1 where there is nothing."""
-        length = np.sqrt(np.concatenate([np.einsum("km,km->k", block, block) for block in self.blocks]))
-        return np.where(length == 0, 1.0, length)
+        squares = np.concatenate([np.diagonal(candidate.gram) for candidate in self.candidates])
+        return np.where(squares == 0.0, 1.0, np.sqrt(squares))
 
     @cached_property
     def grams(self) -> dict[int, Array]:
         """By number of coefficients: products (n, k, k) of the columns scaled to unit length."""
         grams = {}
         for size, (members, rows) in self.by_size.items():
-            grams[size] = np.empty((len(rows), size, size))
-            # Candidate by candidate: all columns once more would be fetched from the system page by page.
-            for gram, member, of_member in zip(grams[size], members, rows, strict=True):
-                part = self.candidates[member].columns.T / self.lengths[of_member, None]
-                gram[...] = part @ part.T
+            lengths = self.lengths[rows]
+            unscaled = np.array([self.candidates[member].gram for member in members])
+            grams[size] = unscaled.reshape(-1, size, size) / (lengths[:, :, None] * lengths[:, None, :])
         return grams
 
     @cached_property

@@ -57,7 +57,7 @@ class Free(DescribedShape):
         return tuple(f".{part}" for part in self.parts)
 
     def columns(self, context: Context, joint: int) -> Array:
-        basis = flexible_basis(context, joint)
+        basis = context.remembered(Free(), joint, lambda: flexible_basis(context, joint))
         if not self.parts:
             return basis
         if max(self.parts) > basis.shape[1]:

@@ -243,6 +243,10 @@ class ChainProblem(MeasuredChain):
         of_rows = Linearisation(*map(self.padded, self.of_rows(local, common)))
         return self.with_calibrated(of_rows, local)
 
+    def squares(self, local: Array, common: Array) -> float | None:
+        """The sum of squares of the whitened residuals at (R, p) and (c,); None where a linearisation is as quick."""
+        return None
+
     def of_rows(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Whitened residuals (n, d) at (R, p) and (c,), and derivatives (n, d, p) and (n, d, c), row by row."""
         pose = self.evaluated(local, common, jacobian=True)
@@ -364,7 +368,7 @@ def _solved(
     """The point of one search; what stays for a session is one number in its runs."""
     stays = problem.stays
     if stays is None:
-        return solve(linearise, begin, common, most)
+        return solve(linearise, begin, common, most, problem.squares)
     return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 

@@ -20,11 +20,14 @@ from monitor.discovery.machine.shapes.free_parts import (
     PRICE,
     in_any_shape,
     is_free,
+    most_together,
     of_parts,
+    of_parts_alone,
     parts_worth_keeping,
     price_of_parts,
     priced,
     whole_basis,
+    with_nearest,
 )
 from monitor.discovery.machine.shapes.inside_shapes import (
     LEVEL,
@@ -335,34 +338,58 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
         for count in range(max(len(ordered), 1)):
             leading, gone = ordered[:count], ordered[count:]
             sawtooth = teeth.beside(leading) if teeth is not None else []
-            for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
+            for new in [
+                *_of_error(scene, whole, leading, gone[:-1], worth),
+                *([sawtooth] if sawtooth else []),
+            ]:
                 # What rounded teeth leave is no other error.
                 beside = [*leading, *new, *([whole] if new is sawtooth else [])]
                 of_others = [each for each in gone if error_of(each) != symbol]
                 # One goes in any case: where teeth take the place of their error's other shapes, these do.
                 may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
-                together = [*leading, *new, *standing_beside(scene, beside, may_stay)]
-                score = priced(scene, together)
-                if score > worth:
-                    best, worth = together, score
+                staying = standing_beside(scene, beside, may_stay)
+                score = priced(scene, [*leading, *new, *staying])
+                if score > worth and _foretells_if_free(scene, new, leading):
+                    best, worth = [*leading, *_named(scene, new, shapes, leading), *staying], score
     return best
+
+
+def _foretells_if_free(
+    scene: ChainScene, new: Sequence[ChainCandidate], leading: Sequence[ChainCandidate]
+) -> bool:
+    """Whether a free shape foretells poses; of others it was asked before."""
+    return not is_free(new[0]) or foretells_poses(scene, new, leading)
+
+
+def _named(
+    scene: ChainScene,
+    new: list[ChainCandidate],
+    shapes: Sequence[ChainCandidate],
+    leading: Sequence[ChainCandidate],
+) -> list[ChainCandidate]:
+    """A free shape with what comes nearest to it; others as they are."""
+    return [with_nearest(scene, new[0], shapes, leading)] if is_free(new[0]) else new
 
 
 def _of_error(
     scene: ChainScene,
-    symbol: str,
-    shapes: Sequence[ChainCandidate],
     whole: ChainCandidate,
     leading: Sequence[ChainCandidate],
+    may_stay: Sequence[ChainCandidate],
+    worth: float,
 ) -> list[list[ChainCandidate]]:
-    """What an error may be beside leading effects: one free shape, or several powers of the position that say as much;
-    none where it is among them or foretells no poses."""
+    """What an error, of which the ``whole`` basis is given, may be beside leading effects: one free shape, whether or
+    not it foretells poses, or several powers of the position that say as much; none where it is among them, or where
+    with those that may stay it is not worth so much."""
+    symbol = error_of(whole)
     if symbol in map(error_of, leading):
         return []
     parts = parts_worth_keeping(scene, whole, leading)
     if not parts:
         return []
-    free = of_parts(scene, symbol, parts, shapes, leading)
+    free = of_parts_alone(scene, symbol, parts)
+    if not any(error_of(power) == symbol for power in scene.powers):
+        return [[free]] if most_together(scene, free, leading, may_stay) > worth else []
     able = foretells_poses(scene, [free], leading)
     bends = bends_instead(scene, symbol, priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]
