@@ -78,15 +78,17 @@ class ErrorProfiles:
                 rows = run == number
                 taken[some] += np.sum((profiles[some][:, rows] @ self._by_nuisance[rows]) ** 2, axis=1)
         before[peaks < ROUNDING] = 0.0
-        left = np.maximum(before - taken, 0.0)
+        remaining = np.maximum(before - taken, 0.0)
         limit = self.scene.fit.problem.largest_effect
         term = self.effect.term
         largest = [
             largest_coefficient(self.effect, ChainBasis(term, profile[:, None]), peak, limit)
             for profile, peak in zip(profiles, peaks.tolist(), strict=True)
         ]
-        shares = np.sqrt(left / np.where(before > 0.0, before, np.inf))
-        return Profiles(profiles, np.sqrt(np.where(left > 0.0, left, 1.0)), shares, np.array(largest))
+        shares = np.sqrt(remaining / np.where(before > 0.0, before, np.inf))
+        return Profiles(
+            profiles, np.sqrt(np.where(remaining > 0.0, remaining, 1.0)), shares, np.array(largest)
+        )
 
     def _squares(self, profiles: Array) -> Array:
         """The sums of squares (k,) of the whitened columns."""
@@ -98,7 +100,7 @@ class ErrorProfiles:
         white = fit.whitening(np.pad(white, ((0, 0), (0, 0), (0, extra))))
         return np.asarray(np.einsum("krn,krn->k", white, white))
 
-    def scores(self, seen: Profiles, tries: int, others: Sequence[ChainCandidate]) -> Array:
+    def scores(self, weighable: Profiles, tries: int, others: Sequence[ChainCandidate]) -> Array:
         """The scores (k,) of profiles beside others, of so many that are tried; minus infinity where the data see
         none."""
         beside = self.scene.remainders.beside(others)
@@ -106,12 +108,12 @@ class ErrorProfiles:
         runs, numbers = self.scene.fit.solution.last.residual.shape
         selected = np.column_stack([beside.basis, beside.residual]).reshape(runs, numbers, -1)
         by_rows = (self._white[:, None] @ self.scene.fit.by_rows(selected))[:, 0]
-        onto = seen.profiles @ by_rows / seen.lengths[:, None]
+        onto = weighable.profiles @ by_rows / weighable.lengths[:, None]
         remainder = 1.0 - np.sum(onto[:, :-1] ** 2, axis=1)
         explained, rank, coefficients = explained_by(
-            remainder[:, None, None], onto[:, -1:], total, dof, least_remainder(seen.shares)
+            remainder[:, None, None], onto[:, -1:], total, dof, least_remainder(weighable.shares)
         )
-        size = np.abs(coefficients[:, 0]) / seen.lengths
-        rank[(size > BEYOND * seen.largest) | (seen.shares <= SMALLEST_SHARE)] = 0
-        odds = tries * np.where(size > seen.largest, ODDS_OF_TOO_LARGE, 1.0)
+        size = np.abs(coefficients[:, 0]) / weighable.lengths
+        rank[(size > BEYOND * weighable.largest) | (weighable.shares <= SMALLEST_SHARE)] = 0
+        odds = tries * np.where(size > weighable.largest, ODDS_OF_TOO_LARGE, 1.0)
         return scores_of(explained, rank, (total, dof), odds)

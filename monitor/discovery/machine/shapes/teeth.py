@@ -50,7 +50,7 @@ class _Sawtooths:
 
     shapes: Array
     grid_points: Array
-    seen: Profiles
+    profiles: Profiles
 
 
 @dataclass(frozen=True)
@@ -127,8 +127,8 @@ class TeethOfError:
         shapes = np.array(list(grid_points)).reshape(-1, 2)
         falls_twice = shapes.sum(axis=1) < low + WITHIN_TRAVEL * travel
         shapes = shapes[falls_twice]
-        seen = self._profiles.of(sawtooths(self._reading, shapes[:, 0], shapes[:, 1]))
-        return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[falls_twice], seen)
+        profiles = self._profiles.of(sawtooths(self._reading, shapes[:, 0], shapes[:, 1]))
+        return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[falls_twice], profiles)
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the sawtooth that says most beside others, or as the plain cycle of so many periods where that
@@ -188,9 +188,9 @@ class TeethOfError:
 
     def _weighed(self, sawtooths: _Sawtooths, others: Sequence[ChainCandidate]) -> list[_Weighed]:
         """Sawtooths beside others, the most convincing first; none where the data see none."""
-        scores = self._profiles.scores(sawtooths.seen, self.tries, others)
+        scores = self._profiles.scores(sawtooths.profiles, self.tries, others)
         ordered = np.argsort(-scores, kind="stable")
-        ordered = ordered[sawtooths.seen.shares[ordered] > SMALLEST_SHARE]
+        ordered = ordered[sawtooths.profiles.shares[ordered] > SMALLEST_SHARE]
         return [
             _Weighed(shape, grid_point, score)
             for shape, grid_point, score in zip(
