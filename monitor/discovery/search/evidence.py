@@ -141,16 +141,8 @@ class Pool(Generic[CandidateT]):
 
     @cached_property
     def least(self) -> Array:
-        """The part (squared) of a direction of each candidate from which on it is determined beside others.
-
-        Below it a fit holds the direction: of the whole effect, what is free in every run included, less is left than
-        products of small errors leave.
-        """
-        shares = np.array([candidate.share for candidate in self.candidates])
-        least: Array = np.maximum(
-            (SMALLEST_SHARE / np.maximum(shares, SMALLEST_SHARE)) ** 2, SMALLEST_REMAINDER
-        )
-        return least
+        """The part (squared) of a direction of each candidate from which on it is determined beside others."""
+        return least_remainder(np.array([candidate.share for candidate in self.candidates]))
 
     @cached_property
     def largest(self) -> Array:
@@ -162,6 +154,17 @@ class Pool(Generic[CandidateT]):
         families = {candidate.family for candidate in self.candidates}
         new = [candidate for candidate in more if candidate.family not in families]
         return Pool((*self.candidates, *new)) if new else self
+
+
+def least_remainder(shares: Array) -> Array:
+    """The part (squared) of a direction from which on it is determined beside others, by the ``shares`` that what is
+    free in every run leaves.
+
+    Below it a fit holds the direction: of the whole effect, what is free in every run included, less is left than
+    products of small errors leave.
+    """
+    least: Array = np.maximum((SMALLEST_SHARE / np.maximum(shares, SMALLEST_SHARE)) ** 2, SMALLEST_REMAINDER)
+    return least
 
 
 def pool_of(scene: Scene[CandidateT]) -> Pool[CandidateT]:
@@ -263,10 +266,21 @@ def evidence_of(
     f = np.where(able, (explained / number) / (stays / other), 0.0)
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
-    price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
-    score = np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
+    score = scores_of(explained, rank, residual, odds)
     values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
     return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
+
+
+def scores_of(
+    explained: Array, rank: npt.NDArray[np.int64], residual: tuple[float, int], odds: Array
+) -> Array:
+    """The scores (n,) of what explains sums of squares (n,) with ranks (n,) of a ``residual``, with ``odds`` (n,)
+    against each; minus infinity where nothing can be explained."""
+    total, dof = residual
+    able = (rank > 0) & (dof > rank) & (total > 0)
+    stays = np.maximum(total - explained, 1e-300)
+    price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
+    return np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
 
 
 def best_of_families(weighed: Sequence[Evidence[CandidateT]]) -> list[Evidence[CandidateT]]:

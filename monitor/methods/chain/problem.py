@@ -183,6 +183,13 @@ class ChainProblem(MeasuredChain):
         padded[self._run, self._row] = rows
         return padded.reshape(len(self.runs), depth * rows.shape[1], *rows.shape[2:])
 
+    def by_rows(self, runs: Array) -> Array:
+        """Rows (n, d, ...) of runs (R, N, ...): what ``padded`` does, undone; what stands behind the rows is left."""
+        numbers = self.sigma.shape[1]
+        depth = int(self._row.max()) + 1
+        of_rows = runs[:, : depth * numbers].reshape(len(runs), depth, numbers, *runs.shape[2:])
+        return np.asarray(of_rows[self._run, self._row])
+
     def state(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Errors (n, J, 2, 6), work ends (n, 3) and tool ends (n, 3) at (R, p) and (c,), in internal units."""
         errors = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
