@@ -60,6 +60,11 @@ class Candidate(Generic[Effect]):
         return self.variant.effect
 
     @property
+    def odds(self) -> float:
+        """The odds against it beforehand."""
+        return self.variant.odds
+
+    @property
     def visible(self) -> bool:
         """Whether the data see anything of the effect."""
         return self.share > SMALLEST_SHARE

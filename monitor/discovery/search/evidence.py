@@ -57,7 +57,7 @@ class Evidence(Generic[CandidateT]):
     @property
     def likelihood(self) -> float:
         """The score without the odds beforehand: what the data alone say."""
-        odds = self.candidate.variant.odds * (ODDS_OF_TOO_LARGE if self.too_large else 1.0)
+        odds = self.candidate.odds * (ODDS_OF_TOO_LARGE if self.too_large else 1.0)
         return self.score + 2.0 * float(np.log(odds))
 
 
@@ -139,7 +139,7 @@ class Pool(Generic[CandidateT]):
     @cached_property
     def odds(self) -> Array:
         """The odds against each candidate beforehand."""
-        return np.array([candidate.variant.odds for candidate in self.candidates])
+        return np.array([candidate.odds for candidate in self.candidates])
 
     @cached_property
     def least(self) -> Array:
