@@ -152,9 +152,9 @@ def _rows(
     for base, columns in zip(problem.base, problem.base_columns, strict=True):
         if isinstance(base, ChainEffect):
             nuisance[:, :, columns] = base.basis(new).displacement(pose.by_error)
-    own = len(problem.base_names) + problem.own_columns[problem.parts.index(part)]
-    nuisance[:, :, own[:3]] = -np.eye(3)
+    of_setup = len(problem.base_names) + problem.own_columns[problem.parts.index(part)]
+    nuisance[:, :, of_setup[:3]] = -np.eye(3)
     if part.tool_point is not None:
-        nuisance[:, :, own[-len(TOOL_POINT) :]] = pose.by_tip
+        nuisance[:, :, of_setup[-len(TOOL_POINT) :]] = pose.by_tip
     columns_of_effects = [each.basis(new).displacement(pose.by_error) / sigma for each in effects]
     return PlanRows(nuisance / sigma, columns_of_effects)
