@@ -143,7 +143,7 @@ class ChainSearch:
         free = first.degrees_of_freedom - under.degrees_of_freedom + 2 * (correlation is not None)
         families = len({variant.family for variant in self.variants})
         candidates = [finding.candidate for finding in latest.refined]
-        tries = [families * each.variant.tries * each.odds for each in candidates]
+        tries = [families * each.variant.tries * each.variant.odds for each in candidates]
         price = free * np.log(design.contrasts) + 2.0 * np.sum(np.log(tries))
         # Readings of a target that scatters are counted by less: in its own unit each is as likely.
         weighted = under.has_weight

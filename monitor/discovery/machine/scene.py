@@ -41,9 +41,9 @@ from monitor.records import Array
 # over some 300 candidates lies at 4.2.
 DETECTABLE = 5.0
 
-# Odds of 1 to so much decide where two effects are one at all poses but for rounding, which is below 1e-5 of a score,
-# and nowhere else: with this step scores differ by 2e-4.
-ODDS_OF_TIED = 1.0001
+# By so much scores differ where effects are one at all poses but for rounding, which is below 1e-5 of a score; nothing
+# else is decided by it.
+BEHIND = 2e-4
 
 MachineEffect: TypeAlias = ParsedEffect
 ChainVariant: TypeAlias = Variant[MachineEffect]
@@ -58,9 +58,9 @@ class ChainCandidate(Candidate[MachineEffect]):
     basis: Basis
 
     @property
-    def odds(self) -> float:
-        """The odds against it beforehand, and of effects that these poses show alike those of the less common cause."""
-        return self.variant.odds * ODDS_OF_TIED ** _less_common(self.effect)
+    def behind(self) -> float:
+        """By how much its score stands behind that of the drive's error which does the same at these poses."""
+        return BEHIND * _less_common(self.effect)
 
     @property
     def raw(self) -> Array:

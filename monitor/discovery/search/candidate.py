@@ -60,9 +60,10 @@ class Candidate(Generic[Effect]):
         return self.variant.effect
 
     @property
-    def odds(self) -> float:
-        """The odds against it beforehand."""
-        return self.variant.odds
+    def behind(self) -> float:
+        """By how much its score stands behind that of a likelier cause which does the same; far less than data
+        decide."""
+        return 0.0
 
     @property
     def visible(self) -> bool:

@@ -143,7 +143,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
         if self._doubt is not None:
-            tries = candidate.variant.tries * candidate.odds * self._families
+            tries = candidate.variant.tries * candidate.variant.odds * self._families
             if self._doubt.p_value(others, candidate) * tries > limit:
                 return False
         return True
@@ -229,7 +229,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         if size == 0 or dof < 1 or rest <= 0.0:
             return False
         p_value = float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
-        return p_value * candidate.variant.tries * candidate.odds * self._families <= self.rate
+        return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
 
     def _larger_errors(
         self, others: Sequence[ChainCandidate], candidate: ChainCandidate

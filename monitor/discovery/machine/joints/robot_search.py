@@ -96,7 +96,7 @@ def _best(pursuit: Pursuit, rest: Sequence[ChainCandidate], level: float) -> Cha
     for candidate in rest:
         new = pursuit.new(candidate.columns[pursuit.order])
         explained = float(np.sum((new.T @ pursuit.residual) ** 2))
-        price = new.shape[1] * np.log(count) + 2.0 * np.log(candidate.odds)
+        price = new.shape[1] * np.log(count) + 2.0 * np.log(candidate.variant.odds)
         scores.append(-count * np.log1p(-min(explained / total, 1.0 - 1e-12)) - price)
     for index in np.argsort(scores)[::-1][:MOST_TRIED]:
         candidate = rest[int(index)]
@@ -108,7 +108,7 @@ def _best(pursuit: Pursuit, rest: Sequence[ChainCandidate], level: float) -> Cha
 
 def _stands(pursuit: Pursuit, candidate: ChainCandidate, new: Array, level: float) -> bool:
     """Whether an effect with ``new`` columns stands: by poses, held out, and of a plausible size."""
-    if new.shape[1] == 0 or pursuit.p_value(new) * candidate.odds > level:
+    if new.shape[1] == 0 or pursuit.p_value(new) * candidate.variant.odds > level:
         return False
     if pursuit.held_out(new) >= pursuit.held_out():
         return False
