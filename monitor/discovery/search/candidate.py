@@ -66,6 +66,12 @@ class Candidate(Generic[Effect]):
         return self.columns.T @ self.columns
 
     @property
+    def behind(self) -> float:
+        """By how much its score stands behind that of a likelier cause which does the same; far less than data
+        decide."""
+        return 0.0
+
+    @property
     def visible(self) -> bool:
         """Whether the data see anything of the effect."""
         return self.share > SMALLEST_SHARE

@@ -58,7 +58,7 @@ class Evidence(Generic[CandidateT]):
     def likelihood(self) -> float:
         """The score without the odds beforehand: what the data alone say."""
         odds = self.candidate.variant.odds * (ODDS_OF_TOO_LARGE if self.too_large else 1.0)
-        return self.score + 2.0 * float(np.log(odds))
+        return self.score + 2.0 * float(np.log(odds)) + self.candidate.behind
 
 
 @dataclass(frozen=True)
@@ -138,6 +138,11 @@ class Pool(Generic[CandidateT]):
     def odds(self) -> Array:
         """The odds against each candidate beforehand."""
         return np.array([candidate.variant.odds for candidate in self.candidates])
+
+    @cached_property
+    def behind(self) -> Array:
+        """By how much the score of each candidate stands behind that of a likelier cause which does the same."""
+        return np.array([candidate.behind for candidate in self.candidates])
 
     @cached_property
     def least(self) -> Array:
@@ -266,7 +271,7 @@ def evidence_of(
     f = np.where(able, (explained / number) / (stays / other), 0.0)
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
-    score = scores_of(explained, rank, residual, odds)
+    score = scores_of(explained, rank, residual, odds) - pool.behind
     values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
     return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
 
