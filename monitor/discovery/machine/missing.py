@@ -240,7 +240,7 @@ def _likelihood_without(
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
     searched = candidate.family.endswith(
-        (":cyclic", ":sawtooth", ":windup", ":harmonic", ":table", ":free", ":curve")
+        (":cyclic", ":sawtooth", ":step", ":windup", ":harmonic", ":table", ":free", ":curve")
     )
     return candidate.effect.text if searched else candidate.family
 

@@ -76,9 +76,15 @@ def of_parts(
 
 
 def parts_worth_keeping(
-    scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]
+    scene: ChainScene,
+    whole: ChainCandidate,
+    others: Sequence[ChainCandidate],
+    *,
+    most: int = MOST_PARTS,
+    choice: float = PRICE,
 ) -> list[int]:
-    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other.
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other:
+    so many at ``most``, ``choice`` the price of the choice of each.
 
     The selection begins once with the best part and once with the best pair: a drive that is wound up is the direction
     less what decays after a reversal, and neither of the two says much alone. The pair has to say more beyond doubt.
@@ -88,29 +94,35 @@ def parts_worth_keeping(
     before: Array = np.linalg.norm(whole.columns, axis=0)
     least = SMALLEST_LENGTH * np.maximum(before, 1e-300)
     dof = scene.degrees_of_freedom - beside.basis.shape[1]
-    price = float(np.log(dof)) + 2.0 * PRICE
+    price = float(np.log(dof)) + 2.0 * choice
 
     def cost(parts: Sequence[int]) -> float:
         return float(dof * np.log(left_by(columns[:, list(parts)], residual)) + price * len(parts))
 
     selections = []
     for begin in ([], _best_pair(columns, residual, least)):
-        parts = _selected(columns, residual, least, (dof, price), begin)
+        parts = _selected(columns, residual, least, (dof, price), begin, most)
         selections.append(worth_keeping(columns, residual, parts, dof, price))
     one_by_one, from_pair = selections
     return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
 
 
 def _selected(
-    columns: Array, residual: Array, least: Array, prices: tuple[float, float], begin: Sequence[int]
+    columns: Array,
+    residual: Array,
+    least: Array,
+    prices: tuple[float, float],
+    begin: Sequence[int],
+    most: int,
 ) -> list[int]:
-    """The parts to ``begin`` with and those that are worth their price beside them, one after the other; ``prices`` are
-    the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part is one of those before."""
+    """The parts to ``begin`` with and those that are worth their price beside them, one after the other, so many at
+    ``most``; ``prices`` are the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part
+    is one of those before."""
     (dof, price), parts = prices, list(begin)
     if parts:
         basis = orthonormal(columns[:, parts])
         residual, columns = without(basis, residual[:, None])[:, 0], without(basis, columns)
-    while len(parts) < MOST_PARTS:
+    while len(parts) < most:
         length = np.linalg.norm(columns, axis=0)
         explained = np.where(
             length > least, (columns.T @ residual) ** 2 / np.where(length > least, length, 1.0) ** 2, 0.0

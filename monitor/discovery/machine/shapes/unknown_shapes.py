@@ -33,6 +33,7 @@ from monitor.discovery.machine.shapes.inside_shapes import (
     with_those_outside,
 )
 from monitor.discovery.machine.shapes.refined_instead import refined_instead
+from monitor.discovery.machine.shapes.scale_steps import steps_of
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -331,16 +332,19 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     worth = max(priced(scene, selected), priced(scene, bending_sight(scene))) + margin
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
-        teeth = teeth_of(scene, shapes[0])
+        sharp = [
+            each for each in (teeth_of(scene, shapes[0]), steps_of(scene, shapes[0])) if each is not None
+        ]
         for count in range(max(len(ordered), 1)):
             leading, gone = ordered[:count], ordered[count:]
-            sawtooth = teeth.beside(leading) if teeth is not None else []
-            for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
-                # What rounded teeth leave is no other error.
-                beside = [*leading, *new, *([whole] if new is sawtooth else [])]
+            edged = [some for each in sharp if (some := each.beside(leading))]
+            for new in [*_of_error(scene, symbol, shapes, whole, leading), *edged]:
+                has_edges = any(new is some for some in edged)
+                # What rounded edges leave is no other error.
+                beside = [*leading, *new, *([whole] if has_edges else [])]
                 of_others = [each for each in gone if error_of(each) != symbol]
-                # One goes in any case: where teeth take the place of their error's other shapes, these do.
-                may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
+                # One goes in any case: where edges take the place of their error's other shapes, these do.
+                may_stay = of_others if has_edges and len(of_others) < len(gone) else gone[:-1]
                 together = [*leading, *new, *standing_beside(scene, beside, may_stay)]
                 score = priced(scene, together)
                 if score > worth:
