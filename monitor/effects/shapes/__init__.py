@@ -58,8 +58,8 @@ def parse_shape(text: str) -> Shape:
             f"there is no shape '{text}'; {hint}"
             "there are const, poly1 to poly9, harmonic1 to harmonic9999, "
             "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), sawtooth84mm(12) (any pitch, and where it "
-            "falls), step(120) or step8mm(110,300) (a jump at each reading, evenly over a width), reversal, windup40mm or "
-            "windup40deg (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
+            "falls), step(120) or step8mm(110,300) (a jump at each reading, evenly over a width), reversal, windup40mm "
+            "or windup40deg (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
             f"table(-100,0,100) for your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

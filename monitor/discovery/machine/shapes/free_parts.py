@@ -100,10 +100,10 @@ def parts_worth_keeping(
         return float(dof * np.log(left_by(columns[:, list(parts)], residual)) + price * len(parts))
 
     selections = []
-    for begin in ([], _best_pair(columns, residual, least)):
+    for begin in ([], _best_pair(columns, residual, least))[:most]:
         parts = _selected(columns, residual, least, (dof, price), begin, most)
         selections.append(worth_keeping(columns, residual, parts, dof, price))
-    one_by_one, from_pair = selections
+    one_by_one, from_pair = selections[0], selections[-1]
     return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
 
 

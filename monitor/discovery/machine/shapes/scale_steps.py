@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from math import comb
 
 import numpy as np
@@ -129,9 +130,9 @@ class StepsOfError:
         if self.effect.term.symbol in map(error_of, others) or not len(self._gaps):
             return []
         worth, best = self._price(0, others) + self._cost([], others), None
-        for places, width, whole in self._wholes:
-            found = self._refined(self._selected(places, width, whole, others), width, others)
-            if not found:
+        for (places, width, whole), most in product(self._wholes, (1, MOST_STEPS)):
+            found = self._refined(self._selected(places, whole, most, others), width, others)
+            if not found or not self._are_apart(found, width):
                 continue
             cost = self._price(len(found), others) + self._cost([self._candidate(found, width)], others)
             if cost < worth:
@@ -166,15 +167,11 @@ class StepsOfError:
         return freedom * float(np.log(residual @ residual))
 
     def _selected(
-        self, places: Array, width: float, whole: ChainCandidate, others: Sequence[ChainCandidate]
+        self, places: Array, whole: ChainCandidate, most: int, others: Sequence[ChainCandidate]
     ) -> list[float]:
-        """The places of the first search that are worth their price: one where several are not apart."""
-        parts: list[int] = []
-        for most in (MOST_STEPS, 1):
-            parts = sorted(parts_worth_keeping(self.scene, whole, others, most=most, choice=self._choice()))
-            if self._are_apart(places[parts].tolist(), width):
-                break
-        return list(map(float, places[parts]))
+        """The places of the first search that are worth their price, so many at most."""
+        parts = parts_worth_keeping(self.scene, whole, others, most=most, choice=self._choice())
+        return list(map(float, places[sorted(parts)]))
 
     def _refined(
         self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
@@ -224,3 +221,12 @@ def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
     if not isinstance(effect, ChainEffect) or effect.joint.turns:
         return None
     return StepsOfError(scene, effect)
+
+
+def steps_between(
+    scene: ChainScene, candidate: ChainCandidate, others: Sequence[ChainCandidate]
+) -> tuple[Between, ...]:
+    """The readings between which each step of an effect lies beside others; none where it has none."""
+    steps = steps_of(scene, candidate)
+    shape = None if steps is None else steps.effect.shape
+    return steps.between(shape, others) if steps is not None and isinstance(shape, Step) else ()
