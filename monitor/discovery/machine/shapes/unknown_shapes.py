@@ -45,7 +45,7 @@ from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.teeth import teeth_of
 from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
-from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.evidence import Pool, weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import (
     WORTH_EXCHANGING,
@@ -59,6 +59,8 @@ from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
 
+# An error is asked for steps where it explains in any shape such a part of what the best one does.
+PROMISING = 0.5
 # So many times the stated noise is an error that is missing, not a statement that is wrong.
 FAR = 1.5
 
@@ -330,6 +332,9 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     }
     best: list[ChainCandidate] = []
     worth = max(priced(scene, selected), priced(scene, bending_sight(scene))) + margin
+    wholes = Pool(tuple(whole for _, whole in errors.values()))
+    counts = range(max(len(ordered), 1))
+    promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
         sharp = [
@@ -350,6 +355,16 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 if score > worth:
                     best, worth = together, score
     return best
+
+
+def _promising(
+    scene: ChainScene, wholes: Pool[ChainCandidate], leading: Sequence[ChainCandidate]
+) -> set[str]:
+    """The errors that explain in any shape beside leading effects no less than half of what the best one does: a step
+    of another would say less."""
+    weighed = weigh_beside(scene, wholes, leading)
+    most = max((evidence.explained for evidence in weighed), default=0.0)
+    return {error_of(each.candidate) for each in weighed if each.explained >= PROMISING * most}
 
 
 def _of_error(
