@@ -337,12 +337,11 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
-        sharp = [
-            each for each in (teeth_of(scene, shapes[0]), steps_of(scene, shapes[0])) if each is not None
-        ]
-        for count in range(max(len(ordered), 1)):
+        teeth, steps = teeth_of(scene, shapes[0]), steps_of(scene, shapes[0])
+        for count in counts:
             leading, gone = ordered[:count], ordered[count:]
-            edged = [some for each in sharp if (some := each.beside(leading))]
+            sharp = (teeth, steps if symbol in promising[count] else None)
+            edged = [some for each in sharp if each is not None and (some := each.beside(leading))]
             for new in [*_of_error(scene, symbol, shapes, whole, leading), *edged]:
                 has_edges = any(new is some for some in edged)
                 # What rounded edges leave is no other error.
