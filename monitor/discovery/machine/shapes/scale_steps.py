@@ -93,12 +93,12 @@ class StepsOfError:
         count = len(self._middles)
         return self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
 
-    def _near(self, place: float, width: float) -> Array:
+    def _near(self, at_mm: float, width: float) -> Array:
         """The places between the neighbours of one among the first."""
         first = self._places(width)
         if width:
-            return np.round(place + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
-        low, high = first[first < place].max(initial=-np.inf), first[first > place].min(initial=np.inf)
+            return np.round(at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
+        low, high = first[first < at_mm].max(initial=-np.inf), first[first > at_mm].min(initial=np.inf)
         return self._middles[(self._middles > low) & (self._middles < high)]
 
     @cached_property
@@ -131,12 +131,15 @@ class StepsOfError:
             return []
         worth, best = self._price(0, others) + self._cost([], others), None
         for (places, width, whole), most in product(self._wholes, (1, MOST_STEPS)):
-            found = self._refined(self._selected(places, whole, most, others), width, others)
-            if not found or not self._are_apart(found, width):
+            selected = self._refined(self._selected(places, whole, most, others), width, others)
+            selected = self._worth_keeping(selected, width, others)
+            if not selected or not self._are_apart(selected, width):
                 continue
-            cost = self._price(len(found), others) + self._cost([self._candidate(found, width)], others)
+            # The width of a way is one more unknown.
+            price = self._price(len(selected) + bool(width), others)
+            cost = price + self._cost([self._candidate(selected, width)], others)
             if cost < worth:
-                worth, best = cost, (found, width)
+                worth, best = cost, (selected, width)
         return [] if best is None else self._at_best_width(*best, others)
 
     def _at_best_width(
@@ -147,7 +150,7 @@ class StepsOfError:
         able = [some for some in widths if self._are_apart(places, some)]
         if able:
             width = min(able, key=lambda some: self._cost([self._candidate(places, some)], others))
-            places = self._refined(places, width, others)
+            places = self._worth_keeping(self._refined(places, width, others), width, others)
         steps = self._candidate(places, width)
         return [steps] if steps.visible and foretells_poses(self.scene, [steps], others) else []
 
@@ -178,15 +181,32 @@ class StepsOfError:
     ) -> list[float]:
         """The places, each at the best between its neighbours of the first search."""
         best = list(places)
-        for index, place in enumerate(places):
+        for index, at_mm in enumerate(places):
             rest = best[:index] + best[index + 1 :]
-            near = [some for some in self._near(place, width) if self._are_apart([*rest, some], width)]
+            near = [some for some in self._near(at_mm, width) if self._are_apart([*rest, some], width)]
             if len(near) > 1:
-                left = self._left_with(near, rest, width, others)
+                remaining = self._left_with(near, rest, width, others)
                 # The middle of those that say the same: between two positions the readings are.
-                alike = np.flatnonzero(left <= left.min() * (1.0 + 1e-9))
+                alike = np.flatnonzero(remaining <= remaining.min() * (1.0 + 1e-9))
                 best[index] = near[int(alike[len(alike) // 2])]
         return best
+
+    def _worth_keeping(
+        self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> list[float]:
+        """The places of steps that are worth their price beside the rest, now that all are where they say most."""
+        worthy = list(places)
+        while len(worthy) > 1:
+            with_all = self._cost([self._candidate(worthy, width)], others)
+            without_each = [
+                self._cost([self._candidate(worthy[:index] + worthy[index + 1 :], width)], others)
+                for index in range(len(worthy))
+            ]
+            least = int(np.argmin(without_each))
+            if without_each[least] - with_all >= self._price(1, others):
+                break
+            del worthy[least]
+        return worthy
 
     def _left_with(
         self, near: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
@@ -204,14 +224,14 @@ class StepsOfError:
         3.84 (twice the logarithm of a likelihood ratio) less likely than where it says most."""
         freedom = self.scene.remainders.beside(others).degrees_of_freedom
         intervals = []
-        for index, place in enumerate(shape.readings):
+        for index, at_mm in enumerate(shape.readings):
             rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-            left = self._left_with(self._middles.tolist(), rest, shape.width, others)
-            best = min(float(left.min()), float(self._left_with([place], rest, shape.width, others)[0]))
-            own = np.flatnonzero((self._gaps[:, 0] <= place) & (place <= self._gaps[:, 1]))
-            able = np.union1d(own, np.flatnonzero(freedom * np.log(left / best) < LIMIT))
+            remaining = self._left_with(self._middles.tolist(), rest, shape.width, others)
+            best = min(float(remaining.min()), float(self._left_with([at_mm], rest, shape.width, others)[0]))
+            of_place = np.flatnonzero((self._gaps[:, 0] <= at_mm) & (at_mm <= self._gaps[:, 1]))
+            able = np.union1d(of_place, np.flatnonzero(freedom * np.log(remaining / best) < LIMIT))
             ends = self._gaps[able]
-            intervals.append(Between(float(ends.min(initial=place)), float(ends.max(initial=place))))
+            intervals.append(Between(float(ends.min(initial=at_mm)), float(ends.max(initial=at_mm))))
         return tuple(intervals)
 
 

@@ -7,7 +7,7 @@ Where the flexible competitor of an error says more than its shapes of the catal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from monitor.discovery.machine.compare import lack_of_fit
@@ -33,7 +33,7 @@ from monitor.discovery.machine.shapes.inside_shapes import (
     with_those_outside,
 )
 from monitor.discovery.machine.shapes.refined_instead import refined_instead
-from monitor.discovery.machine.shapes.scale_steps import steps_of
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -42,7 +42,7 @@ from monitor.discovery.machine.shapes.slight_shapes import (
     slight_wave,
 )
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.teeth import teeth_of
+from monitor.discovery.machine.shapes.teeth import TeethOfError, teeth_of
 from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import Pool, weigh_beside
@@ -337,11 +337,10 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
-        teeth, steps = teeth_of(scene, shapes[0]), steps_of(scene, shapes[0])
+        sharp = _Sharp(teeth_of(scene, shapes[0]), steps_of(scene, shapes[0]))
         for count in counts:
             leading, gone = ordered[:count], ordered[count:]
-            sharp = (teeth, steps if symbol in promising[count] else None)
-            edged = [some for each in sharp if each is not None and (some := each.beside(leading))]
+            edged = sharp.beside(leading, with_steps=symbol in promising[count])
             for new in [*_of_error(scene, symbol, shapes, whole, leading), *edged]:
                 has_edges = any(new is some for some in edged)
                 # What rounded edges leave is no other error.
@@ -354,6 +353,19 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 if score > worth:
                     best, worth = together, score
     return best
+
+
+@dataclass(frozen=True)
+class _Sharp:
+    """What has edges of one error: its teeth and its steps, None where it has none."""
+
+    teeth: TeethOfError | None
+    steps: StepsOfError | None
+
+    def beside(self, leading: Sequence[ChainCandidate], *, with_steps: bool) -> list[list[ChainCandidate]]:
+        """The teeth and, if asked for, the steps that say most beside leading effects, as far as there are any."""
+        asked = (self.teeth, self.steps if with_steps else None)
+        return [some for each in asked if each is not None and (some := each.beside(leading))]
 
 
 def _promising(
