@@ -91,15 +91,19 @@ class StepsOfError:
         if width:
             return np.linspace(self._middles[0], self._middles[-1], PLACES)
         count = len(self._middles)
-        return self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
+        return np.asarray(
+            self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
+        )
 
     def _near(self, at_mm: float, width: float) -> Array:
         """The places between the neighbours of one among the first."""
         first = self._places(width)
         if width:
-            return np.round(at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
+            return np.asarray(
+                np.round(at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
+            )
         low, high = first[first < at_mm].max(initial=-np.inf), first[first > at_mm].min(initial=np.inf)
-        return self._middles[(self._middles > low) & (self._middles < high)]
+        return np.asarray(self._middles[(self._middles > low) & (self._middles < high)])
 
     @cached_property
     def _wholes(self) -> list[tuple[Array, float, ChainCandidate]]:
@@ -231,7 +235,12 @@ class StepsOfError:
             of_place = np.flatnonzero((self._gaps[:, 0] <= at_mm) & (at_mm <= self._gaps[:, 1]))
             able = np.union1d(of_place, np.flatnonzero(freedom * np.log(remaining / best) < LIMIT))
             ends = self._gaps[able]
-            intervals.append(Between(float(ends.min(initial=at_mm)), float(ends.max(initial=at_mm))))
+            intervals.append(
+                Between(
+                    float(ends.min(initial=at_mm - shape.width / 2.0)),
+                    float(ends.max(initial=at_mm + shape.width / 2.0)),
+                )
+            )
         return tuple(intervals)
 
 
