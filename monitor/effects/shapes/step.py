@@ -71,7 +71,7 @@ class Step(DescribedShape):
 def steps_at(reading: Array, at: Iterable[float], width: float) -> Array:
     """The steps (n, k) from -1/2 to 1/2 of readings (n,) in mm, at places (k,) and evenly over a width in mm."""
     beyond = reading[:, None] - np.asarray(list(at))
-    return np.clip(beyond / width, -0.5, 0.5) if width else np.sign(beyond) / 2.0
+    return np.asarray(np.clip(beyond / width, -0.5, 0.5) if width else np.sign(beyond) / 2.0)
 
 
 def _parse_readings(text: str) -> tuple[float, ...]:

@@ -69,7 +69,7 @@ class StepsOfError:
     def _gaps(self) -> Array:
         """The lower and upper ends (g, 2) in mm of what lies between neighbouring positions, where a step may be."""
         between = np.column_stack([self._positions[:-1, 1], self._positions[1:, 0]])
-        return between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1]
+        return np.asarray(between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1])
 
     @cached_property
     def _middles(self) -> Array:
