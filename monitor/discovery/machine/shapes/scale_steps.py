@@ -77,7 +77,7 @@ class StepsOfError:
         middles = self._gaps.mean(axis=1)
         rounded = np.round(middles, 2)
         inside = (rounded > self._gaps[:, 0]) & (rounded < self._gaps[:, 1])
-        return np.where(inside, rounded, middles)
+        return np.asarray(np.where(inside, rounded, middles))
 
     @cached_property
     def _widths(self) -> list[float]:
