@@ -27,7 +27,7 @@ from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, InstrumentEffect, with_time_constant
 from monitor.effects.drivers import EachRun, SettlingDriver
-from monitor.effects.shapes import Compliance, Cyclic, Harmonic, Sawtooth
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic, Sawtooth, Step
 from monitor.effects.shapes.free import Free
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
@@ -118,7 +118,7 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
     those of many periods), and with one length of the tool a turn of a head and a shift of it move the tip alike."""
     if (
         not isinstance(effect, ChainEffect)
-        or not isinstance(effect.shape, Free | Harmonic | Sawtooth)
+        or not isinstance(effect.shape, Free | Harmonic | Sawtooth | Step)
         or effect.term.stage != MOTION
     ):
         return []

@@ -106,9 +106,15 @@ def most_together(
 
 
 def parts_worth_keeping(
-    scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]
+    scene: ChainScene,
+    whole: ChainCandidate,
+    others: Sequence[ChainCandidate],
+    *,
+    most: int = MOST_PARTS,
+    choice: float = PRICE,
 ) -> list[int]:
-    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other.
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other:
+    so many at ``most``, ``choice`` the price of the choice of each.
 
     The selection begins once with the best part and once with the best pair: a drive that is wound up is the direction
     less what decays after a reversal, and neither of the two says much alone. The pair has to say more beyond doubt.
@@ -119,28 +125,29 @@ def parts_worth_keeping(
     products = Products(whole.gram - overlap.T @ overlap, whole.columns.T @ beside.residual, total, total)
     least = SMALLEST_LENGTH * np.maximum(np.sqrt(np.diagonal(whole.gram)), 1e-300)
     dof = scene.degrees_of_freedom - beside.basis.shape[1]
-    price = float(np.log(dof)) + 2.0 * PRICE
+    price = float(np.log(dof)) + 2.0 * choice
 
     def cost(parts: Sequence[int]) -> float:
         return float(dof * np.log(products.left_by(parts)) + price * len(parts))
 
     selections = []
-    for begin in ([], _best_pair(products, least)):
-        parts = _selected(products, least, (dof, price), begin)
+    for begin in ([], _best_pair(products, least))[:most]:
+        parts = _selected(products, least, (dof, price), begin, most)
         selections.append(worth_keeping(products, parts, dof, price))
-    one_by_one, from_pair = selections
+    one_by_one, from_pair = selections[0], selections[-1]
     return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
 
 
 def _selected(
-    products: Products, least: Array, prices: tuple[float, float], begin: Sequence[int]
+    products: Products, least: Array, prices: tuple[float, float], begin: Sequence[int], most: int
 ) -> list[int]:
-    """The parts to ``begin`` with and those that are worth their price beside them, one after the other; ``prices`` are
-    the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part is one of those before."""
+    """The parts to ``begin`` with and those that are worth their price beside them, one after the other, so many at
+    ``most``; ``prices`` are the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part
+    is one of those before."""
     (dof, price), parts = prices, list(begin)
     for part in parts:
         products = products.without(part)
-    while len(parts) < MOST_PARTS:
+    while len(parts) < most:
         length, total = products.lengths, products.total
         explained = np.where(length > least, products.onto / np.where(length > least, length, 1.0), 0.0) ** 2
         best = int(np.argmax(explained))
