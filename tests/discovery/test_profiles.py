@@ -44,7 +44,7 @@ def test_profiles_have_the_scores_of_their_columns(virtual_campaigns, correlatio
     np.testing.assert_allclose(seen.largest, [candidate.largest for candidate in candidates], rtol=1e-12)
     for others in ([], scene.candidates[:1], scene.candidates):
         weighed = {
-            evidence.candidate.effect.shape: evidence.score
+            evidence.candidate.effect.shape: evidence.score + evidence.candidate.behind
             for evidence in weigh_beside(scene, candidates[:4], others)
         }
         expected = [weighed[variant.effect.shape] for variant in variants[:4]]

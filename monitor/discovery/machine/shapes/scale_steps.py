@@ -38,6 +38,8 @@ PLACES, NEAR_PLACES = 36, 33
 # is wider than a twelfth is a curve, which hats follow.
 WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
+# Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
+WIDTHS_APART = 4.0
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,9 @@ class StepsOfError:
         """Whether there are positions enough between neighbouring steps, at which both have come to their levels."""
         at = self._positions.mean(axis=1)
         between = np.diff(np.searchsorted(at, sorted(places)))
-        return bool(np.all(between >= POSITIONS_BEYOND) and np.all(np.diff(sorted(places)) >= 2.0 * width))
+        return bool(
+            np.all(between >= POSITIONS_BEYOND) and np.all(np.diff(sorted(places)) >= WIDTHS_APART * width)
+        )
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the steps that say most beside others, one effect of up to three; none where it is among them,
