@@ -35,12 +35,14 @@ class Distance:
 class TouchProblem(ChainProblem):
     """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is measured.
 
-    ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
+    Where the chain stands at expected places, ``beside`` (n, 3) mm is what the readings differ by there, and ``read``
+    (n, J) where the joints were read.
     """
 
     distances: tuple[Distance, ...] = ()
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
     beside: Array | None = None
+    read: Array | None = None
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -107,6 +109,7 @@ class TouchProblem(ChainProblem):
             self,
             context=replace(self.context.expecting(places), positions=places),
             beside=bare.evaluated(solution.local, solution.common).residual,
+            read=self.context.positions,
         )
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
