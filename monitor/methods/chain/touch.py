@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
+from monitor.effects import ChainEffect
 from monitor.machine import ChainPose
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
@@ -87,6 +89,14 @@ class TouchProblem(ChainProblem):
         moves = np.zeros((len(balls) + 3, 9))
         moves[:-3, :6], moves[-3:, 6:] = balls, np.eye(3)
         return moves
+
+    @cached_property
+    def stays_small(self) -> npt.NDArray[np.bool_]:
+        """The gains: with one rotary axis balls and gains grow together, and a world of half the size has half the
+        noise."""
+        gains = [isinstance(effect, ChainEffect) and effect.is_gain for effect in self.base]
+        sizes = [columns.stop - columns.start for columns in self.base_columns]
+        return np.concatenate([np.repeat(gains, sizes), np.zeros(len(self.own_names), dtype=bool)])
 
     @property
     def measured_joints(self) -> tuple[int, ...]:
