@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import explain
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.separation import separate
 from monitor.discovery.machine.separation.distances import Pair, distance_of
 from monitor.discovery.machine.separation.setups import decides, of_effects, setups_of
+from monitor.effects import parse_effect
 from monitor.machine import parse_topology
 from monitor.methods.samba.method import problem_of
 from monitor.records import SecondSetup
@@ -174,3 +176,16 @@ def test_the_seventh_of_a_group_is_no_tie_that_poses_break(explained, campaign_w
     assert "ECC1:harmonic1" in names(first)
     assert len(names(first)) > 6
     assert any(set(pair) == {"EXC1:harmonic1", "ECC1:harmonic1"} for pair in first.separation.together)
+
+
+def test_a_second_set_up_that_reaches_no_pose_is_none(virtual_campaigns, monkeypatch):
+    """A machine without strokes reaches a quarter more than it went; of a lifted set-up that may be no pose at all."""
+    campaign = virtual_campaigns.on_machine("one rotary table", 7)[0]
+    fitted = fit(problem_of(campaign))
+    effects = [parse_effect(text, fitted.problem.context.chain) for text in ("EXX:reversal", "EBX:reversal")]
+    monkeypatch.setattr(
+        separate, "_reachable", lambda chain, positions, *_: np.zeros(len(positions), dtype=bool)
+    )
+    moved = next(iter(setups_of(fitted.problem.context.chain, np.zeros(3))))
+    assert separate._pairs_in(moved, fitted, effects, None, np.array([1e-3]), {}) == []
+    assert separate.separating_poses(fitted, effects[0], np.array([1e-3]), effects[1:]) == separate.NO_POSES

@@ -22,7 +22,7 @@ from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.condensed import triangles
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
-from monitor.methods.chain.measured import MeasuredChain
+from monitor.methods.chain.measured import LARGEST_UNTOLD, MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
@@ -375,7 +375,7 @@ def _solved(
     """The point of one search; what stays for a session is one number in its runs."""
     stays = problem.stays
     if stays is None:
-        return solve(linearise, begin, common, most, problem.squares)
+        return solve(linearise, begin, common, most, problem.squares, problem.stays_small)
     return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 
@@ -407,12 +407,15 @@ def _best_of(
     return min(solutions, key=lambda solution: float(np.sum(solution.last.residual**2)))
 
 
-def _mistaken_unit(problem: ChainProblem, gain: float) -> str:
-    """The unit that positions, or the readings of instruments, seem to be in under a gain, in words; else empty."""
+def _mistaken_unit(problem: ChainProblem, gain: float, gains: Array) -> str:
+    """The unit that positions or the readings of instruments seem to be in under a gain, or a bar's length where all
+    ``gains`` that are told are that one, in words; else empty."""
     # A tip truly moves by 1 + gain of the positions that were typed.
     of_positions = mistaken_for_mm(1.0 / (1.0 + gain), NEAR_UNIT)
-    of_readings = () if problem.measured_joints else mistaken_for_mm(1.0 + gain, NEAR_UNIT)
-    mistakes = [f"its readings were {UNIT_WORDS[unit]}" for unit in of_readings]
+    alike = not problem.measured_joints or np.ptp(gains) < NEAR_UNIT * (1.0 + gain)
+    of_lengths = mistaken_for_mm(1.0 + gain, NEAR_UNIT) if alike else ()
+    lengths = "the length of its scale bar was" if problem.measured_joints else "its readings were"
+    mistakes = [f"{lengths} {UNIT_WORDS[unit]}" for unit in of_lengths]
     mistakes += [f"its positions were {UNIT_WORDS[unit]}" for unit in of_positions]
     return f"; it looks as if {' or '.join(mistakes)}" if mistakes else ""
 
@@ -428,13 +431,19 @@ def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
         if problem.is_limited[columns.start]
     ]
     columns = [column for _, column in limited]
-    errors = np.where(solution.local_free[:, columns], solution.local[:, columns], 0.0)
-    too_large = np.abs(errors) > problem.largest_error
+    free = solution.local_free[:, columns]
+    small = (
+        np.zeros(free.shape[1], dtype=bool) if problem.stays_small is None else problem.stays_small[columns]
+    )
+    errors = np.where(free | small, solution.local[:, columns], 0.0)
+    too_large = np.abs(errors) > np.where(free, problem.largest_error, LARGEST_UNTOLD)
     if too_large.any():
         run, which = np.unravel_index(int(np.abs(errors).argmax()), errors.shape)
-        (effect, column), error = limited[int(which)], float(errors[run, which])
-        is_gain = isinstance(effect, ChainEffect) and effect.is_gain
-        looks = _mistaken_unit(problem, error) if is_gain and error > -1.0 else ""
+        column, error = limited[int(which)][1], float(errors[run, which])
+        gains = [isinstance(each, ChainEffect) and each.is_gain for each, _ in limited]
+        is_gain = gains[int(which)]
+        of_run = errors[run, free[run] & gains]
+        looks = _mistaken_unit(problem, error, of_run) if is_gain and error > -1.0 and of_run.size else ""
         others = int(too_large.any(axis=1).sum()) - 1
         alike = f" ({others} other run{'s' * (others > 1)} too)" if others else ""
         raise DataError(

@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
+from monitor.effects import ChainEffect
 from monitor.machine import ChainPose
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
@@ -35,12 +37,14 @@ class Distance:
 class TouchProblem(ChainProblem):
     """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is measured.
 
-    ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
+    Where the chain stands at expected places, ``beside`` (n, 3) mm is what the readings differ by there, and ``read``
+    (n, J) where the joints were read.
     """
 
     distances: tuple[Distance, ...] = ()
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
     beside: Array | None = None
+    read: Array | None = None
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -86,6 +90,14 @@ class TouchProblem(ChainProblem):
         moves[:-3, :6], moves[-3:, 6:] = balls, np.eye(3)
         return moves
 
+    @cached_property
+    def stays_small(self) -> npt.NDArray[np.bool_]:
+        """The gains: with one rotary axis balls and gains grow together, and a world of half the size has half the
+        noise."""
+        gains = [isinstance(effect, ChainEffect) and effect.is_gain for effect in self.base]
+        sizes = [columns.stop - columns.start for columns in self.base_columns]
+        return np.concatenate([np.repeat(gains, sizes), np.zeros(len(self.own_names), dtype=bool)])
+
     @property
     def measured_joints(self) -> tuple[int, ...]:
         """The linear axes: their readings are where the tip met the ball."""
@@ -107,6 +119,7 @@ class TouchProblem(ChainProblem):
             self,
             context=replace(self.context.expecting(places), positions=places),
             beside=bare.evaluated(solution.local, solution.common).residual,
+            read=self.context.positions,
         )
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:

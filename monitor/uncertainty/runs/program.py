@@ -99,9 +99,10 @@ class _Step:
 def compile_program(run: TouchedRun) -> Program | None:
     """The program of a run's problem, or None where its model needs the plain way.
 
-    That is so for effects of the artefact and for chains with more than three linear axes.
+    That is so for effects of the artefact, for chains with more than three linear axes and where the chain stands at
+    expected places beside its readings.
     """
-    bases = _entries(run)
+    bases = _entries(run) if run.problem.read is None else None
     if bases is None or len(run.linear) > AXES:
         return None
     steps = _walk(run, bases)

@@ -56,8 +56,14 @@ class TouchedRun(MeasuredRun):
     @cached_property
     def inputs(self) -> Array:
         """The inputs (N,) as measured, in mm."""
-        readings = self.problem.context.positions[:, self.linear] * self.signs
+        readings = self._read[:, self.linear] * self.signs
         return np.concatenate([readings.ravel(), [d.length[0] for d in self.problem.distances]])
+
+    @property
+    def _read(self) -> Array:
+        """Where the joints (n, J) were read; the chain may stand at expected places beside them."""
+        problem = self.problem
+        return problem.context.positions if problem.read is None else problem.read
 
     def by_reading(self, by_error: Array) -> Array:
         """What a reading of each linear axis moves (n, 3, axes), from the derivatives (n, 3, J, 2, 6) by errors."""
@@ -78,18 +84,16 @@ class TouchedRun(MeasuredRun):
 
     def repeated(self, inputs: Array) -> TouchProblem:
         """The touch problem whose runs are the trials ``inputs`` (N, B)."""
-        context = self.problem.context
-        trials = inputs.shape[1]
-        count = self.probings
+        trials, count = inputs.shape[1], self.probings
         readings = inputs[: count * len(self.linear)].T.reshape(trials * count, len(self.linear))
-        positions = np.tile(context.positions, (trials, 1))
+        several = self.problem.taken(np.tile(np.arange(count), trials), np.repeat(np.arange(trials), count))
+        positions = np.tile(self._read, (trials, 1))
         positions[:, self.linear] = readings * self.signs
-        several = context.taken(np.tile(np.arange(count), trials))
+        positions += np.tile(self.problem.context.positions - self._read, (trials, 1))
         lengths = inputs[count * len(self.linear) :]
         return replace(
-            self.problem,
-            context=replace(several, positions=positions, run=np.repeat(np.arange(trials), count)),
-            sigma=np.tile(self.problem.sigma, (trials, 1)),
+            several,
+            context=replace(several.context, positions=positions),
             distances=tuple(
                 replace(distance, length=lengths[i]) for i, distance in enumerate(self.problem.distances)
             ),
@@ -99,11 +103,9 @@ class TouchedRun(MeasuredRun):
 def touch_run(problem: TouchProblem, run: int, common: Array) -> TouchedRun:
     """One ``run`` of touched balls, with the common unknowns held at ``common`` (c,)."""
     index = int(np.flatnonzero(problem.runs == run)[0])
-    rows = problem.context.run == run
+    rows = np.flatnonzero(problem.context.run == run)
     single = replace(
-        problem,
-        context=problem.context.taken(np.flatnonzero(rows)),
-        sigma=problem.sigma[rows],
+        problem.taken(rows, problem.context.run[rows]),
         distances=tuple(replace(d, length=d.length[[index]]) for d in problem.distances),
     )
     return TouchedRun(single, common)

@@ -67,6 +67,8 @@ def _first_run(problem: TouchProblem) -> TouchProblem:
         context=replace(planned, time=context.time[first]),
         sigma=problem.sigma[first],
         distances=tuple(replace(distance, length=distance.length[:1]) for distance in problem.distances),
+        beside=None,
+        read=None,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from monitor.methods import campaign_method
 from monitor.records import Array, Campaign
+from monitor.units import UNIT_WORDS, mistaken_for_mm
 
 #: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
 MOST_TARGETS = 12
@@ -29,6 +30,9 @@ IN_UNITS = {
     "_um": {"mm": 1e3, "nm": 1e-3, "thousandths of an inch": 25.4, "inches": 25.4e3},
     "_urad": {"mrad": 1e3, "nrad": 1e-3, "arc seconds": 1e6 * np.pi / 648e3, "degrees": 1e6 * np.pi / 180.0},
 }
+
+#: A bar is of the length that its balls are declared apart but for this part; balls are placed by hand.
+NEAR_LENGTH = 0.02
 
 #: A campaign with a mistake undone.
 Undo = Callable[[Campaign], Campaign]
@@ -56,6 +60,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
         yield from _angles_of_mounts(turning)
     if measured and measured[0].startswith("tracker_"):
         yield f"{', '.join(measured)} were in metres", _of_channels(_scaled(measured, 1e3))
+    yield from _length_of_bar(campaign)
     yield from _exchanged_targets(campaign)
 
 
@@ -166,6 +171,37 @@ def _angles_of_mounts(turning: Sequence[str]) -> Iterator[Trial]:
             f"{column} was counted from 90 degrees (a zenith or polar distance)",
             _of_readings(_complement(axis)),
         )
+
+
+def _length_of_bar(campaign: Campaign) -> Iterator[Trial]:
+    """The length of a bar whose balls are declared further apart or nearer: in another unit, or as declared."""
+    bar = campaign.artefact.scale_bar
+    if bar is None:
+        return
+    first, second = (
+        np.array(ball.nominal) for name in bar.balls for ball in campaign.artefact.balls if ball.id == name
+    )
+    declared = float(np.linalg.norm(first - second))
+    if abs(bar.length - declared) <= NEAR_LENGTH * declared:
+        return
+    apart = f"its balls {' and '.join(bar.balls)} are declared {declared:.4g} mm apart"
+    units = mistaken_for_mm(bar.length / declared, NEAR_LENGTH)
+    if units:
+        what = f"the length of the scale bar was {UNIT_WORDS[units[0]]} (length_mm = {bar.length:g}; {apart})"
+        yield what, _with_length(bar.length * units[0].factor)
+    else:
+        what = f"the scale bar were of another length than {bar.length:g} mm (`length_mm`; {apart})"
+        yield what, _with_length(declared)
+
+
+def _with_length(length: float) -> Undo:
+    def undo(campaign: Campaign) -> Campaign:
+        artefact = campaign.artefact
+        assert artefact.scale_bar is not None
+        bar = replace(artefact.scale_bar, length=length)
+        return replace(campaign, artefact=replace(artefact, scale_bar=bar))
+
+    return undo
 
 
 def _exchanged_targets(campaign: Campaign) -> Iterator[Trial]:
