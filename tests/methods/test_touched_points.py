@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,19 @@ def test_effects_look_at_where_a_ball_is_and_not_at_what_was_read(tmp_path: Path
     context = problem.for_search().context
     taken = context.positions - context.places
     assert np.all(np.std(taken - noise, axis=0) < 0.25 * np.std(noise, axis=0))
+
+
+def test_a_model_with_a_reversal_looks_where_its_search_did(tmp_path: Path) -> None:
+    """Was: `compare` and `model history` saw the direction in what was read, from 10 µm on, `explain` at the balls,
+    from 0.1 mm on: of one model and campaign one said 0.80 µm and explained, the other 0.99 µm and two bad points."""
+    searched = plates(tmp_path, 0)[0].for_search().context
+    campaign = read_campaign(tmp_path)
+    method = campaign_method(campaign)
+    problem = method.problem_of(campaign, replace(method.own_model, added=("EXX:reversal",)))
+    assert problem.for_search() is problem
+    np.testing.assert_array_equal(problem.context.places, searched.places)
+    np.testing.assert_array_equal(problem.context.travel, searched.travel)
+    assert problem.context.stops_are_stated
 
 
 @pytest.mark.parametrize("once", [False, True])
