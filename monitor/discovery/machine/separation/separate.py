@@ -18,6 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
+from monitor.discovery.machine.separation.orders import runs_in_reversed_order
 from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always, EachRun, RunTime
@@ -45,13 +46,14 @@ class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
     separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, None where none
-    does."""
+    does. ``by_order`` are rivals that the plan in the reversed order tells, with how many runs of it do."""
 
     poses: tuple[dict[str, float], ...]
     before: float
     after: float
     together: tuple[tuple[str, str], ...] = ()
     setups: tuple[SecondSetup | None, ...] = ()
+    by_order: tuple[tuple[str, int], ...] = ()
 
 
 NO_POSES = Separation((), 0.0, 0.0)
@@ -132,8 +134,7 @@ def separating_poses(
     problem, context, strokes = fit.problem, fit.problem.context, strokes or {}
     alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
     if not isinstance(problem, TouchProblem):
-        same = (rival.text for rival in alike if moves_alike(context, effect, coefficients, rival, strokes))
-        return replace(NO_POSES, together=tuple((effect.text, name) for name in same))
+        return _by_other_means(fit, effect, coefficients, alike, strokes)
     if not alike:
         return NO_POSES
     group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
@@ -156,6 +157,28 @@ def separating_poses(
         {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
     )
     return Separation(poses, selection.before, selection.after, together, setups)
+
+
+def _by_other_means(
+    fit: Fit,
+    effect: MachineEffect,
+    coefficients: Array,
+    rivals: Sequence[MachineEffect],
+    strokes: Mapping[str, tuple[float, float]],
+) -> Separation:
+    """What is known of rivals where no poses are selected: which nothing tells, and which another order does."""
+    context = fit.problem.context
+    same = [rival for rival in rivals if moves_alike(context, effect, coefficients, rival, strokes)]
+    others = {
+        rival.text: runs_in_reversed_order(fit, effect, coefficients, rival)
+        for rival in rivals
+        if rival not in same
+    }
+    return replace(
+        NO_POSES,
+        together=tuple((effect.text, rival.text) for rival in same),
+        by_order=tuple((name, runs) for name, runs in others.items() if runs is not None),
+    )
 
 
 def _second_setups(
