@@ -171,7 +171,7 @@ def _bad_row(reading: BadRow, unit: str) -> None:
 def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: str = "CAMPAIGN") -> None:
     """Cause, remedy and rivals of an effect, and where to measure to tell them apart."""
     output.say(f"   cause: {effect.description.cause}")
-    alone = remedy_holds_for(effect.effect, effect.indistinguishable_from)
+    alone = remedy_holds_for(effect.effect, _of_another_correction(effect))
     output.say(f"   remedy{alone}: {effect.description.remedy}")
     if effect.indistinguishable_from:
         output.say(f"   these {answers_text} do not rule out: {', '.join(effect.indistinguishable_from)}")
@@ -185,6 +185,13 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: 
             for tie in effect.ties:
                 if tie.broken_by is not TieBreak.POSES:
                     output.say(f"   {_tie(effect.effect, tie, campaign)}")
+
+
+def _of_another_correction(effect: MachineMissing | CurveMissing) -> list[str]:
+    """The rivals of an effect but for those that one correction serves as well."""
+    ties = effect.ties if isinstance(effect, MachineMissing) else ()
+    served = {rival for tie in ties if tie.broken_by is TieBreak.NOTHING for rival in tie.rivals}
+    return [rival for rival in effect.indistinguishable_from if rival not in served]
 
 
 #: Ties that other runs break.

@@ -246,7 +246,7 @@ def _reachable_touches(
     standing: Callable[[Array], Array] = np.asarray,
 ) -> _Touches | None:
     """Touches of all balls, where they are ``standing``, at those poses of a grid where the machine reaches every ball;
-    None where they cannot be computed."""
+    None where they cannot be computed, or the machine reaches none."""
     context, chain = problem.context, problem.context.chain
     first = context.run == problem.runs[0]
     balls = [target for target in problem.targets if int(np.sum(context.target[first] == target)) >= 3]
@@ -261,7 +261,7 @@ def _reachable_touches(
         return None
     reachable = _reachable(chain, positions, context.positions, strokes)
     good = np.array([reachable[pose == index].all() for index in range(len(grid))])
-    return _Touches(positions, pose, np.array(targets), nominal).among(good[pose])
+    return _Touches(positions, pose, np.array(targets), nominal).among(good[pose]) if good.any() else None
 
 
 def _reachable(
