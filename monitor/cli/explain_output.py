@@ -9,12 +9,14 @@ from monitor.cli.contradiction_output import against_others
 from monitor.cli.identify_output import reversal_words
 from monitor.cli.measurement_output import where
 from monitor.cli.residual_output import four_digits, with_uncertainty
+from monitor.reporting.adjusting import remedy_holds_for
 from monitor.reporting.runs_that_tell import (
     MOVED_ONCE,
     NO_POSE_TELLS,
     WHO_MOVED,
     more_runs,
     poses_that_tell,
+    runs_in_reversed_order,
     runs_that_tell,
 )
 from monitor.reporting.second_setup import IN_WORDS
@@ -170,7 +172,8 @@ def _bad_row(reading: BadRow, unit: str) -> None:
 def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: str = "CAMPAIGN") -> None:
     """Cause, remedy and rivals of an effect, and where to measure to tell them apart."""
     output.say(f"   cause: {effect.description.cause}")
-    output.say(f"   remedy: {effect.description.remedy}")
+    alone = remedy_holds_for(effect.effect, _of_another_correction(effect))
+    output.say(f"   remedy{alone}: {effect.description.remedy}")
     if effect.indistinguishable_from:
         output.say(f"   these {answers_text} do not rule out: {', '.join(effect.indistinguishable_from)}")
         if effect.tell_apart_by:
@@ -183,6 +186,13 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: 
             for tie in effect.ties:
                 if tie.broken_by is not TieBreak.POSES:
                     output.say(f"   {_tie(effect.effect, tie, campaign)}")
+
+
+def _of_another_correction(effect: MachineMissing | CurveMissing) -> list[str]:
+    """The rivals of an effect but for those that one correction serves as well."""
+    ties = effect.ties if isinstance(effect, MachineMissing) else ()
+    served = {rival for tie in ties if tie.broken_by is TieBreak.NOTHING for rival in tie.rivals}
+    return [rival for rival in effect.indistinguishable_from if rival not in served]
 
 
 #: Ties that other runs break.
@@ -218,6 +228,8 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
         return f"to tell {rivals} apart: {_test(tie.measurement)}"
     if tie.broken_by is TieBreak.INSTRUMENT:
         return f"to tell {rivals} apart, measure the same movements with another instrument"
+    if tie.broken_by is TieBreak.REVERSED_ORDER:
+        return f"to tell {rivals} apart, {runs_in_reversed_order(tie.runs or 1)}"
     if tie.broken_by is TieBreak.MORE_POSES:
         return f"to tell {rivals} apart, measure {poses_that_tell(tie.axes, (effect, *tie.rivals))}"
     if tie.setup is not None:

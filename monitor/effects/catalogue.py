@@ -88,6 +88,14 @@ def of_tool_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
 
 
+def of_work_end(chain: Chain, drivers: Iterable[str]) -> tuple[str, ...]:
+    """Return what grows or shifts beyond the last axis of the work where that turns: what is clamped on a table."""
+    if not chain.work or not chain.work[-1].turns:
+        return ()
+    last = chain.work[-1].name
+    return tuple(f"E{axis}{last}:const@{driver}" for driver in drivers for axis in "XYZ")
+
+
 def of_ram(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> tuple[str, ...]:
     """Return what grows before a head: shifts of linear axes that no axis has turned, in every direction for which the
     ``base`` has no location error of the first turning axis.

@@ -23,7 +23,8 @@ SMALLEST_MOVE_MM = 10e-3
 SMALLEST_MOVE_RAD = 50e-6
 # A measured axis stops where the surface is: errors of the machine and the lay of the piece shift the stops of touches
 # that were sent to one position, by up to 40 um in examples/tilting-table and free-form-pocket, whose next larger moves
-# are 0.3 mm. What no plan asked for reverses nothing either.
+# are 0.3 mm. What no plan asked for reverses nothing either. Of the places of a plate, which the file states, each move
+# was asked for.
 SMALLEST_MOVE_BETWEEN_STOPS_MM = 0.1
 # Columns of up to so many probings are held: 0.1 MB each, some hundred in a search.
 MOST_REMEMBERED = 20_000
@@ -75,7 +76,7 @@ class Context:
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
     (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
     scale shapes and drivers where these probings are only planned, None where these are it; ``resting`` names the
-    targets beside the machine.
+    targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were brought to a target.
     """
 
     chain: Chain
@@ -94,6 +95,7 @@ class Context:
     stretch: npt.NDArray[np.int64] | None = None
     measured: Context | None = None
     resting: frozenset[str] = frozenset()
+    stops_are_stated: bool = False
 
     def __len__(self) -> int:
         return len(self.run)
@@ -172,7 +174,9 @@ class Context:
         places = self.places
         stops = np.any(places != self.positions, axis=0)
         smallest = np.where(
-            turning, SMALLEST_MOVE_RAD, np.where(stops, SMALLEST_MOVE_BETWEEN_STOPS_MM, SMALLEST_MOVE_MM)
+            turning,
+            SMALLEST_MOVE_RAD,
+            np.where(stops & (not self.stops_are_stated), SMALLEST_MOVE_BETWEEN_STOPS_MM, SMALLEST_MOVE_MM),
         )
         signs = np.zeros_like(places)
         for rows in self.stretches:

@@ -5,6 +5,7 @@ The meaning is put together from the term, its shape and its driver; the most sp
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from monitor.effects.description import Description, Explanation, described
@@ -12,6 +13,7 @@ from monitor.effects.driver import DescribedDriver
 from monitor.effects.effect import ArtefactEffect, ChainEffect, InstrumentEffect, ParsedEffect, TurnEffect
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
+from monitor.effects.shapes.free import Follows
 from monitor.effects.shapes.harmonic import Harmonic
 
 
@@ -29,6 +31,17 @@ def describe(effect: ParsedEffect) -> Description:
         explanations.append(effect.driver.explanation(error))
     explanation = max(filter(None, explanations), key=lambda explanation: explanation.specificity)
     return described(error.meaning + phrase + _driver_phrase(effect), explanation)
+
+
+def describe_free(effect: ChainEffect, follows: Collection[Follows]) -> Description:
+    """Describe an effect of free shape that ``follows`` more than the position of its axis, or that alone."""
+    name = effect.joint.name
+    direction, others = (each in follows for each in (Follows.DIRECTION, Follows.OTHERS))
+    on = f"position and direction of {name}" if direction else f"the position of {name}"
+    alone = "" if direction or others else " alone"
+    beside = ", and where the other axes stand" if others else ""
+    plain = describe(effect)
+    return replace(plain, meaning=f"{plain.meaning}: it depends on {on}{alone}{beside}")
 
 
 def describe_bend(effect: ParsedEffect) -> Description:

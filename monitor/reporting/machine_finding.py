@@ -37,6 +37,8 @@ class MistakeFound:
     untried: int = 0
 
 
+#: So many rivals of an effect stand in a sentence; all of them stand with the effect.
+MOST_RIVALS = 3
 #: From this correlation of neighbours on a run wanders rather than scatters.
 WANDERS = 0.25
 #: What moved where all targets did.
@@ -242,6 +244,22 @@ def _more_of_its_shape(first: MissingEffect, further: Sequence[MissingEffect]) -
     return [effect.effect for effect in further if any(rival.startswith(error) for rival in effect.others)]
 
 
+def _some(rivals: Sequence[str]) -> tuple[list[str], int]:
+    """The first of many rivals, and how many more there are."""
+    named = list(rivals) if len(rivals) == MOST_RIVALS + 1 else list(rivals[:MOST_RIVALS])
+    return named, len(rivals) - len(named)
+
+
+def _with_rivals(missing: MissingEffect) -> str:
+    """An effect that is named behind the first, with what these data do not tell from it."""
+    if not missing.others:
+        return missing.effect
+    named, more = _some(missing.others)
+    last = f" or one of {more} more" if more else ""
+    rivals = f"{', '.join(named)}{last}" if more else " or ".join(named)
+    return f"{missing.effect} (or {rivals}, which these data do not rule out)"
+
+
 def _missing_sentences(finding: MachineFinding) -> list[str]:
     if not finding.missing:
         return [
@@ -253,7 +271,7 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         ]
     first = finding.missing[0]
     doubtful = _more_of_its_shape(first, finding.missing[1:])
-    further = [missing.effect for missing in finding.missing[1:] if missing.effect not in doubtful]
+    further = [_with_rivals(missing) for missing in finding.missing[1:] if missing.effect not in doubtful]
     sentences = [f"The model lacks {first.effect}: {first.meaning}."]
     if first.nearest_shape is not None:
         sentences.append(f"The catalogue does not have its shape; {first.nearest_shape} comes nearest.")
@@ -262,7 +280,9 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
     if first.varies:
         sentences.append("It varies from run to run and no recorded column follows it.")
     if first.others:
-        sentences.append(f"These data cannot tell it apart from {', '.join(first.others)}.")
+        named, more = _some(first.others)
+        rivals = f"{', '.join(named)} and {more} more" if more else ", ".join(named)
+        sentences.append(f"These data cannot tell it apart from {rivals}.")
     if finding.unseen:
         sentences.append(UNSEEN)
     if further:

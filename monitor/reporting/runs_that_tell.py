@@ -44,6 +44,14 @@ def more_runs(runs: int) -> str:
     return f"measure {runs} {'run' if runs == 1 else 'runs'} more at the present poses"
 
 
+def runs_in_reversed_order(runs: int) -> str:
+    """Return how many ``runs`` in the reversed order tell jumps at reversal apart."""
+    return (
+        f"measure {runs} {'run' if runs == 1 else 'runs'} more in the reversed order, from the last reading to the "
+        "first, so that every axis comes from the other side"
+    )
+
+
 def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
     """Return which runs give one or two ``drivers`` other values, and what has to be recorded of them.
 

@@ -18,6 +18,7 @@ from monitor.reporting.runs_that_tell import (
     WHO_MOVED,
     more_runs,
     poses_that_tell,
+    runs_in_reversed_order,
     runs_that_tell,
 )
 from monitor.reporting.second_setup import IN_WORDS
@@ -317,6 +318,7 @@ def what_breaks(tie: Tie) -> str:
         TieBreak.NO_POSES: f"{NO_POSE_TELLS} them apart{'' if tie.runs is None else f': {more_runs(tie.runs)}'}",
         TieBreak.REPEATED: MOVED_ONCE,
         TieBreak.REFERENCES: WHO_MOVED,
+        TieBreak.REVERSED_ORDER: runs_in_reversed_order(tie.runs or 1),
         TieBreak.MORE_POSES: f"measure {poses_that_tell(tie.axes, tie.rivals)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.SETUP: f"measure a run more {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",

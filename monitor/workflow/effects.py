@@ -18,6 +18,7 @@ from monitor.effects.catalogue import (
     of_single_touches,
     of_tool_end,
     of_tracker,
+    of_work_end,
 )
 from monitor.effects.curve import CurveEffect
 from monitor.effects.curve.words import describe_curve
@@ -105,6 +106,7 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
         *of_balls(DRIVERS),
         *of_single_touches(),
         *of_tool_end(chain, DRIVERS),
+        *of_work_end(chain, DRIVERS),
         *of_ram(chain, base, DRIVERS),
         *of_tracker(chain, DRIVERS),
     )

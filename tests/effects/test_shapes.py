@@ -87,6 +87,9 @@ def test_a_stop_that_no_plan_asked_for_reverses_nothing(make: Callable[..., Cont
     moved = context.expecting(expected)
     np.testing.assert_array_equal(moved.travel[:, measured], [1, 1, 1, 1, -1])
     np.testing.assert_array_equal(moved.travel[:, commanded], [1, 1, -1, -1, -1])
+    # Balls of a plate whose places the file states: to each the axis was brought.
+    stated = replace(moved, stops_are_stated=True)
+    np.testing.assert_array_equal(stated.travel[:, measured], [1, 1, -1, -1, -1])
 
 
 def test_shapes_look_where_the_axis_is_expected(make: Callable[..., Context]) -> None:

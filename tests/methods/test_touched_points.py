@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from monitor.discovery import explain
 from monitor.discovery.machine.fit import fit
 from monitor.discovery.machine.noise.plan_cells import plan_cells, revisited_cells
 from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.shapes.cycles import best_cycle
 from monitor.discovery.machine.shapes.shown_cycles import is_shown
 from monitor.discovery.machine.shapes.variants import (
     as_it_appears,
@@ -51,6 +53,7 @@ def plates(
     seed: int,
     *,
     cycle: float = 0.0,
+    pitch: float = 35.0,
     commanded: bool = False,
     once: bool = False,
     clamped: bool = False,
@@ -58,7 +61,8 @@ def plates(
 ) -> tuple[InstrumentProblem, np.ndarray]:
     """The problem of balls 70 mm apart, touched forth and back in two runs; the noise (n, 3) mm of X, Z, Y.
 
-    Each plate lies anew within 2 mm in each run, unless it stays ``clamped``; ``cycle`` mm repeat every 35 mm along X.
+    Each plate lies anew within 2 mm in each run, unless it stays ``clamped``; ``cycle`` mm repeat every ``pitch``
+    mm along X.
     Axes that are ``commanded`` stand at the same positions in both runs, or at each ``once`` only, and the noise is
     that of the points. The display of the axes has ``digits``.
     """
@@ -76,7 +80,7 @@ def plates(
             noise = rng.normal(0.0, 0.8e-3, place.shape)
             axes = place + lay - [0.0, 250.0, 0.0]
             point = place - place.mean(axis=0)
-            axes[:, 0] -= cycle * np.cos(2.0 * np.pi * axes[:, 0] / 35.0 - 1.0)
+            axes[:, 0] -= cycle * np.cos(2.0 * np.pi * axes[:, 0] / pitch - 1.0)
             if commanded:
                 point = point + noise
             else:
@@ -108,6 +112,19 @@ def test_effects_look_at_where_a_ball_is_and_not_at_what_was_read(tmp_path: Path
     context = problem.for_search().context
     taken = context.positions - context.places
     assert np.all(np.std(taken - noise, axis=0) < 0.25 * np.std(noise, axis=0))
+
+
+def test_a_model_with_a_reversal_looks_where_its_search_did(tmp_path: Path) -> None:
+    """Was: `compare` and `model history` saw the direction in what was read, from 10 µm on, `explain` at the balls,
+    from 0.1 mm on: of one model and campaign one said 0.80 µm and explained, the other 0.99 µm and two bad points."""
+    searched = plates(tmp_path, 0)[0].for_search().context
+    campaign = read_campaign(tmp_path)
+    method = campaign_method(campaign)
+    problem = method.problem_of(campaign, replace(method.own_model, added=("EXX:reversal",)))
+    assert problem.for_search() is problem
+    np.testing.assert_array_equal(problem.context.places, searched.places)
+    np.testing.assert_array_equal(problem.context.travel, searched.travel)
+    assert problem.context.stops_are_stated
 
 
 @pytest.mark.parametrize("once", [False, True])
@@ -208,6 +225,25 @@ def test_a_cycle_has_to_show_and_be_no_steeper_than_a_machine(
     (evidence,) = weigh_beside(scene, scene.candidates, [])
     removed = evidence.explained * fitted.sigma**2
     assert is_shown(scene.candidates[0], sizes, removed) == shown
+
+
+@pytest.mark.parametrize(("pitch", "told"), [(140.0, [140.0]), (310.0, [])])
+def test_a_cycle_is_no_longer_than_half_of_the_travel(
+    tmp_path: Path, pitch: float, told: list[float]
+) -> None:
+    """Was: a dead zone as a cycle of 312 mm of an axis that travelled 462 mm, for which to enter a compensation. From
+    the grid, that ends at half of the travel, the best pitch was looked for beyond."""
+    problem, _ = plates(tmp_path, 0, cycle=8e-3, pitch=pitch)
+    shape = parse_effect("EXX:free(3)", problem.context.chain)
+    scene = scene_of(fit(problem), [Variant("EXX:free", shape)])
+    travel = float(np.ptp(problem.context.positions[:, problem.context.chain.index("X")]))
+    assert 2.0 * 140.0 < travel < 2.0 * 310.0
+    pitches = [
+        cycle.effect.shape.pitch
+        for cycle in best_cycle(scene, scene.candidates[0], [])
+        if isinstance(cycle.effect, ChainEffect) and isinstance(cycle.effect.shape, Cyclic)
+    ]
+    np.testing.assert_allclose(pitches, told, rtol=0.02)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from monitor.discovery import Verdict
 from monitor.documents import from_document
 from monitor.exceptions import InputError
+from monitor.reporting.adjusting import remedy_holds_for
 from monitor.reporting.machine_finding import UNSEEN, MachineFinding, MissingEffect, machine_sentences
 from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.store import Database, load_analysis
@@ -85,13 +87,39 @@ def test_what_may_be_more_of_an_unknown_shape_is_not_said_to_hold() -> None:
     def told(*further: MissingEffect) -> str:
         return machine_sentences(MachineFinding(False, [shaped, *further], 0, (), (), 8, (), False, ()))
 
-    assert told(other).endswith("The other effects hold whatever its shape is. It also lacks EBAZ:harmonic2.")
+    assert told(other).endswith(
+        "The other effects hold whatever its shape is. It also lacks EBAZ:harmonic2 (or "
+        "EBAZ:harmonic2@warmup, which these data do not rule out)."
+    )
     assert "hold whatever" not in told(bent, other)
     assert told(bent, other).endswith(
-        "It also lacks EBAZ:harmonic2. "
+        "It also lacks EBAZ:harmonic2 (or EBAZ:harmonic2@warmup, which these data do not rule out). "
         "These data cannot tell sight:up:formula(1/tan(elevation)) from more of the shape of EBEL."
     )
     assert "hold whatever" not in told()
+
+
+def test_rivals_are_said_of_every_effect_and_many_of_them_are_counted() -> None:
+    """Was: "It also lacks EZZ:reversal." of one among 15, with a play of 9 µm to be entered in the control."""
+    rivals = ("EBX:reversal", "EXX:reversal", "probe:lobing3", "EXY:reversal")
+    plain = MissingEffect("EYB:harmonic2", "axial displacement of B", None, False, ())
+    tied = MissingEffect("EZZ:reversal", "positioning error of Z", None, False, rivals)
+    many = replace(tied, others=(*rivals, "EBY:reversal"))
+
+    def told(*missing: MissingEffect) -> str:
+        return machine_sentences(MachineFinding(False, missing, 0, (), (), 8, (), False, ()))
+
+    assert told(plain, many).endswith(
+        " It also lacks EZZ:reversal (or EBX:reversal, EXX:reversal, probe:lobing3 or one of 2 more, which these data "
+        "do not rule out)."
+    )
+    assert "(or EBX:reversal or EXX:reversal or probe:lobing3 or EXY:reversal, which" in told(plain, tied)
+    assert told(many).endswith("apart from EBX:reversal, EXX:reversal, probe:lobing3 and 2 more.")
+    assert told(tied).endswith("apart from EBX:reversal, EXX:reversal, probe:lobing3, EXY:reversal.")
+    assert remedy_holds_for("EZZ:reversal", rivals) == (
+        ", if it is EZZ:reversal and not one of those named below"
+    )
+    assert remedy_holds_for("EZZ:reversal", ("EZZ:windup7mm",)) == ""
 
 
 @pytest.mark.parametrize("driver", ["warmup", "settling", "run_time", "sequence", "each_run"])

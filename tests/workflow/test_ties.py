@@ -85,6 +85,17 @@ def test_poses_that_something_outside_sees_have_no_plan_of_touches() -> None:
     assert ties == (Tie(("EBJ1:compliance@gravity",), TieBreak.MORE_POSES, (), ("J2", "J1")),)
 
 
+def test_jumps_at_reversal_are_told_by_another_order_before_more_poses() -> None:
+    separation = Separation((), 0.0, 0.0, by_order=(("EXX:reversal", 1),))
+    effect = SimpleNamespace(effect="EZZ:reversal", separation=separation, within_runs=False)
+    ties = ties_of(effect, ("EXX:reversal", "EYY:poly1"), is_planned=False)
+    assert ties == (
+        Tie(("EXX:reversal",), TieBreak.REVERSED_ORDER, runs=1),
+        Tie(("EYY:poly1",), TieBreak.MORE_POSES, axes=("Z", "Y")),
+    )
+    assert "from the last reading to the first" in what_breaks(ties[0])
+
+
 @pytest.mark.parametrize(
     "method", [name for name, each in methods().items() if isinstance(each, ChainMethod)]
 )

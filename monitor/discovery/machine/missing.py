@@ -14,7 +14,7 @@ from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
-from monitor.discovery.machine.shapes.curves import Curve
+from monitor.discovery.machine.shapes.curves import Curve, follows
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.scale_steps import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -28,8 +28,10 @@ from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
+from monitor.effects.description import Description
 from monitor.effects.drivers import Always, EachRun
-from monitor.effects.words import describe, describe_bend
+from monitor.effects.shapes.free import Free
+from monitor.effects.words import describe, describe_bend, describe_free
 from monitor.records import Array
 from monitor.units import Unit
 
@@ -282,7 +284,7 @@ def _missing(
     return ChainMissing(
         rank=index + 1,
         effect=_name(candidate),
-        description=describe(effect) if travelled_periods is None else describe_bend(effect),
+        description=_described(scene, effect, travelled_periods, coefficients, covariance),
         parameters=effect.parameters(scene.fit.problem.context),
         units=(effect.unit,) * len(coefficients),
         coefficients=coefficients,
@@ -314,6 +316,25 @@ def _missing(
         largest=size.largest,
         steps=steps_between(scene, candidate, except_for(selection.candidates, index)),
     )
+
+
+def _described(
+    scene: ChainScene,
+    effect: MachineEffect,
+    travelled_periods: float | None,
+    coefficients: Array,
+    covariance: Array,
+) -> Description:
+    """An effect in words, as these data show it."""
+    if travelled_periods is not None:
+        return describe_bend(effect)
+    if (
+        isinstance(effect, ChainEffect)
+        and isinstance(effect.shape, Free)
+        and not isinstance(effect.driver, EachRun)
+    ):
+        return describe_free(effect, follows(scene.fit.problem.context, effect, coefficients, covariance))
+    return describe(effect)
 
 
 def _shows_within_runs_alone(scene: ChainScene, effect: MachineEffect) -> bool:

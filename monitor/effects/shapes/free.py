@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.effects.context import Context
 from monitor.effects.joint_error import JointError
@@ -31,6 +33,14 @@ BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
 PLAY = (1 / 16, 1 / 8, 1 / 4)
 # A joint of two rails or a slip of a scale goes from one level to the other within this part of a hat's spacing.
 STEEPNESS = 1 / 4
+
+
+class Follows(StrEnum):
+    """What a part of the basis follows beside the position of its axis."""
+
+    POSITION = "position"
+    DIRECTION = "direction"
+    OTHERS = "others"
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,12 @@ class Free(DescribedShape):
         return np.asarray(basis[:, [part - 1 for part in self.parts]])
 
     def phrase(self, error: JointError) -> str:
-        return f", of a shape that no entry of the catalogue has: it depends on position and direction of {error.name}"
+        return ", of a shape that no entry of the catalogue has"
+
+    def following(self, context: Context, joint: int) -> npt.NDArray[np.str_]:
+        """Return what each part (k,) follows: a value of ``Follows``."""
+        follows = np.array([each for each, parts in _blocks(context, joint) for _ in parts])
+        return np.asarray(follows[[part - 1 for part in self.parts]] if self.parts else follows)
 
 
 def parts_of_position(turns: bool) -> int:
@@ -96,6 +111,11 @@ def flexible_basis(context: Context, joint: int) -> Array:
 
 def _unscaled(context: Context, joint: int) -> Array:
     """The parts (n, k) before they are scaled to 1."""
+    return np.column_stack([part for _, parts in _blocks(context, joint) for part in parts])
+
+
+def _blocks(context: Context, joint: int) -> list[tuple[Follows, list[Array]]]:
+    """The parts (n,) in their order, with what they follow."""
     position, direction = context.places[:, joint], context.travel[:, joint]
     others = [
         part
@@ -106,23 +126,26 @@ def _unscaled(context: Context, joint: int) -> Array:
     visited = context.scaling.places[:, joint]
     middle, half = (visited.max() + visited.min()) / 2.0, max(float(np.ptp(visited)) / 2.0, 1e-12)
     scaled = (position - middle) / half
-    if context.chain.joints[joint].turns:
-        parts = [wave(order * position) for order in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
+    turns = context.chain.joints[joint].turns
+    if turns:
+        first = [wave(order * position) for order in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
         simple = [np.cos(position), np.sin(position), scaled]
     else:
-        parts = _hats(scaled, HATS)
+        first = _hats(scaled, HATS)
         simple = [scaled, scaled**2]
-    parts += [direction, *(direction * part for part in simple)]
     way = way_since_reversal(context, joint) / (2.0 * half)
-    parts += [direction * np.exp(-way / length) for length in BUILD_UP]
-    parts += [part * other for part in simple for other in others]
-    if not context.chain.joints[joint].turns:
-        parts += _steps(scaled)
-    parts += [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
-    parts.append((direction == 0.0).astype(np.float64))
-    if context.sight is not None and context.chain.joints[joint].turns and _is_part_of_turn(visited):
-        parts += _hats(scaled, HATS_OF_A_PART)
-    return np.column_stack(parts)
+    of_direction = [direction, *(direction * part for part in simple)]
+    of_direction += [direction * np.exp(-way / length) for length in BUILD_UP]
+    play = [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
+    is_mount = context.sight is not None and turns and _is_part_of_turn(visited)
+    return [
+        (Follows.POSITION, first),
+        (Follows.DIRECTION, of_direction),
+        (Follows.OTHERS, [part * other for part in simple for other in others]),
+        (Follows.POSITION, [] if turns else _steps(scaled)),
+        (Follows.DIRECTION, [*play, (direction == 0.0).astype(np.float64)]),
+        (Follows.POSITION, _hats(scaled, HATS_OF_A_PART) if is_mount else []),
+    ]
 
 
 def _hats(scaled: Array, count: int) -> list[Array]:

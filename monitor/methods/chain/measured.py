@@ -17,7 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import ChainEffect, Context, Effect
-from monitor.effects.catalogue import of_balls, of_ram, of_single_touches, of_tool_end
+from monitor.effects.catalogue import (
+    of_balls,
+    of_ram,
+    of_single_touches,
+    of_tool_end,
+    of_work_end,
+)
 from monitor.machine import ChainPose
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.sessions import Stays
@@ -251,7 +257,11 @@ class MeasuredChain(ABC):
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         of_probe = () if self.touch_normals is None else of_single_touches()
         chain, base = self.context.chain, [effect.text for effect in self.base]
-        of_growth = (*of_tool_end(chain, drivers), *of_ram(chain, base, drivers))
+        of_growth = (
+            *of_tool_end(chain, drivers),
+            *of_work_end(chain, drivers),
+            *of_ram(chain, base, drivers),
+        )
         return (*of_balls(drivers), *of_probe, *of_growth)
 
     @property

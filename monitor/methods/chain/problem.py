@@ -51,7 +51,8 @@ class ChainProblem(MeasuredChain):
         if self.context.expected is not None or not stopping.joints or not stopping.rows.any():
             return self
         bare = replace(self, added=())
-        return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
+        context = self.context.expecting(stops(bare, solve_problem(bare)))
+        return replace(self, context=replace(context, stops_are_stated=stopping.places is not None))
 
     def with_base(self, effects: tuple[ChainEffect, ...]) -> Self:
         """Return the problem with further base effects behind its own, all of them open."""

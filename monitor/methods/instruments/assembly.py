@@ -59,7 +59,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     context = replace(context, sight=_sight(setups, number), nominal=_places(context, parts))
     context = replace(context, instruments=_instrument_rows(context, parts))
     absent = _absent(context, added)
-    return InstrumentProblem(
+    problem = InstrumentProblem(
         context=context,
         base=base,
         added=tuple(effect for effect in added if effect.text not in absent),
@@ -71,6 +71,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
         shares_bars=True,
         absent=tuple(absent.items()),
     )
+    return problem.foreseen() if problem.added else problem
 
 
 def _absent(context: Context, added: tuple[ParsedEffect, ...]) -> dict[str, str]:

@@ -40,6 +40,9 @@ class TieBreak(Enum):
     REPEATED = "repeated"
     #: Targets that rest beside the machine, before and after a move: of the station, or of the machine on its base.
     REFERENCES = "references"
+    #: So many ``runs`` of the present plan in the reversed order: jumps at reversal that no pose between the present
+    #: ones tells apart.
+    REVERSED_ORDER = "reversed_order"
     #: More poses over the whole range of ``axes``, of what gives way another load: the method has no plan for pairs.
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
@@ -70,7 +73,10 @@ class Tie:
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) -> tuple[Tie, ...]:
     """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_planned`` says that
     `monitor plan --separate` selects poses for the campaign."""
-    actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None], list[str]] = {}
+    actions: dict[
+        tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None, int | None], list[str]
+    ] = {}
+    in_order = dict(effect.separation.by_order)
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
         setup = _setup(effect, rival) if kind is TieBreak.NOTHING else None
@@ -78,13 +84,18 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) ->
             kind = TieBreak.SETUP
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
+        runs = in_order.get(rival) if kind is TieBreak.PLAN else None
+        if runs is not None:
+            kind = TieBreak.REVERSED_ORDER
         if kind is TieBreak.PLAN and not is_planned:
             kind, axes = TieBreak.MORE_POSES, axes_of(effect.effect, rival)
-        actions.setdefault((kind, drivers, axes, setup), []).append(rival)
+        actions.setdefault((kind, drivers, axes, setup, runs), []).append(rival)
     return tuple(
-        Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, setup=setup)
-        for (kind, drivers, axes, setup), names in actions.items()
-    )
+        Tie(
+            tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, runs=runs, setup=setup
+        )
+        for (kind, drivers, axes, setup, runs), names in actions.items()
+    )  # fmt: skip
 
 
 def _setup(effect: ChainMissing, rival: str) -> SecondSetup | None:

@@ -25,11 +25,12 @@ from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
-from monitor.effects import ChainEffect, InstrumentEffect, with_time_constant
-from monitor.effects.drivers import EachRun, SettlingDriver
-from monitor.effects.shapes import Compliance, Cyclic, Harmonic, Sawtooth, Step
+from monitor.effects import ChainEffect, InstrumentEffect, parse_effect, with_time_constant
+from monitor.effects.drivers import Always, EachRun, SettlingDriver
+from monitor.effects.drivers.gravity import Gravity
+from monitor.effects.shapes import Compliance, Const, Cyclic, Harmonic, Sawtooth, Step
 from monitor.effects.shapes.free import Free
-from monitor.machine import COMPONENTS, MOTION
+from monitor.machine import COMPONENTS, MOTION, Chain
 from monitor.records import Array
 
 # A time constant between two of the grid may lose so much there; rivals are compared at their best value.
@@ -96,6 +97,7 @@ class RivalSearch:
         if part_of_bend(candidate.effect, context) is not None:
             variants += bends_of(candidate.effect, context)
         variants += _of_other_errors(candidate.effect)
+        variants += _same_drift(candidate.effect, context.chain)
         variants += as_it_appears(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
@@ -127,6 +129,22 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
         for index, letter in enumerate(COMPONENTS)
         if index != effect.term.component
     ]
+    return [Variant(other.text, other) for other in others]
+
+
+def _same_drift(effect: MachineEffect, chain: Chain) -> list[ChainVariant]:
+    """A drift of an axis as the same drift of every other: the catalogue has few of them, and one may stand for all."""
+    if (
+        not isinstance(effect, ChainEffect)
+        or not isinstance(effect.shape, Const)
+        or isinstance(effect.driver, Always | Gravity)
+        or effect.term.stage != MOTION
+    ):
+        return []
+    names = [joint.name for joint in chain.joints if joint != effect.joint]
+    texts = [f"E{COMPONENTS[effect.term.component]}{name}:const@{effect.driver_text}" for name in names]
+    # At the time constant of the effect, where it has one.
+    others = [replace(parse_effect(text, chain), driver=effect.driver) for text in texts]
     return [Variant(other.text, other) for other in others]
 
 

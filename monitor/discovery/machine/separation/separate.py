@@ -18,6 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
+from monitor.discovery.machine.separation.orders import runs_in_reversed_order
 from monitor.discovery.machine.separation.second_ball import second_ball
 from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
@@ -46,13 +47,14 @@ class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
     separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, None where none
-    does."""
+    does. ``by_order`` are rivals that the plan in the reversed order tells, with how many runs of it do."""
 
     poses: tuple[dict[str, float], ...]
     before: float
     after: float
     together: tuple[tuple[str, str], ...] = ()
     setups: tuple[SecondSetup | None, ...] = ()
+    by_order: tuple[tuple[str, int], ...] = ()
 
 
 NO_POSES = Separation((), 0.0, 0.0)
@@ -133,7 +135,7 @@ def separating_poses(
     problem, context, strokes = fit.problem, fit.problem.context, strokes or {}
     alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
     if not isinstance(problem, TouchProblem):
-        return _of_instruments(fit, effect, coefficients, alike, strokes)
+        return _by_other_means(fit, effect, coefficients, alike, strokes)
     if not alike:
         return NO_POSES
     group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
@@ -158,24 +160,35 @@ def separating_poses(
     return Separation(poses, selection.before, selection.after, together, setups)
 
 
-def _of_instruments(
+def _by_other_means(
     fit: Fit,
     effect: MachineEffect,
     coefficients: Array,
-    alike: Sequence[MachineEffect],
+    rivals: Sequence[MachineEffect],
     strokes: Mapping[str, tuple[float, float]],
 ) -> Separation:
-    """Of a method that touches no balls the shifts that are one at every pose, and the pairs that a second set-up of
-    its R-test tells apart."""
+    """What is known of rivals where no poses are selected: which nothing tells, which a second set-up of an R-test
+    does, and which of the rest another order."""
+    context = fit.problem.context
     setups: dict[tuple[str, str], SecondSetup | None] = {}
-    for rival in alike[: MOST_EFFECTS - 1]:
-        pair = effect.text, rival.text
-        if moves_alike(fit.problem.context, effect, coefficients, rival, strokes):
+    orders: dict[str, int | None] = {}
+    for index, rival in enumerate(rivals):
+        pair, setup = (effect.text, rival.text), None
+        if moves_alike(context, effect, coefficients, rival, strokes):
             setups[pair] = None
-        elif isinstance(effect, ChainEffect) and isinstance(rival, ChainEffect):
+            continue
+        if index < MOST_EFFECTS - 1 and isinstance(effect, ChainEffect) and isinstance(rival, ChainEffect):
             setup = second_ball(fit, effect, coefficients, rival, strokes)
-            setups |= {} if setup is None else {pair: setup}
-    return replace(NO_POSES, together=tuple(setups), setups=tuple(setups.values()))
+        if setup is not None:
+            setups[pair] = setup
+        else:
+            orders[rival.text] = runs_in_reversed_order(fit, effect, coefficients, rival)
+    return replace(
+        NO_POSES,
+        together=tuple(setups),
+        setups=tuple(setups.values()),
+        by_order=tuple((name, runs) for name, runs in orders.items() if runs is not None),
+    )
 
 
 def _second_setups(
@@ -243,7 +256,7 @@ def _reachable_touches(
     standing: Callable[[Array], Array] = np.asarray,
 ) -> _Touches | None:
     """Touches of all balls, where they are ``standing``, at those poses of a grid where the machine reaches every ball;
-    None where they cannot be computed, or there is no such pose."""
+    None where they cannot be computed, or the machine reaches none."""
     context, chain = problem.context, problem.context.chain
     first = context.run == problem.runs[0]
     balls = [target for target in problem.targets if int(np.sum(context.target[first] == target)) >= 3]
@@ -258,9 +271,7 @@ def _reachable_touches(
         return None
     reachable = _reachable(chain, positions, context.positions, strokes)
     good = np.array([reachable[pose == index].all() for index in range(len(grid))])
-    if not good.any():
-        return None
-    return _Touches(positions, pose, np.array(targets), nominal).among(good[pose])
+    return _Touches(positions, pose, np.array(targets), nominal).among(good[pose]) if good.any() else None
 
 
 def _reachable(

@@ -9,8 +9,13 @@ import numpy as np
 
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.effects import ChainEffect, Context
+from monitor.effects.shapes.free import Follows, Free
 from monitor.records import Array
 
+# A part of a shape that is larger than so many times its standard uncertainty is said.
+SEEN = 2.0
+# Points that agree to so many decimals of the largest are one.
+SAME_DIGITS = 9
 # A curve is drawn through no more points than a figure shows.
 MOST_POINTS = 200
 
@@ -35,18 +40,25 @@ def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covar
     at = effect.joint.sign * context.places[:, effect.term.joint]
     direction = effect.joint.sign * context.travel[:, effect.term.joint]
     first = np.flatnonzero(context.run == context.run[0])
-    rows = first[np.argsort(at[first], kind="stable")]
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64))]
-    shape = beyond_base(context, effect)[rows]
+    shape = beyond_base(context, effect)[first]
     variance = np.einsum("mi,ij,mj->m", shape, covariance, shape)
-    return Curve(
-        effect.joint.name,
-        effect.joint.turns,
-        at[rows],
-        direction[rows],
-        shape @ coefficients,
-        np.sqrt(np.maximum(variance, 0.0)),
+    points = np.column_stack(
+        [at[first], direction[first], shape @ coefficients, np.sqrt(np.maximum(variance, 0.0))]
     )
+    points = _each_once(points)
+    points = points[
+        np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(np.int64))
+    ]
+    return Curve(effect.joint.name, effect.joint.turns, *points.T)
+
+
+def _each_once(points: Array) -> Array:
+    """Points (m, k) in the order of their first number, those that come to the same once: several targets, touched
+    where the axis stands still."""
+    scale = np.abs(points).max(axis=0, initial=0.0)
+    rounded = np.round(points / np.where(scale > 0.0, scale, 1.0), SAME_DIGITS)
+    _, once = np.unique(rounded, axis=0, return_index=True)
+    return np.asarray(points[once])
 
 
 def beyond_base(context: Context, effect: ChainEffect) -> Array:
@@ -64,3 +76,21 @@ def without_powers(context: Context, effect: ChainEffect, powers: Sequence[int])
     )
     plain = np.power(at[:, None], np.asarray(powers, dtype=np.int64))
     return np.asarray(columns - plain @ np.linalg.lstsq(plain, columns, rcond=None)[0])
+
+
+def follows(
+    context: Context, effect: ChainEffect, coefficients: Array, covariance: Array
+) -> frozenset[Follows]:
+    """Return what an effect of free shape with coefficients (k,) follows: what its parts of that kind make together,
+    where it is largest, is beyond twice its standard uncertainty."""
+    assert isinstance(effect.shape, Free)
+    columns, kinds = beyond_base(context, effect), effect.shape.following(context, effect.term.joint)
+    shown = []
+    for kind in Follows:
+        of_kind = kinds == kind
+        sizes = columns[:, of_kind] @ coefficients[of_kind]
+        row = columns[int(np.abs(sizes).argmax()), of_kind]
+        variance = float(row @ covariance[np.ix_(of_kind, of_kind)] @ row)
+        if float(np.abs(sizes).max()) > SEEN * np.sqrt(max(variance, 0.0)):
+            shown.append(kind)
+    return frozenset(shown)

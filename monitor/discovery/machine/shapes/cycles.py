@@ -12,7 +12,7 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.refine import AT_END, refine
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
@@ -24,6 +24,7 @@ from monitor.discovery.machine.shapes.variants import (
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes import Cyclic
 from monitor.effects.shapes.free import Free
 from monitor.effects.shapes.nodes import Nodes
 
@@ -64,4 +65,15 @@ def best_cycle(
         cycle for cycle in scene_of(scene.fit, resolvable(variants, context)).candidates if cycle.visible
     ]
     weighed = weigh_beside(scene, cycles, others)
-    return [refine(scene, [*others, weighed[0].candidate], len(others)).candidate] if weighed else []
+    if not weighed:
+        return []
+    best = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
+    return [] if _is_at_longest(best, travel / FEWEST_PERIODS) else [best]
+
+
+def _is_at_longest(cycle: ChainCandidate, longest: float) -> bool:
+    """Whether a cycle has the longest pitch, in mm, that is sought: longer ones would say more, and are bends."""
+    effect = cycle.effect
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Cyclic)
+    return effect.shape.pitch > (1.0 - AT_END) * longest

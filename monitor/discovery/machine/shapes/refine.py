@@ -10,7 +10,12 @@ import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import STEP as ORDER_STEP
-from monitor.discovery.machine.shapes.variants import TIME_CONSTANTS_S, frequency_step, with_drivers
+from monitor.discovery.machine.shapes.variants import (
+    TIME_CONSTANTS_S,
+    frequency_step,
+    longest_pitch,
+    with_drivers,
+)
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
@@ -56,7 +61,8 @@ class Refined:
 @dataclass(frozen=True)
 class _Range:
     """A value that is searched: its name, unit and start, the half ``width`` of its range in the logarithm and the
-    tolerance there, the variant for any other value, and the nearest value that is likelier beforehand."""
+    tolerance there, the variant for any other value, and the nearest value that is likelier beforehand; none lies above
+    ``largest``."""
 
     name: str
     unit: str
@@ -65,6 +71,7 @@ class _Range:
     tolerance: float
     variant: Callable[[float], ChainVariant]
     likely: Callable[[float], float | None]
+    largest: float = float("inf")
 
 
 def _range_of(candidate: ChainCandidate) -> _Range | None:
@@ -95,6 +102,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
+            max(pitch, longest_pitch(travel)),
         )
     if isinstance(effect.shape, WindUp):
         return _Range(
@@ -188,10 +196,10 @@ def _best_logarithm(badness: Callable[[float], float], searched: _Range) -> floa
         middle = float(widths[int(np.argmin([badness(width) for width in widths.tolist()]))])
         searched = replace(searched, width=float(widths[1] - widths[0]))
     for _ in range(MOST_BELOW_GRID if searched.unit == "min" else 1):
-        low = middle - searched.width
+        low, high = middle - searched.width, middle + searched.width
         best = scipy.optimize.minimize_scalar(
             badness,
-            bounds=(low, middle + searched.width),
+            bounds=(low, min(high, float(np.log(searched.largest)))),
             method="bounded",
             options={"xatol": searched.tolerance, "maxiter": 30},
         )

@@ -232,6 +232,11 @@ def frequency_step(travel: float) -> float:
     return 0.5 / max(travel, SHORT_TRAVEL_MM)
 
 
+def longest_pitch(travel: float) -> float:
+    """The longest pitch in mm that is sought of an axis that travelled so many mm: more than half of it is a bend."""
+    return max(min(LONGEST_PITCH_MM, travel), travel / FEWEST_PERIODS)
+
+
 def pitches_over(travel: float, longest: float) -> list[float]:
     """The grid of pitches in mm of an axis that travelled so many mm, from the ``longest`` down."""
     step, low = frequency_step(travel), 1.0 / longest
