@@ -10,7 +10,12 @@ import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import STEP as ORDER_STEP
-from monitor.discovery.machine.shapes.variants import TIME_CONSTANTS_S, frequency_step, with_drivers
+from monitor.discovery.machine.shapes.variants import (
+    TIME_CONSTANTS_S,
+    frequency_step,
+    longest_pitch,
+    with_drivers,
+)
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
@@ -56,7 +61,7 @@ class Refined:
 @dataclass(frozen=True)
 class _Range:
     """A value that is searched: its name, unit and start, the half ``width`` of its range in the logarithm and the
-    tolerance there, the variant for any other value, and the nearest value that is likelier beforehand."""
+    tolerance there, the variant for any other value, the nearest value that is likelier beforehand, and the largest."""
 
     name: str
     unit: str
@@ -65,6 +70,7 @@ class _Range:
     tolerance: float
     variant: Callable[[float], ChainVariant]
     likely: Callable[[float], float | None]
+    largest: float = float("inf")
 
 
 def _range_of(candidate: ChainCandidate) -> _Range | None:
@@ -95,6 +101,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
+            longest_pitch(travel),
         )
     if isinstance(effect.shape, WindUp):
         return _Range(
@@ -191,7 +198,7 @@ def _best_logarithm(badness: Callable[[float], float], searched: _Range) -> floa
         low = middle - searched.width
         best = scipy.optimize.minimize_scalar(
             badness,
-            bounds=(low, middle + searched.width),
+            bounds=(low, min(middle + searched.width, float(np.log(searched.largest)))),
             method="bounded",
             options={"xatol": searched.tolerance, "maxiter": 30},
         )
@@ -241,9 +248,10 @@ def _at_least(
 
 
 def at_rest(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
-    """A candidate that follows a driver, without it."""
+    """A candidate that follows a driver, without it; that of the scene where it has it, at the price of its pitch."""
     (bare,) = with_drivers(candidate.effect, ()) or [candidate.variant]
-    return scene_of(scene.fit, [bare]).candidates[0]
+    searched = (each for each in scene.candidates if each.effect.text == bare.effect.text)
+    return next(searched, None) or scene_of(scene.fit, [bare]).candidates[0]
 
 
 def _settled(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:

@@ -204,7 +204,7 @@ def cycles_of_unknown_pitch(context: Context) -> tuple[ChainVariant, ...]:
         if joint.kind == "linear":
             shortest, travel = limits[joint.name]
             coarse = LONGEST_PITCH_MM < 2.0 * shortest < float("inf")
-            longest = max(LONGEST_PITCH_MM, travel / FEWEST_PERIODS if coarse else 0.0)
+            longest = max(LONGEST_PITCH_MM, longest_pitch(travel) if coarse else 0.0)
             term = f"E{COMPONENTS[joint.main]}{joint.name}"
             travels.append((term, max(travel, SHORT_TRAVEL_MM), longest))
     return _cycles_over(context.chain, tuple(travels))
@@ -265,7 +265,7 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit. A period longer than what was travelled is a bend.
+    anyhow have no such limit. A period longer than half of what was travelled is a bend.
     """
     limits = _pitch_limits(context)
     return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
@@ -337,8 +337,13 @@ def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, floa
     """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Cyclic)
-    low, high = limits[effect.joint.name]
-    return low <= effect.shape.pitch <= high
+    shortest, travel = limits[effect.joint.name]
+    return shortest <= effect.shape.pitch <= longest_pitch(travel)
+
+
+def longest_pitch(travel: float) -> float:
+    """The longest pitch in mm that is told of an axis that travelled so many mm: of fewer periods it is a bend."""
+    return travel / FEWEST_PERIODS
 
 
 def _pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
