@@ -14,9 +14,10 @@ from monitor.discovery.machine.scene import (
     MachineEffect,
     scene_of,
 )
+from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.variants import as_it_appears, bends_of, part_of_bend, with_drivers
+from monitor.discovery.machine.shapes.variants import bends_of, part_of_bend, with_drivers
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
@@ -76,7 +77,7 @@ class RivalSearch:
         if part_of_bend(candidate.effect, context) is not None:
             variants += bends_of(candidate.effect, context)
         variants += _of_other_errors(candidate.effect)
-        variants += as_it_appears(candidate.effect, context)
+        variants += aliases_of(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.alias_pitches import as_it_appears
 from monitor.discovery.machine.shapes.bends import foretells_poses, score_beside
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import (
@@ -22,7 +23,6 @@ from monitor.discovery.machine.shapes.free_parts import (
     whole_basis,
 )
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.variants import as_it_appears
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING
 

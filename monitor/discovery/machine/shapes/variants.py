@@ -198,7 +198,7 @@ def constants_of(driver: Driver) -> tuple[float, ...]:
 def cycles_of_unknown_pitch(context: Context) -> tuple[ChainVariant, ...]:
     """Positioning errors of every linear axis with every pitch of the grid; where its positions stand so far apart that
     they show hardly any of these, with pitches up to half of its travel."""
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     travels: list[tuple[str, float, float]] = []
     for joint in context.chain.joints:
         if joint.kind == "linear":
@@ -267,7 +267,7 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
     anyhow have no such limit. A period longer than half of what was travelled is a bend.
     """
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
 
 
@@ -279,7 +279,7 @@ def without_aliases(
 
     On positions 50 mm apart a lead of 12 mm is a wave of 300 mm: over 300 mm of travel nobody can say that it repeats.
     """
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     return [
         replace(variant, odds=NEVER_FOUND)
         if isinstance(effect := variant.effect, ChainEffect)
@@ -289,21 +289,6 @@ def without_aliases(
         else variant
         for variant in variants
     ]
-
-
-def as_it_appears(effect: MachineEffect, context: Context) -> list[ChainVariant]:
-    """The cycle of the longer pitch for which positions on a grid take one below twice their step; none elsewhere."""
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Cyclic):
-        return []
-    shortest, travel = _pitch_limits(context)[effect.joint.name]
-    if not effect.shape.pitch < shortest < float("inf"):
-        return []
-    apparent = _apparent(1.0 / effect.shape.pitch, 2.0 / shortest)
-    if apparent * travel < FEWEST_PERIODS:
-        return []
-    text = f"cyclic{1.0 / apparent:.6g}mm"
-    longer = replace(effect, shape=parse_shape(text), shape_text=text)
-    return [Variant(longer.text, longer)]
 
 
 def that_moves_first(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
@@ -325,10 +310,10 @@ def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     on a grid."""
     if not 0.0 < shortest < float("inf"):
         return shortest == 0.0 and pitch <= travel
-    return _apparent(1.0 / pitch, 2.0 / shortest) * travel >= FEWEST_PERIODS
+    return apparent_frequency(1.0 / pitch, 2.0 / shortest) * travel >= FEWEST_PERIODS
 
 
-def _apparent(frequency: float, steps: float) -> float:
+def apparent_frequency(frequency: float, steps: float) -> float:
     """The frequency in 1/mm that a wave has at positions of which so many ``steps`` are in a mm."""
     return float(abs(frequency - steps * np.round(frequency / steps)))
 
@@ -346,7 +331,7 @@ def longest_pitch(travel: float) -> float:
     return travel / FEWEST_PERIODS
 
 
-def _pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
+def pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
     """The shortest and the longest pitch in mm that the positions of every linear axis can show."""
     series = _series(context)
     return {
