@@ -15,6 +15,7 @@ from monitor.discovery.machine.scene import (
     scene_of,
 )
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
+from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import bends_of, part_of_bend, with_drivers
@@ -60,6 +61,9 @@ class RivalSearch:
                 # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
                 if best.likelihood >= least or (of_instrument and same):
                     rivals.append((best.candidate, same))
+        named = {rival.family for rival, _ in rivals}
+        axes = axes_as_likely(self.scene, self.selected[index], others, least)
+        rivals += [(axis, False) for axis in axes if axis.family not in named]
         return sorted(rivals, key=lambda pair: not pair[1])
 
     def _pool(self, index: int) -> list[ChainCandidate]:
