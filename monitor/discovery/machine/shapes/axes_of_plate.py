@@ -35,7 +35,7 @@ def axes_of_plate(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tup
     selected = result.candidates
     for plate in filter(is_plate, selected):
         several = [plate, *filter(_grows, selected)]
-        others = [each for each in selected if all(each is not one for one in several)]
+        others = [each for each in selected if all(each is not other for other in several)]
         margin = WORTH_EXCHANGING if len(several) == 1 else -WORTH_EXCHANGING
         worth = priced(scene, several, others) + margin
         pairs = [pair for pair in growing_axes(scene, others) if _differ(scene, pair, others)]
