@@ -63,6 +63,9 @@ def test_a_cycle_between_two_that_follow_it_at_few_positions_leads(tmp_path: Pat
     assert missing.effect.startswith("EXX:cyclic")
     assert missing.searched is not None
     assert missing.searched.value == pytest.approx(200.0, abs=8.0)
+    # 1/70 - 1/200 and 1/70 + 1/200: at 70 mm from hole to hole they are one.
+    rivals = [float(rival.effect[len("EXX:cyclic") : -len("mm")]) for rival in missing.rivals]
+    assert sorted(rivals) == pytest.approx([51.9, 107.7], abs=2.5)
 
 
 def tables_of_five_angles(folder: Path) -> Path:

@@ -72,6 +72,21 @@ def test_two_axes_that_grow_alike_are_the_part(
     assert missing.effect.endswith(")@plate_degC")
     # What is stated of the points grows less by as much: the coefficient is of the statement.
     assert 1e6 * abs(missing.amplitude) == pytest.approx(11.5, abs=2.0)
+    # That two screws grow alike is possible, where the part is held at the zeros of both.
+    screws = {"EXX:poly1@plate_degC", "EYY:poly1@plate_degC"}
+    assert (screws <= {rival.effect for rival in missing.rivals}) == (held == (0.0, 0.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [101, 104, 105])
+def test_two_axes_of_which_one_grows_twice_as_much_are_told(tmp_path: Path, seed: int) -> None:
+    """A plate held at Y = 169 mm or 203 mm was told, about its middle, or as following another clock."""
+    per_kelvin = np.array([12e-6, 24e-6])
+    found = explained(campaign_of(tmp_path / "part", seed, 2, per_kelvin, (0.0, 0.0))).missing
+    assert {effect.effect for effect in found} == {"EXX:poly1@plate_degC", "EYY:poly1@plate_degC"}
+    for effect in found:
+        hidden = per_kelvin["XY".index(effect.effect[1])]
+        assert abs(effect.amplitude - hidden) < 3.0 * effect.u
 
 
 @pytest.mark.slow

@@ -12,10 +12,10 @@ from monitor.discovery import explain
 from monitor.discovery.machine.fit import fit
 from monitor.discovery.machine.noise.plan_cells import plan_cells, revisited_cells
 from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.shapes.alias_pitches import aliases_of, as_it_appears
 from monitor.discovery.machine.shapes.cycles import best_cycle
 from monitor.discovery.machine.shapes.shown_cycles import is_shown
 from monitor.discovery.machine.shapes.variants import (
-    as_it_appears,
     cycles_of_unknown_pitch,
     resolvable,
 )
@@ -206,6 +206,9 @@ def test_a_lead_is_told_with_the_pitch_that_the_grid_takes_it_for(tmp_path: Path
     assert isinstance(longer.effect.shape, Cyclic)
     assert abs(longer.effect.shape.pitch - 35.0) < 0.05
     assert not as_it_appears(longer.effect, context)
+    # 1/14 - 1/35 is 1/23.33.
+    pitches = [alias.effect.text.removeprefix("EXX:cyclic") for alias in aliases_of(longer.effect, context)]
+    assert pitches == ["23.3333mm", "10mm"]
 
 
 @pytest.mark.parametrize(

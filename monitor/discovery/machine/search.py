@@ -11,6 +11,7 @@ from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
@@ -79,7 +80,7 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
             )
             accepts = ChainAcceptance(scene, drivers, rate).accepts
             scene, result = drift_instead(*one_instead(scene, result, accepts), drivers, accepts)
-            return plate_instead(scene, result, accepts)
+            return axes_of_plate(*plate_instead(scene, result, accepts), accepts)
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
 
 

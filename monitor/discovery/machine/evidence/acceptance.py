@@ -5,6 +5,7 @@ scatters from run to run, and by the error on runs that took no part in its fit.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -283,8 +284,14 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         return p_value is None or p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
-        """The effect with each driver, or without its own."""
-        return scene_of(self.scene.fit, with_drivers(candidate.effect, self.drivers)).candidates
+        """The effect with each driver, or without its own, at the price of a pitch that was sought; none that the scan
+        weighs already: a pitch that was sought would come back as if it had been known."""
+        others = with_drivers(candidate.effect, self.drivers)
+        if is_cycle(candidate):
+            others = [replace(other, tries=other.tries * candidate.variant.tries) for other in others]
+        weighed = {each.effect.text for each in self.scene.candidates}
+        others = [other for other in others if other.effect.text not in weighed]
+        return scene_of(self.scene.fit, others).candidates
 
     def at_best_value(self, selected: Sequence[ChainCandidate], index: int) -> ChainCandidate:
         """The selected candidate at an index with its time constant, pitch or order at the best value."""

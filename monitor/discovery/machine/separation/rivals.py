@@ -15,11 +15,13 @@ from monitor.discovery.machine.scene import (
     scene_of,
 )
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
+from monitor.discovery.machine.shapes.alias_pitches import aliases_of
+from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.variants import as_it_appears, bends_of, part_of_bend, with_drivers
+from monitor.discovery.machine.shapes.variants import bends_of, part_of_bend, with_drivers
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
@@ -63,6 +65,9 @@ class RivalSearch:
                 # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
                 if best.likelihood >= least or (of_instrument and same):
                     rivals.append((best.candidate, same))
+        named = {rival.family for rival, _ in rivals}
+        axes = axes_as_likely(self.scene, self.selected[index], others, least)
+        rivals += [(axis, False) for axis in axes if axis.family not in named]
         rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
         return sorted(rivals, key=lambda pair: not pair[1])
 
@@ -98,7 +103,7 @@ class RivalSearch:
             variants += bends_of(candidate.effect, context)
         variants += _of_other_errors(candidate.effect)
         variants += _same_drift(candidate.effect, context.chain)
-        variants += as_it_appears(candidate.effect, context)
+        variants += aliases_of(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))

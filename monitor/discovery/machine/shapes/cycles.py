@@ -18,6 +18,7 @@ from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
     SHORTEST_PITCH_MM,
+    longest_pitch,
     pitches_over,
     resolvable,
 )
@@ -59,7 +60,7 @@ def best_cycle(
     if travel < FEWEST_PERIODS * SHORTEST_PITCH_MM:
         return []
     symbol = error_of(shape)
-    texts = [f"{symbol}:cyclic{pitch:.6g}mm" for pitch in pitches_over(travel, travel / FEWEST_PERIODS)]
+    texts = [f"{symbol}:cyclic{pitch:.6g}mm" for pitch in pitches_over(travel, longest_pitch(travel))]
     variants = [Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(texts)) for text in texts]
     cycles = [
         cycle for cycle in scene_of(scene.fit, resolvable(variants, context)).candidates if cycle.visible

@@ -13,12 +13,12 @@ from dataclasses import replace
 from itertools import combinations
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.alias_pitches import as_it_appears
 from monitor.discovery.machine.shapes.cycles import best_cycle
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import is_free, priced
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.variants import as_it_appears
 from monitor.discovery.machine.shapes.waves import many_periods
 from monitor.discovery.search.evidence import Evidence, weigh_beside
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of

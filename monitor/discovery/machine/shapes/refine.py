@@ -249,9 +249,10 @@ def _at_least(
 
 
 def at_rest(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
-    """A candidate that follows a driver, without it."""
+    """A candidate that follows a driver, without it; that of the scene where it has it, at the price of its pitch."""
     (bare,) = with_drivers(candidate.effect, ()) or [candidate.variant]
-    return scene_of(scene.fit, [bare]).candidates[0]
+    searched = (each for each in scene.candidates if each.effect.text == bare.effect.text)
+    return next(searched, None) or scene_of(scene.fit, [bare]).candidates[0]
 
 
 def _settled(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.alias_pitches import as_it_appears
 from monitor.discovery.machine.shapes.bends import foretells_poses, score_beside
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import (
@@ -22,6 +23,7 @@ from monitor.discovery.machine.shapes.free_parts import (
     whole_basis,
 )
 from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING
 
 
@@ -29,20 +31,27 @@ def refined_instead(
     scene: ChainScene, several: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
 ) -> ChainCandidate | None:
     """The one shape, at its best value or free, that says beside ``others`` more than ``several`` of its error at the
-    price of the choice of each; None where none does, or where nothing of them was sought."""
-    if len(several) < 2 or all(shape.variant.tries == 1 for shape in several):
+    price of the choice of each; None where none does, or where nothing of them was sought. A usual lead that looks
+    longer at its positions is as good as sought: whatever is there one of them comes near to."""
+    context = scene.fit.problem.context
+    sought = [shape for shape in several if shape.variant.tries > 1]
+    longer = [shape for shape in several if as_it_appears(shape.effect, context)]
+    if len(several) < 2 or not (sought or longer):
         return None
     choice = 2.0 * float(np.log(scene.families))
-    worth = score_beside(scene, several, others) - choice * len(several) + WORTH_EXCHANGING
-    sought = [shape for shape in several if shape.variant.tries > 1]
+    # A screw has one lead: two that both look longer have to be shown beyond doubt.
+    margin = WORTH_EXCHANGING if len(longer) < 2 else -UNDECIDED
+    worth = score_beside(scene, several, others) - choice * len(several) + margin
     ones = [refine(scene, [*others, shape], len(others)).candidate for shape in sought]
     ones += _free(scene, several, others)
 
     def score(shape: ChainCandidate) -> float:
         return score_beside(scene, [shape], others) - (price_of_parts(shape) or choice)
 
-    best = max(ones, key=score)
-    return best if score(best) > worth and foretells_poses(scene, [best], others) else None
+    best = max(ones, key=score, default=None)
+    return (
+        best if best is not None and score(best) > worth and foretells_poses(scene, [best], others) else None
+    )
 
 
 def _free(

@@ -198,13 +198,13 @@ def constants_of(driver: Driver) -> tuple[float, ...]:
 def cycles_of_unknown_pitch(context: Context) -> tuple[ChainVariant, ...]:
     """Positioning errors of every linear axis with every pitch of the grid; where its positions stand so far apart that
     they show hardly any of these, with pitches up to half of its travel."""
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     travels: list[tuple[str, float, float]] = []
     for joint in context.chain.joints:
         if joint.kind == "linear":
             shortest, travel = limits[joint.name]
             coarse = LONGEST_PITCH_MM < 2.0 * shortest < float("inf")
-            longest = max(LONGEST_PITCH_MM, travel / FEWEST_PERIODS if coarse else 0.0)
+            longest = max(LONGEST_PITCH_MM, longest_pitch(travel) if coarse else 0.0)
             term = f"E{COMPONENTS[joint.main]}{joint.name}"
             travels.append((term, max(travel, SHORT_TRAVEL_MM), longest))
     return _cycles_over(context.chain, tuple(travels))
@@ -230,11 +230,6 @@ def columns_of_pitches(context: Context) -> int:
 def frequency_step(travel: float) -> float:
     """The step in 1/mm of the grid of pitches of an axis that travelled so many mm."""
     return 0.5 / max(travel, SHORT_TRAVEL_MM)
-
-
-def longest_pitch(travel: float) -> float:
-    """The longest pitch in mm that is sought of an axis that travelled so many mm: more than half of it is a bend."""
-    return max(min(LONGEST_PITCH_MM, travel), travel / FEWEST_PERIODS)
 
 
 def pitches_over(travel: float, longest: float) -> list[float]:
@@ -270,9 +265,9 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit. A period longer than what was travelled is a bend.
+    anyhow have no such limit. A period longer than half of what was travelled is a bend.
     """
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
 
 
@@ -284,7 +279,7 @@ def without_aliases(
 
     On positions 50 mm apart a lead of 12 mm is a wave of 300 mm: over 300 mm of travel nobody can say that it repeats.
     """
-    limits = _pitch_limits(context)
+    limits = pitch_limits(context)
     return [
         replace(variant, odds=NEVER_FOUND)
         if isinstance(effect := variant.effect, ChainEffect)
@@ -294,21 +289,6 @@ def without_aliases(
         else variant
         for variant in variants
     ]
-
-
-def as_it_appears(effect: MachineEffect, context: Context) -> list[ChainVariant]:
-    """The cycle of the longer pitch for which positions on a grid take one below twice their step; none elsewhere."""
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Cyclic):
-        return []
-    shortest, travel = _pitch_limits(context)[effect.joint.name]
-    if not effect.shape.pitch < shortest < float("inf"):
-        return []
-    apparent = _apparent(1.0 / effect.shape.pitch, 2.0 / shortest)
-    if apparent * travel < FEWEST_PERIODS:
-        return []
-    text = f"cyclic{1.0 / apparent:.6g}mm"
-    longer = replace(effect, shape=parse_shape(text), shape_text=text)
-    return [Variant(longer.text, longer)]
 
 
 def that_moves_first(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
@@ -330,10 +310,10 @@ def _repeats(pitch: float, shortest: float, travel: float) -> bool:
     on a grid."""
     if not 0.0 < shortest < float("inf"):
         return shortest == 0.0 and pitch <= travel
-    return _apparent(1.0 / pitch, 2.0 / shortest) * travel >= FEWEST_PERIODS
+    return apparent_frequency(1.0 / pitch, 2.0 / shortest) * travel >= FEWEST_PERIODS
 
 
-def _apparent(frequency: float, steps: float) -> float:
+def apparent_frequency(frequency: float, steps: float) -> float:
     """The frequency in 1/mm that a wave has at positions of which so many ``steps`` are in a mm."""
     return float(abs(frequency - steps * np.round(frequency / steps)))
 
@@ -342,11 +322,16 @@ def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, floa
     """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Cyclic)
-    low, high = limits[effect.joint.name]
-    return low <= effect.shape.pitch <= high
+    shortest, travel = limits[effect.joint.name]
+    return shortest <= effect.shape.pitch <= longest_pitch(travel)
 
 
-def _pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
+def longest_pitch(travel: float) -> float:
+    """The longest pitch in mm that is told of an axis that travelled so many mm: of fewer periods it is a bend."""
+    return travel / FEWEST_PERIODS
+
+
+def pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
     """The shortest and the longest pitch in mm that the positions of every linear axis can show."""
     series = _series(context)
     return {
