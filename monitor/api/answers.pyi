@@ -10,6 +10,7 @@ from monitor.documents import Said
 from monitor.records import Array
 from monitor.records import FrameOfReference
 from monitor.records import Verdict
+from monitor.reporting.between_points import BetweenPoints
 from monitor.reporting.budget import DayToDay
 from monitor.reporting.budget import HoldsFor
 from monitor.reporting.budget import LengthReference
@@ -90,7 +91,6 @@ from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.answer import ValidationAnswer
 from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer
 from monitor.workflow.uncertainty.request import Asked
-from monitor.workflow.volumetric.answer import BetweenPoints
 from monitor.workflow.volumetric.answer import LeftOutOfMap
 from monitor.workflow.volumetric.answer import MapLength
 from monitor.workflow.volumetric.answer import MapPoint

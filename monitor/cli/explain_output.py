@@ -244,6 +244,9 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
             f"   q is that of the whole scan and above its rate of {explanation.rate:g}: this was asked for "
             "afterwards, at a level of its own that it met"
         )
+    if effect.error_peak_um is not None:
+        error = effect.effect.partition(":")[0]
+        output.say(f"   {error} with all of its effects: at most {effect.error_peak_um:.1f} µm at the {at}")
     if effect.refers_to is not None:
         output.say(f"   relative to: {effect.refers_to}")
     if effect.shape_unknown:

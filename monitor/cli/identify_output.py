@@ -85,9 +85,18 @@ def _taken_up(answer: IdentifyAnswer) -> None:
     for by, names in alike.items():
         lacks = "has no number of its own" if len(names) == 1 else "have no numbers of their own"
         output.say(f"{', '.join(names)} {lacks}: {_doing_the_same(by)}")
-    unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
-    if unseen:
-        output.say(f"such readings see nothing of {', '.join(unseen)}")
+    _unseen(answer)
+
+
+def _unseen(answer: IdentifyAnswer) -> None:
+    """The errors of which the readings say nothing, with why where an instrument of the model is absent."""
+    unseen = [taken for taken in answer.taken_up or () if not taken.by]
+    for taken in unseen:
+        if taken.why is not None:
+            output.say(f"no number: {taken.why}")
+    names = [taken.parameter for taken in unseen if taken.why is None]
+    if names:
+        output.say(f"such readings see nothing of {', '.join(names)}")
 
 
 def _as_stated(answer: IdentifyAnswer) -> None:

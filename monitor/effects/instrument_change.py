@@ -7,7 +7,7 @@ an instrument as its setups name it, and then one coefficient holds for all of t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -77,15 +77,20 @@ class InstrumentChange(BuiltIn, ABC):
 
     def setups(self, context: Context) -> tuple[ReadBy, ...]:
         """Return the setups that change. Raises EffectError where there are none."""
-        setups = self._instruments(context).setups
+        return self.among(self._instruments(context).setups, "this campaign has")
+
+    def among(self, setups: Iterable[ReadBy], there_are: str) -> tuple[ReadBy, ...]:
+        """Return those of the ``setups`` that change. Raises EffectError where there are none: ``there_are`` begins
+        the list of what there is, ``this campaign has``."""
+        setups = tuple(setups)
         named = [setup for setup in setups if self.name in (setup.id, setup.instrument)]
         if not named:
             names = tuple(
                 dict.fromkeys(name for setup in setups for name in (setup.id, setup.instrument) if name)
             )
             raise EffectError(
-                f"'{self.text}': no setup or instrument '{self.name}'; {did_you_mean(self.name, names)}this campaign "
-                f"has {', '.join(names)}"
+                f"'{self.text}': no setup or instrument '{self.name}'; {did_you_mean(self.name, names)}{there_are} "
+                f"{', '.join(names) or 'none'}"
             )
         able = tuple(setup for setup in named if setup.kind in self.kinds)
         if not able:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
+
 from monitor.effects.context import Context
 from monitor.effects.description import Explanation
 from monitor.effects.joint_error import JointError
@@ -50,6 +52,10 @@ class DescribedShape(BuiltIn):
 
     def refuse(self, text: str, error: JointError) -> None:
         """Raise EffectError where the error of an effect cannot have this shape."""
+
+    def jumps(self, low: float, high: float) -> Array:
+        """Return the readings (m,) from ``low`` to ``high``, mm or rad, at which the shape jumps."""
+        return np.zeros(0)
 
     def phrase(self, error: JointError) -> str:
         """Return the part of the effect's meaning that the shape makes; it begins with a comma."""

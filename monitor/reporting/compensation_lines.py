@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from monitor.reporting.between_points import BetweenPoints
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 
 _CIRCUMSTANCES = (
@@ -37,11 +38,16 @@ class TableOrigin:
 
 
 def positioning_lines(
-    origin: TableOrigin, turns: bool, remaining: Mapping[str, float], reversals: Sequence[AxisValue]
+    origin: TableOrigin,
+    turns: bool,
+    remaining: Mapping[str, float],
+    jumps: Mapping[str, int],
+    reversals: Sequence[AxisValue],
 ) -> list[str]:
     """Return the lines above the tables of linear axes, or of the rotary ones.
 
-    ``remaining`` is what straight lines between the rows leave at most, mm or rad, by axis.
+    ``remaining`` is what straight lines between the rows leave at most, mm or rad, ``jumps`` at how many
+    readings the error jumps between two rows, by axis.
     """
     unit, small = ("deg", "urad") if turns else ("mm", "um")
     show = (MICRORADIAN if turns else MICROMETRE).to_display
@@ -58,8 +64,16 @@ def positioning_lines(
         "Use it or the volumetric table of the run, not both.",
         *_CIRCUMSTANCES,
         f"Between two rows: a straight line, which leaves at most {left_over}.",
+        *(line for axis, count in jumps.items() for line in _of_jumps(axis, count)),
         *(line for reversal in reversals for line in _of_reversal(reversal)),
     ]
+
+
+def _of_jumps(axis: str, count: int) -> Iterator[str]:
+    """Lines on an axis whose error jumps within its travel."""
+    readings = "1 reading" if count == 1 else f"{count} readings"
+    yield f"{axis}: the error jumps at {readings}, each between two rows 0.002 mm apart. A control that wants its"
+    yield "points further apart leaves up to the whole jump near it."
 
 
 def _of_reversal(reversal: AxisValue) -> Iterator[str]:
@@ -77,11 +91,12 @@ def volumetric_lines(
     turning: Sequence[str],
     tip: tuple[float, float, float],
     zero: Sequence[AxisValue] | None,
+    between: Sequence[BetweenPoints] = (),
 ) -> list[str]:
     """Return the lines above the table of the volumetric error.
 
     ``linear`` and ``turning`` are the axes, ``tip`` (mm) is that of the tool in the frame of the spindle, ``zero``
-    where the workpiece's zero was set; None: where the axes say.
+    where the workpiece's zero was set; None: where the axes say. ``between`` are errors that its rows do not follow.
     """
     added = ", ".join(f"correction_{name.lower()}_um to the reading {name.lower()}_mm" for name in linear)
     held = f"; {' and '.join(turning)} stay at the commanded reading" if turning else ""
@@ -102,6 +117,7 @@ def volumetric_lines(
         "The positioning errors of the axes are in this table.",
         "Use it or the positioning table of the run, not both.",
         _of_zero(zero),
+        *(f"NOT FOLLOWED {effect}." for effect in between),
         *_CIRCUMSTANCES,
     ]
 

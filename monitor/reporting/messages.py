@@ -51,6 +51,11 @@ def model_refuted(campaigns: Sequence[str], judged: int, model: str, p_value: fl
     )
 
 
+def who_has(campaign: str | None) -> str:
+    """Return the words before a list of what a ``campaign`` has, or all campaigns of the database."""
+    return "the campaigns of this database have" if campaign is None else f"campaign {campaign} has"
+
+
 def simulated(campaigns: Sequence[str], of: int, most: int = 5) -> str:
     """Return which ``campaigns`` among those ``of`` a history nobody measured."""
     named = ", ".join(campaigns[:most]) + (

@@ -68,6 +68,7 @@ if TYPE_CHECKING:
         WithdrawnCampaign as WithdrawnCampaign,
         check_machine as check_machine,
         described_machines as described_machines,
+        described_setups as described_setups,
         list_campaigns as list_campaigns,
         list_runs as list_runs,
         list_withdrawn as list_withdrawn,
@@ -229,8 +230,8 @@ else:
             "archiving": "Archived archive_faults archive_files archived_count",
             "audit": "AuditEntry anchored_entry chain_faults last_anchor last_entries",
             "campaigns": "Imported import_campaign import_curve load_campaign",
-            "catalogue": "CampaignRow RunRow WithdrawnCampaign check_machine described_machines list_campaigns "
-            "list_runs list_withdrawn",
+            "catalogue": "CampaignRow RunRow WithdrawnCampaign check_machine described_machines described_setups "
+            "list_campaigns list_runs list_withdrawn",
             "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
             "load_certificate mark_certificate save_certificate",
             "connection": "Database",

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from monitor.documents import IN_UTC, OMITTED
 from monitor.exceptions import DataError, NotFoundError, did_you_mean
-from monitor.records import Machine
+from monitor.records import Machine, Setup
 from monitor.store.connection import Database
 from monitor.store.past.campaign_runs import imported_campaigns
-from monitor.store.record_json import as_imported, machine_record
+from monitor.store.record_json import as_imported, machine_record, setups_record
 
 if TYPE_CHECKING:
     pass
@@ -161,6 +161,22 @@ def described_machines(db: Database) -> tuple[Machine, ...]:
         with as_imported(campaign):
             machines.append(machine_record(text))
     return tuple(machines)
+
+
+def described_setups(db: Database, campaign: str | None) -> tuple[Setup, ...]:
+    """The setups of instruments of a ``campaign``, else of all that count, each as every campaign states it.
+
+    Raises NotFoundError listing what is there, StoreError for a campaign that is not described.
+    """
+    of_campaign = "" if campaign is None else f" AND campaign_id = {campaign_number(db, campaign)}"
+    setups: dict[Setup, None] = {}
+    for name, text in db.rows(
+        "SELECT arg_min(campaign, campaign_id), artefact FROM campaign WHERE (artefact -> 'setups') IS NOT NULL"
+        f"{of_campaign} GROUP BY artefact ORDER BY min(campaign_id)"
+    ):
+        with as_imported(name):
+            setups.update(dict.fromkeys(setups_record(text)))
+    return tuple(setups)
 
 
 def campaign_number(db: Database, name: str) -> int:

@@ -164,8 +164,13 @@ def artefact_record(text: str) -> Artefact:
         tuple(Reflector(**reflector) for reflector in document.get("reflectors", ())),
         l_shape=_l_shape(document.get("l_shape")),
         self_calibration=_self_calibration(document.get("self_calibration")),
-        setups=tuple(map(_setup, document.get("setups", ()))),
+        setups=setups_record(text),
     )
+
+
+def setups_record(text: str) -> tuple[Setup, ...]:
+    """The setups of ``artefact_json``."""
+    return tuple(map(_setup, json.loads(text).get("setups", ())))
 
 
 def _setup(document: dict[str, Any]) -> Setup:

@@ -10,7 +10,7 @@ import pytest
 from monitor.discovery import fit
 from monitor.discovery.machine.scene import ChainScene, scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
-from monitor.discovery.machine.sizes import peak_of
+from monitor.discovery.machine.sizes import peak_of, peaks_of_errors
 from monitor.effects import parse_effect
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
@@ -19,7 +19,7 @@ from tests.simulator.instruments import SimulatedAxis, SimulatedChain
 
 #: Length of the tool, and where X was measured, far from the zero of its scale, mm.
 TOOL, PLACES = 80.0, [*np.arange(500.0, 901.0, 50.0), *np.arange(900.0, 499.0, -50.0)]
-EFFECTS = ("EXX:poly1", "EXX:poly2", "EBX:poly1", "EBX:reversal")
+EFFECTS = ("EXX:poly1", "EXX:poly2", "EXX:poly3", "EBX:poly1", "EBX:reversal")
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +68,20 @@ def test_a_bow_is_as_high_as_it_stands_beyond_a_straight_line(scene: ChainScene)
 def test_a_tilt_moves_the_tip_by_its_lever_whatever_measures_angles(scene: ChainScene) -> None:
     """Was: a microradian counted as a micrometre where an autocollimator took part."""
     assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * TOOL, rel=1e-6)
+
+
+def test_an_error_of_several_effects_has_one_peak_of_all_of_them(scene: ChainScene) -> None:
+    """A square and a cube that cancel in part: each is higher by itself than what the axis does."""
+    square, cube, tilt = (
+        next(each for each in scene.candidates if each.effect.text == text)
+        for text in ("EXX:poly2", "EXX:poly3", "EBX:reversal")
+    )
+    at = np.array(PLACES)
+    # Both bow alike over these places; the cube 3 times the middle as much.
+    sizes = [(np.array([size]), np.eye(1)) for size in (1e-7, 20e-6, -1e-7 / 2100.0)]
+    length = square.raw[: len(at), 0, 0] * 1e-7 - cube.raw[: len(at), 0, 0] * 1e-7 / 2100.0
+    bow = np.abs(length - np.polyval(np.polyfit(at, length, 1), at)).max()
+    peaks = peaks_of_errors(scene, (square, tilt, cube), sizes)
+    assert peaks == {0: pytest.approx(bow, rel=1e-6)}
+    each = [peak_of(scene, one, one.raw, size) for one, size in ((square, sizes[0][0]), (cube, sizes[2][0]))]
+    assert bow < 0.2 * min(each)

@@ -33,7 +33,11 @@ def test_identify_says_what_it_left_out(db: mm.Database) -> None:
     assert longer["runs"] == plain["runs"]
     assert longer["added"] == {}
     assert [taken for taken in longer["taken_up"] if taken not in plain["taken_up"]] == [
-        {"parameter": LENGTH, "by": []}
+        {
+            "parameter": LENGTH,
+            "by": [],
+            "why": f"'{LENGTH}': no setup or instrument 'ball bar'; this campaign has r-test, R-test",
+        }
     ]
 
 
@@ -72,8 +76,19 @@ def test_a_plan_weighs_the_effect_where_a_test_brings_its_instrument(db: mm.Data
 
 def test_an_effect_is_added_only_where_it_has_a_column(db: mm.Database) -> None:
     for campaign, effect in (("r-test", LENGTH), ("four-instruments", "instrument:bal bar:length")):
-        with pytest.raises(EffectError, match=r"no setup or instrument '.*'; .*this campaign has"):
+        with pytest.raises(EffectError, match=rf"no setup or instrument '.*'; .*campaign {campaign} has"):
             db.ask("add effect", effect=effect, to="instruments", new_name="wrong", campaign=campaign)
+
+
+@pytest.mark.parametrize("question", ["add effect", "affected by effect"])
+def test_an_effect_of_no_setup_is_refused_without_a_campaign_too(db: mm.Database, question: str) -> None:
+    """A rehearsal of the addition refuses what the addition refuses; both name what there is."""
+    with pytest.raises(
+        EffectError, match=r"no setup or instrument 'r-tset'; did you mean '[rR]-test'\? the campaigns of"
+    ):
+        db.ask(question, effect="instrument:r-tset:lobing3", to="instruments", new_name="wrong")
+    with pytest.raises(EffectError, match="'instrument:bar-xy:lobing3' is a change of "):
+        db.ask(question, effect="instrument:bar-xy:lobing3", to="instruments", new_name="wrong")
 
 
 def test_a_machine_followed_by_such_a_model_has_one_history(db: mm.Database, tmp_path: Path) -> None:

@@ -386,3 +386,30 @@ def test_what_repeats_between_the_points_of_a_map_is_said_with_its_size(effect, 
     assert between.size == pytest.approx(size, rel=0.01)
     assert between.unit == ("µrad" if effect.startswith("EBX") else "µm")
     assert between_points(replace(mapped, points=49)) == ()
+
+
+def test_teeth_have_a_row_on_either_side_of_every_edge(simulator, tmp_path):
+    """Edges at -195, -111 ... 141 mm fall between even rows; straight lines left half a step beside each."""
+    truth = Truth(simulator, "w b X Y Z t", {}, 1.0)
+    truth.values = {"EXX:sawtooth84mm(-27)": 4e-3}
+    (path,) = write_tables(_mapped(truth, "w b X Y Z t", {}), "positioning-csv", tmp_path)
+    header, rows = _table(path)
+    nodes, errors = np.array([[row["reading_mm"], row["error_um"]] for row in rows]).T
+    assert len(rows) == 33 + 2 * 5
+    readings = np.arange(-210.0, 190.0, 0.013)
+    of_tooth = (readings + 27.0) / 84.0 % 1.0
+    far = np.minimum(of_tooth, 1.0 - of_tooth) * 84.0 > 0.001
+    left = np.interp(readings, nodes, errors) - 4.0 * (of_tooth - 0.5)
+    assert np.abs(left[far]).max() < 0.001
+    assert any(
+        "X: the error jumps at 5 readings, each between two rows 0.002 mm apart" in line for line in header
+    )
+
+
+def test_the_header_of_a_volumetric_table_says_what_its_rows_do_not_follow(simulator, tmp_path):
+    truth = Truth(simulator, "w b X Y Z t", {}, 1.0)
+    truth.values = {"EXX:sawtooth84mm(-27)": 4e-3}
+    mapped = _mapped(truth, "w b X Y Z t", {})
+    (path,) = write_tables(mapped, "volumetric-csv", tmp_path)
+    (between,) = between_points(mapped)
+    assert any(line.endswith(f"NOT FOLLOWED {between}.") for line in _table(path)[0])

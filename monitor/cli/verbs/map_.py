@@ -99,11 +99,7 @@ def _say(answer: VolumetricAnswer) -> None:
     if answer.datum is not None:
         output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
     for effect in answer.between_points or ():
-        output.say(
-            f"between the points of the map, {effect.spacing_mm:.4g} mm apart along {effect.axis}: {effect.effect}, up "
-            f"to {effect.size:.1f} {effect.unit}, repeats every {effect.pitch_mm:g} mm, so that the largest error may "
-            "lie between them (--points sets more)"
-        )
+        output.say(f"{effect} (--points sets more)")
     for omitted in answer.left_out:
         output.say(f"not in the map: {omitted.parameter}: {omitted.why}")
     output.say(

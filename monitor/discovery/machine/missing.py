@@ -18,7 +18,7 @@ from monitor.discovery.machine.shapes.curves import Curve
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
-from monitor.discovery.machine.sizes import peak_of, size_of, spread_or_length
+from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, size_of, spread_or_length
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -50,7 +50,8 @@ class ChainMissing(Missing):
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
-    is the absolute value of.
+    is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
+    of several.
     """
 
     held_out_days_before: float | None
@@ -66,6 +67,7 @@ class ChainMissing(Missing):
     unit: Unit | None = None
     within_runs: bool = False
     largest: str | None = None
+    error_peak: float | None = None
 
 
 @dataclass(frozen=True)
@@ -131,9 +133,13 @@ def missing_effects(
     if scene.fit.whitening is not None:
         shown = scene_of(scene.fit.with_correlation(None), [candidate.variant for candidate in candidates])
     selection = _Selection(scene, candidates, shown, poses, surroundings)
+    sizes = [(estimate[part], covariance[part, part]) for part in _parts(candidates)]
+    peaks = peaks_of_errors(scene, candidates, sizes)
     return tuple(
-        _missing(selection, index, finding, refined[index], (estimate[part], covariance[part, part]))
-        for index, (finding, part) in enumerate(zip(result.findings, _parts(candidates), strict=True))
+        replace(
+            _missing(selection, index, finding, refined[index], sizes[index]), error_peak=peaks.get(index)
+        )
+        for index, finding in enumerate(result.findings)
     )
 
 

@@ -7,7 +7,7 @@ of a free shape) the size is the largest value of the error.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,22 +93,49 @@ def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficien
 
     Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
     """
+    return min(_largest(scene, each @ coefficients) for each in (raw, _beyond_powers(scene, candidate, raw)))
+
+
+def peaks_of_errors(
+    scene: ChainScene, candidates: Sequence[ChainCandidate], sizes: Sequence[tuple[Array, Array]]
+) -> dict[int, float]:
+    """The largest displacement in mm of every error of the chain that has several effects, of all of them together as
+    ``peak_of`` of one, by the index of its first candidate; ``sizes`` are the coefficients and their covariances.
+
+    Effects of one error that cancel in part are each larger than what the axis does.
+    """
+    of_error: dict[str, list[int]] = {}
+    for index, candidate in enumerate(candidates):
+        if isinstance(candidate.effect, ChainEffect):
+            of_error.setdefault(candidate.effect.term.symbol, []).append(index)
+    peaks = {}
+    for several in (indices for indices in of_error.values() if len(indices) > 1):
+        raws = [size_of(candidates[index], *sizes[index]).raw for index in several]
+        whole = sum(raw @ sizes[index][0] for index, raw in zip(several, raws, strict=True))
+        beyond = sum(
+            _beyond_powers(scene, candidates[index], raw) @ sizes[index][0]
+            for index, raw in zip(several, raws, strict=True)
+        )
+        peaks[several[0]] = min(_largest(scene, np.asarray(each)) for each in (whole, beyond))
+    return peaks
+
+
+def _largest(scene: ChainScene, displacement: Array) -> float:
+    """The largest of displacements (n, d) in mm where lengths were measured, else of the angles' own."""
     is_length = scene.fit.problem.is_length
     rows = is_length if is_length.any() else ~is_length
+    return float(np.linalg.norm(displacement[rows], axis=1).max())
 
-    def largest(displacement: Array) -> float:
-        return float(np.linalg.norm(displacement[rows] @ coefficients, axis=1).max())
 
+def _beyond_powers(scene: ChainScene, candidate: ChainCandidate, raw: Array) -> Array:
+    """The displacements ``raw`` (n, d, k) of an effect; of a power of the position of an axis what the base leaves."""
     effect = candidate.effect
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Poly):
-        return largest(raw)
+        return raw
     if not isinstance(effect.driver, Always) or effect.term.stage != MOTION:
-        return largest(raw)
+        return raw
     powers = _powers_of_base(scene, effect)
-    return min(
-        largest(raw),
-        largest(_of_shape(candidate, lambda context, of: without_powers(context, of, powers))),
-    )
+    return _of_shape(candidate, lambda context, of: without_powers(context, of, powers))
 
 
 def _powers_of_base(scene: ChainScene, effect: ChainEffect) -> list[int]:

@@ -44,6 +44,10 @@ class Sawtooth(DescribedShape):
         reading = context.chain.joints[joint].sign * context.places[:, joint]
         return np.asarray(((reading - self.edge) / self.pitch % 1.0 - 0.5)[:, np.newaxis])
 
+    def jumps(self, low: float, high: float) -> Array:
+        first, last = np.ceil((low - self.edge) / self.pitch), np.floor((high - self.edge) / self.pitch)
+        return np.asarray(self.edge + self.pitch * np.arange(first, last + 1.0))
+
     def phrase(self, error: JointError) -> str:
         return f", in teeth of {self.pitch:g} mm that rise evenly and fall at once, one of them at {self.edge:g} mm"
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.measured import Displaced
 from monitor.methods.chain.shared_effects import FollowedEffects
@@ -43,10 +44,12 @@ class RunIdentification:
 @dataclass(frozen=True)
 class TakenUp:
     """An error that has no number of its own, whatever the plan: the free ones, or unknown frames and places, ``by``
-    which it is taken up; none where the readings see nothing of it."""
+    which it is taken up; none where the readings see nothing of it. ``why`` says so of an instrument that measured
+    nothing here."""
 
     parameter: str
     by: tuple[str, ...]
+    why: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
     """What these setups cannot give a number, whatever the plan."""
     assert isinstance(problem, InstrumentProblem)
     centres = (TakenUp(f"the centre of {name} across its bar", ()) for name in problem.bars_of_one_direction)
-    absent = (TakenUp(effect, ()) for effect in problem.left_out)
+    absent = (TakenUp(effect, (), why) for effect, why in problem.left_out.items())
     return (*taken_up(problem.context.chain, problem.setups), *centres, *absent)
 
 

@@ -7,6 +7,7 @@ from decimal import Decimal
 
 from markupsafe import Markup
 
+from monitor.reporting.between_points import BetweenPoints
 from monitor.reporting.certificate.tables import Number, aligned
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
 from monitor.reporting.numbers import (
@@ -39,30 +40,51 @@ def printed_map(volumetric: VolumetricResult, texts: Texts) -> PrintedMap:
     """The map in the words of a language."""
     sign = texts.decimal_sign
     k = written_factor(volumetric.k, sign)
+    explained = [_region(volumetric, texts, k)]
+    explained += [_between(effect, texts) for effect in volumetric.between_points or ()]
     return PrintedMap(
         state=volumetric.state,
         expanded=texts.markup("page.map_expanded", k=k),
         rows=_rows(volumetric, texts),
-        explained=texts(
-            "page.map_explained",
-            points=volumetric.points,
-            each=volumetric.each,
-            poses=volumetric.poses,
-            ranges="; ".join(
-                texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
-                for axis, first, last in volumetric.ranges
-            ),
-            origin=texts("page.map_from_strokes" if volumetric.from_strokes else "page.map_from_visited"),
-            datum=texts("page.map_datum", place=place_words(volumetric.datum, texts))
-            if volumetric.datum
-            else texts("page.map_no_datum"),
-            k=k,
-            p=written_probability(volumetric.p, sign),
-        ),
+        explained=" ".join(explained),
         left_out=" ".join(
             texts("page.map_left_out", parameters=name, why=why_refused(refused, texts))
             for name, refused in volumetric.refused
         ),
+    )
+
+
+def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:
+    """What the numbers mean, and of which region they are."""
+    sign = texts.decimal_sign
+    return texts(
+        "page.map_explained",
+        points=volumetric.points,
+        each=volumetric.each,
+        poses=volumetric.poses,
+        ranges="; ".join(
+            texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
+            for axis, first, last in volumetric.ranges
+        ),
+        origin=texts("page.map_from_strokes" if volumetric.from_strokes else "page.map_from_visited"),
+        datum=texts("page.map_datum", place=place_words(volumetric.datum, texts))
+        if volumetric.datum
+        else texts("page.map_no_datum"),
+        k=k,
+        p=written_probability(volumetric.p, sign),
+    )
+
+
+def _between(effect: BetweenPoints, texts: Texts) -> str:
+    """What an error does between the points of the map."""
+    return texts(
+        "page.map_between_points",
+        effect=effect.effect,
+        axis=effect.axis,
+        spacing=_tenths(effect.spacing_mm, texts),
+        size=_tenths(effect.size, texts),
+        unit=effect.unit,
+        pitch=_tenths(effect.pitch_mm, texts),
     )
 
 

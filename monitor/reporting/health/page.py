@@ -382,6 +382,7 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
             f"{pose.pose}: {pose.worst_um:.1f} µm ({pose.rms_um:.1f} µm)" for pose in worst_poses
         )
         lines.append(("by pose", f"at most (rms) {poses}"))
+    lines += [("not followed", str(effect)) for effect in error_map.between_points or ()]
     return tuple(lines)
 
 

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
+from monitor.reporting.between_points import BetweenPoints
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
@@ -205,7 +206,8 @@ class VolumetricMap:
     ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
     expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``. ``limit_um`` of the
     machine's file for the worst of them, and the probability to be beyond it. ``by_parameter`` is what each parameter
-    adds to the worst error, the largest first; None in older records.
+    adds to the worst error, the largest first; ``between_points`` are
+    the errors that its points do not follow. None in older records.
     """
 
     run: int
@@ -221,6 +223,7 @@ class VolumetricMap:
     limit_um: float | None = field(default=None, metadata=OMITTED)
     probability_out: float | None = field(default=None, metadata=OMITTED)
     by_parameter: tuple[MapShare, ...] | None = field(default=None, metadata=OMITTED)
+    between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

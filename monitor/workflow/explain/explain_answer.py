@@ -64,7 +64,8 @@ class MachineMissing:
     a part of a turn: an offset, a tilt, flexure or another order looks alike there. ``within_its_shape`` are effects
     that stand out beside it but not beside its error in any shape: they cannot be separated from it. ``refers_to``
     says in words what its coefficients are stated relative to, where it is an error of the chain. ``largest`` is the
-    coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes.
+    coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes. ``error_peak_um`` stands in
+    the first of several effects of one error of the chain: the largest displacement of all of them together.
     """
 
     rank: int
@@ -100,6 +101,7 @@ class MachineMissing:
     ties: tuple[Tie, ...] = ()
     refers_to: str | None = field(default=None, metadata=OMITTED)
     largest: str | None = field(default=None, metadata=OMITTED)
+    error_peak_um: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

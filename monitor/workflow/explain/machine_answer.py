@@ -170,6 +170,7 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         ties=ties_of(effect, rivals(effect), is_planned=is_planned),
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
         largest=effect.largest,
+        error_peak_um=micrometres(effect.error_peak),
     )
 
 

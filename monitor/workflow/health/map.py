@@ -40,6 +40,7 @@ def stated_map(
         limit_um=limit_um,
         probability_out=probability_out,
         by_parameter=_shares(answer),
+        between_points=answer.between_points,
     )
 
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from monitor.effects import parse_effect
+from monitor.effects import InstrumentEffect, ParsedEffect, parse_effect
+from monitor.effects.context import ReadBy
 from monitor.effects.curve import inputs_of, parse_curve_effect
 from monitor.effects.curve.words import describe_curve
 from monitor.effects.words import describe
@@ -14,11 +15,22 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.instruments.readings import readings
 from monitor.methods.model import SHARED_BASE, SHARED_BASE_MEANING, Model, chain_of
-from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
+from monitor.reporting import messages
+from monitor.store import (
+    Database,
+    StoredModel,
+    curve_names,
+    described_machines,
+    described_setups,
+    load_curve,
+    load_model,
+)
 from monitor.workflow.uncertainty.machine_frame import refers_to
 
 Subject = TypeVar("Subject")
+Found = TypeVar("Found")
 
 
 class Subjects(Protocol):
@@ -77,11 +89,24 @@ class Machines:
                     "shared by all runs of a campaign; elsewhere they are what is followed from run to run"
                 )
             return effect
-        text = _first(chains, lambda chain: parse_effect(effect, chain).text)
+        parsed = _first(chains, lambda chain: parse_effect(effect, chain))
+        self._refuse_nobodys(parsed, campaign)
+        text = parsed.text
         bases = [base for _, _, base in self._calibrated()]
         if bases and all(text in base for base in bases):
             raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
         return text
+
+    def _refuse_nobodys(self, effect: ParsedEffect, campaign: str | None) -> None:
+        """Raise EffectError for a change of a setup or an instrument that no campaign has, or not ``campaign``."""
+        if isinstance(effect, InstrumentEffect):
+            setups = (
+                ReadBy(
+                    setup.id, setup.instrument or "", setup.reading, len(readings()[setup.reading].columns)
+                )
+                for setup in described_setups(self.db, campaign)
+            )
+            effect.change.among(setups, messages.who_has(campaign))
 
     def _calibrated(self) -> Iterator[tuple[str, Chain, tuple[str, ...]]]:
         """Yield the machines that the method can calibrate: name, chain, and the effects that are free in every run."""
@@ -139,12 +164,12 @@ class Curves:
         return _first(names, text_on)
 
 
-def _first(subjects: Sequence[Subject], text_on: Callable[[Subject], str]) -> str:
-    """The text of the first subject that has it. Raises the fault of the first where none has it."""
+def _first(subjects: Sequence[Subject], on: Callable[[Subject], Found]) -> Found:
+    """What is ``on`` the first subject that has it. Raises the fault of the first where none has it."""
     fault: InputError | None = None
     for subject in subjects:
         try:
-            return text_on(subject)
+            return on(subject)
         except InputError as error:
             fault = fault or error
     assert fault is not None

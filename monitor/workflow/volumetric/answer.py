@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED, named
 from monitor.records import Array
+from monitor.reporting.between_points import BetweenPoints
 from monitor.reporting.svg.map_slices import Slice
 
 
@@ -67,19 +68,6 @@ class LeftOutOfMap:
     parameter: str
     why: str
     outside_model: bool | None = field(default=None, metadata=OMITTED)
-
-
-@dataclass(frozen=True)
-class BetweenPoints:
-    """An error in the map, up to ``size`` along its ``axis``, that repeats every ``pitch_mm`` where the points of the
-    map are ``spacing_mm`` apart: what it does between them is in no number of the map."""
-
-    effect: str
-    axis: str
-    pitch_mm: float
-    spacing_mm: float
-    size: float
-    unit: str
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ import numpy as np
 from monitor.effects import ChainEffect
 from monitor.effects.shapes.cyclic import Cyclic
 from monitor.effects.shapes.sawtooth import Sawtooth
+from monitor.reporting.between_points import BetweenPoints
 from monitor.uncertainty.geometric_errors import GeometricErrors, joint_errors
 from monitor.uncertainty.volumetric import middle
 from monitor.units import Unit
-from monitor.workflow.volumetric.answer import BetweenPoints
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 #: With eight points a period the largest of them is at least 0.92 of the amplitude of a wave.

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from monitor.effects.shape import DescribedShape
 from monitor.exceptions import InputError
 from monitor.machine import Joint
 from monitor.records import Array
@@ -41,6 +43,8 @@ TABLE_POINTS = 33
 PART_LEFT = 0.005
 LEAST_LEFT = 1e-5
 MOST_POINTS = 4097
+#: An error that jumps has a row so far before and after it (mm, rad): ten last digits of the table.
+BESIDE = 1e-3
 
 
 def write_tables(mapped: VolumetricMap, form: str, folder: Path) -> tuple[str, ...]:
@@ -72,27 +76,55 @@ def _numbers(values: Iterable[float]) -> list[str]:
     return [_number(value) for value in values]
 
 
-def _evenly(mapped: VolumetricMap, axis: int, count: int) -> tuple[Array, PositioningError]:
-    """Readings (count,) of the axis at an index, mm or rad, and its error there."""
+@dataclass(frozen=True)
+class _Line:
+    """Readings (n,) of an axis, mm or rad, with its ``error`` there, what straight lines between them leave at most
+    (``remaining``), and the readings ``jumps`` (m,) that have a row on either side."""
+
+    readings: Array
+    error: PositioningError
+    remaining: float
+    jumps: Array
+
+
+def _jumps(mapped: VolumetricMap, axis: int, low: float, high: float) -> Array:
+    """The readings (m,) at which the error of an axis jumps; none where they are too many for rows of their own."""
+    effects = [effect for effect in mapped.errors.effects if effect.term.joint == axis]
+    jumps = [effect.shape.jumps(low, high) for effect in effects if isinstance(effect.shape, DescribedShape)]
+    places: Array = np.unique(np.concatenate([np.zeros(0), *jumps]))
+    return places if 2 * len(places) <= MOST_POINTS - TABLE_POINTS else np.zeros(0)
+
+
+def _nodes(low: float, high: float, count: int, jumps: Array) -> Array:
+    """So many readings evenly from ``low`` to ``high``, and two beside every jump."""
+    even = np.linspace(low, high, count)
+    apart = np.abs(even[:, None] - jumps).min(axis=1, initial=np.inf) > BESIDE
+    beside = np.concatenate([jumps - BESIDE, jumps + BESIDE])
+    return np.unique(np.concatenate([even[apart], np.clip(beside, low, high)]))
+
+
+def _along(mapped: VolumetricMap, axis: int) -> _Line:
+    """The table of the axis at an index: rows enough for straight lines between them."""
     chain = mapped.errors.chain
     joint = chain.joints[axis]
     visited = joint.sign * mapped.errors.context.positions[:, axis]
     low, high = (visited.min(), visited.max()) if joint.turns else mapped.ranges[joint.name]
-    readings = np.linspace(low, high, count)
-    positions = np.tile(middle(chain, mapped.ranges), (count, 1))
-    positions[:, axis] = joint.sign * readings
-    return readings, positioning_error(mapped.errors, axis, positions)
-
-
-def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, PositioningError, float]:
-    """Readings of the axis at an index, its error there, and what straight lines between them leave at most."""
+    jumps = _jumps(mapped, axis, low, high)
     count = TABLE_POINTS
     while True:
-        between, finer = _evenly(mapped, axis, 2 * count - 1)
-        lines = (finer.errors[:-2:2] + finer.errors[2::2]) / 2.0
-        remaining = float(np.abs(finer.errors[1:-1:2] - lines).max())
-        if remaining <= max(PART_LEFT * np.abs(finer.errors).max(), LEAST_LEFT) or count >= MOST_POINTS:
-            return between[::2], PositioningError(finer.errors[::2], finer.u[::2]), remaining
+        nodes = _nodes(low, high, count, jumps)
+        middles = (nodes[:-1] + nodes[1:]) / 2.0
+        readings = np.concatenate([nodes, middles])
+        positions = np.tile(middle(chain, mapped.ranges), (len(readings), 1))
+        positions[:, axis] = joint.sign * readings
+        error = positioning_error(mapped.errors, axis, positions)
+        at_nodes, at_middles = np.split(error.errors, [len(nodes)])
+        # Between the two rows of a jump lies the jump.
+        followed = np.abs(middles[:, None] - jumps).min(axis=1, initial=np.inf) > BESIDE
+        lines = (at_nodes[:-1] + at_nodes[1:]) / 2.0
+        remaining = float(np.abs(at_middles - lines)[followed].max())
+        if remaining <= max(PART_LEFT * np.abs(error.errors).max(), LEAST_LEFT) or count >= MOST_POINTS:
+            return _Line(nodes, PositioningError(at_nodes, error.u[: len(nodes)]), remaining, jumps)
         count = 2 * count - 1
 
 
@@ -115,9 +147,16 @@ def _positioning(mapped: VolumetricMap) -> dict[str, tuple[Sequence[str], list[R
         if axes:
             along = {axis: _along(mapped, axis) for axis in axes}
             header = positioning_header(
-                mapped, {axis: remaining for axis, (_, _, remaining) in along.items()}, turns
+                mapped,
+                {axis: line.remaining for axis, line in along.items()},
+                {axis: len(line.jumps) for axis, line in along.items() if len(line.jumps)},
+                turns,
             )
-            rows = [row for axis in axes for row in _axis_rows(joints[axis], *along[axis][:2])]
+            rows = [
+                row
+                for axis, line in along.items()
+                for row in _axis_rows(joints[axis], line.readings, line.error)
+            ]
             columns = (
                 ["axis", "reading_deg", "error_urad", "correction_urad", "correction_deg", "u_urad"]
                 if turns

@@ -8,17 +8,24 @@ from monitor.effects.joint_error import JointError
 from monitor.effects.shapes import Reversal
 from monitor.reporting.compensation_lines import AxisValue, TableOrigin, positioning_lines, volumetric_lines
 from monitor.workflow.models import label
+from monitor.workflow.volumetric.between_points import between_points
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 
-def positioning_header(mapped: VolumetricMap, remaining: Mapping[int, float], turns: bool) -> list[str]:
+def positioning_header(
+    mapped: VolumetricMap, remaining: Mapping[int, float], jumps: Mapping[int, int], turns: bool
+) -> list[str]:
     """The lines above the tables of linear axes, or of the rotary ones.
 
-    ``remaining`` is what straight lines between the rows leave at most, mm or rad, by the index of the axis.
+    ``remaining`` is what straight lines between the rows leave at most, mm or rad, ``jumps`` how many jumps have a
+    row on either side, by the index of the axis.
     """
     joints = mapped.errors.chain.joints
     by_name = {joints[axis].name: size for axis, size in remaining.items()}
-    return positioning_lines(_origin(mapped), turns, by_name, list(_reversals(mapped, list(remaining))))
+    jumping = {joints[axis].name: count for axis, count in jumps.items()}
+    return positioning_lines(
+        _origin(mapped), turns, by_name, jumping, list(_reversals(mapped, list(remaining)))
+    )
 
 
 def volumetric_header(mapped: VolumetricMap) -> list[str]:
@@ -38,6 +45,7 @@ def volumetric_header(mapped: VolumetricMap) -> list[str]:
             for joint, position in zip(joints, map(float, datum), strict=True)
             if joint.kind != "spindle"
         ],
+        between_points(mapped),
     )
 
 
