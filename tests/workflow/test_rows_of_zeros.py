@@ -16,6 +16,7 @@ from monitor.workflow.explain.request import ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from tests.methods.test_plates_on_a_cmm import LYING, STANDING_XZ, STANDING_YZ, campaign_of
 
 GRID = """format = 1
 campaign = "grid"
@@ -57,7 +58,7 @@ def grid(folder: Path, zeros: tuple[int, ...]) -> Path:
 @pytest.mark.slow
 def test_identify_and_explain_name_the_same_rows(tmp_path: Path) -> None:
     """`identify` refused the readings, and `explain` said that nothing is missing, without a word of zeros."""
-    named = r"un 1, sequence 5, 6: all that was read, or all axes, are 0"
+    named = r"un 1, sequence 5, 6: all that was read is 0"
     with Database(tmp_path / "zeros.duckdb") as db:
         import_folders(db, ImportRequest([grid(tmp_path / "grid", (4, 5))]))
         with pytest.raises(DataError, match=named):
@@ -68,3 +69,38 @@ def test_identify_and_explain_name_the_same_rows(tmp_path: Path) -> None:
 def test_one_point_at_the_origin_is_a_reading(tmp_path: Path) -> None:
     assert blank_rows(read_campaign(grid(tmp_path / "grid", (4,)))) == frozenset()
     assert blank_rows(read_campaign(grid(tmp_path / "two", (4, 5)))) == {(1, 5), (1, 6)}
+
+
+def test_a_bad_reading_at_the_home_pose_is_no_row_of_zeros(tmp_path: Path) -> None:
+    """Was: that all axes are 0 there, as programs write where they got no reading; a plan may pass there twice."""
+    table = grid(tmp_path / "grid", ()) / "probings.csv"
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    for number, off in ((20, 0.0), (60, 0.06)):
+        cells = lines[number].split(",")
+        lines[number] = ",".join([*cells[:4], "0.000", "0.000", "0.000", f"{150.0 + off:.4f}", "-90.0000"])
+    table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    with Database(tmp_path / "home.duckdb") as db:
+        import_folders(db, ImportRequest([table.parent]))
+        answer = explain(db, ExplainRequest("grid")).explanation
+    assert [reading.sequence for reading in answer.suspect_data] == [61]
+    assert "leave these rows out" not in answer.answer
+
+
+@pytest.mark.slow
+def test_the_origin_of_a_plate_stays_where_a_column_is_mistaken(tmp_path: Path) -> None:
+    """Was: its three readings were to be left out, and no word of the inches."""
+    table = campaign_of(tmp_path / "plate", [LYING, STANDING_XZ, STANDING_YZ], 1, "0.00000") / "probings.csv"
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines]
+    origin = [float(cell) for cell in rows[0][7:9]]
+    for cells in rows:
+        cells[4] = f"{float(cells[4]) / 25.4:.6f}"
+        of_ball = zip(cells[7:9], origin, strict=True)
+        cells[7:9] = [f"{float(cell) - at + 0.0:.5f}" for cell, at in of_ball]
+    table.write_text("\n".join([head, *map(",".join, rows)]) + "\n", encoding="utf-8")
+    assert len(blank_rows(read_campaign(table.parent))) == 3
+    with Database(tmp_path / "plate.duckdb") as db:
+        import_folders(db, ImportRequest([table.parent]))
+        with pytest.raises(DataError, match="It looks as if x_mm was in inches") as refusal:
+            identify(db, IdentifyRequest("cmm"))
+    assert "leave these rows out" not in str(refusal.value)

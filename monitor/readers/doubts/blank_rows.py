@@ -19,17 +19,15 @@ FEWEST = 2
 MOST_NAMED = 12
 
 
-def blank_rows(campaign: Campaign, *, or_axes: bool = False) -> frozenset[tuple[int, int]]:
-    """Run and sequence of the rows that read nothing but zeros, ``or_axes`` of which all axes stand at zero; empty
-    where there are fewer than ``FEWEST`` of them or they are most of the campaign."""
+def blank_rows(campaign: Campaign) -> frozenset[tuple[int, int]]:
+    """Run and sequence of the rows that read nothing but zeros; empty where there are fewer than ``FEWEST`` of them or
+    they are most of the campaign. Where axes stand at zero says nothing: a plan may pass there in every run."""
     probings = campaign.probings
     read = [values for name, values in probings.channels.items() if name.startswith(READ)]
-    blank = np.zeros(len(probings), dtype=bool)
-    for columns in (read, list(probings.readings.values()) if or_axes else []):
-        if columns:
-            numbers = np.column_stack(columns)
-            zeros = np.all((numbers == 0.0) | np.isnan(numbers), axis=1)
-            blank |= zeros & np.isfinite(numbers).any(axis=1)
+    if not read:
+        return frozenset()
+    numbers = np.column_stack(read)
+    blank = np.all((numbers == 0.0) | np.isnan(numbers), axis=1) & np.isfinite(numbers).any(axis=1)
     if not FEWEST <= np.count_nonzero(blank) <= len(blank) // 2:
         return frozenset()
     return frozenset(zip(probings.run[blank].tolist(), probings.sequence[blank].tolist(), strict=True))
@@ -46,6 +44,6 @@ def blank_words(rows: Collection[tuple[int, int]]) -> Iterator[str]:
     for run in sorted({run for run, _ in rows}):
         sequences = sorted(sequence for of_run, sequence in rows if of_run == run)
         yield (
-            f"{named_rows(run, sequences)}: all that was read, or all axes, are 0, as programs write where they got no "
-            "reading: leave these rows out"
+            f"{named_rows(run, sequences)}: all that was read is 0, as programs write where they got no reading: "
+            "leave these rows out"
         )

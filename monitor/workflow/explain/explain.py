@@ -137,8 +137,7 @@ def _with_blank_rows(answer: MachineExplanation, campaign: Campaign) -> MachineE
     """An answer that names the rows of zeros among the readings that were left out."""
     left_out = {(reading.run, reading.sequence) for reading in answer.suspect_data}
     blank = (
-        f"{sentence[0].upper()}{sentence[1:]}."
-        for sentence in blank_words(left_out & blank_rows(campaign, or_axes=True))
+        f"{sentence[0].upper()}{sentence[1:]}." for sentence in blank_words(left_out & blank_rows(campaign))
     )
     return replace(answer, answer=" ".join((answer.answer, *blank)))
 

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 
-from monitor.exceptions import DataError, MistakenUnitError, TooFewReadingsError, TooManyRowsError
+import numpy as np
+
+from monitor.exceptions import (
+    DataError,
+    MistakenUnitError,
+    MonitorError,
+    TooFewReadingsError,
+    TooManyRowsError,
+)
 from monitor.methods.chain.parts import parts_of
-from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
@@ -32,16 +41,17 @@ def with_mistake(
 ) -> DataError:
     """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
 
-    Rows of zeros are named. Columns that the import saw exchanged are said again. Else the changes are tried that would
-    let the readings fit, which takes up to half a minute; where none does, what else the import noticed of the columns
-    is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is
-    tried.
+    Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
+    it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
+    that would let the readings fit, which takes up to half a minute; where none does, what else the import noticed of
+    the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows
+    a part is tried.
     """
     if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
         return refusal
-    blank = tuple(blank_words(blank_rows(campaign)))
-    if blank:
-        return _with_sentences(refusal, blank)
+    blank = blank_rows(campaign)
+    if blank and _fits_without(campaign, blank, problem_of):
+        return _with_sentences(refusal, tuple(blank_words(blank)))
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
         return _with_sentences(refusal, exchanged)
@@ -61,6 +71,21 @@ def with_mistake(
         else column_doubts(campaign, tool_frames(campaign))
     )
     return _with_sentences(refusal, said) if said else refusal
+
+
+def _fits_without(
+    campaign: Campaign, rows: Collection[tuple[int, int]], problem_of: Callable[[Campaign], ChainProblem]
+) -> bool:
+    """Whether a machine of the file fits a campaign without some rows, each a run and a sequence number."""
+    probings = campaign.probings
+    pairs = zip(probings.run.tolist(), probings.sequence.tolist(), strict=True)
+    others = np.array([pair not in rows for pair in pairs])
+    try:
+        with np.errstate(all="ignore"):
+            solve_problem(problem_of(replace(campaign, probings=probings.rows(others))))
+    except (MonitorError, np.linalg.LinAlgError):
+        return False
+    return True
 
 
 def _with_sentences(refusal: DataError, said: Sequence[str]) -> DataError:

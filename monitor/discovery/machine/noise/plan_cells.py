@@ -40,12 +40,36 @@ def _planned(problem: ChainProblem) -> Array:
 
 
 def _linked(places: Array) -> npt.NDArray[np.int64]:
-    """The group (n,) of every row (n, k): from one of it to the next no number differs by more than 1."""
-    pairs = scipy.spatial.cKDTree(places).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    links = scipy.sparse.coo_array(
-        (np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (len(places), len(places))
-    )
-    return np.asarray(scipy.sparse.csgraph.connected_components(links, directed=False)[1], dtype=np.int64)
+    """The group (n,) of every row (n, k): from one of it to the next no number differs by more than 1.
+
+    Rows whose numbers have the same whole parts are one group: a ball that is touched ten thousand times has fifty
+    million pairs. Of two such cells side by side one row and its nearest in the other tell whether they are linked.
+    """
+    cells, cell = np.unique(np.floor(places), axis=0, return_inverse=True)
+    cell = cell.reshape(-1)
+    beside = scipy.spatial.cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray")
+    (pair, row), (other_pair, other) = (_rows_of(cell, side) for side in beside.T)
+    linked = np.zeros(len(beside), dtype=bool)
+    if len(beside):
+        nearest = scipy.spatial.cKDTree(np.column_stack([2.0 * other_pair, places[other]])).query(
+            np.column_stack([2.0 * pair, places[row]]), p=np.inf, distance_upper_bound=np.nextafter(1.0, 2.0)
+        )[0]
+        linked[pair[np.isfinite(nearest)]] = True
+    first, second = beside[linked].T
+    links = scipy.sparse.coo_array((np.ones(len(first)), (first, second)), (len(cells), len(cells)))
+    groups = scipy.sparse.csgraph.connected_components(links, directed=False)[1]
+    return np.asarray(groups[cell], dtype=np.int64)
+
+
+def _rows_of(
+    cell: npt.NDArray[np.int64], asked: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The rows of every cell that is ``asked`` for (m,), one behind the other, and which of the m each belongs to."""
+    count, order = np.bincount(cell), np.argsort(cell, kind="stable")
+    of_asked = np.repeat(np.arange(len(asked)), count[asked])
+    before = np.cumsum(count[asked]) - count[asked]
+    place = np.arange(len(of_asked)) - before[of_asked]
+    return of_asked, order[(np.cumsum(count) - count)[asked][of_asked] + place]
 
 
 def _visits(problem: ChainProblem, planned: Array) -> npt.NDArray[np.int64]:
