@@ -323,7 +323,8 @@ def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, floa
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Cyclic)
     shortest, travel = limits[effect.joint.name]
-    return shortest <= effect.shape.pitch <= longest_pitch(travel)
+    # Names of pitches have six digits.
+    return shortest <= effect.shape.pitch <= (1.0 + 1e-5) * longest_pitch(travel)
 
 
 def longest_pitch(travel: float) -> float:
