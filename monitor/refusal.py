@@ -50,7 +50,8 @@ class Advice:
 
     ``names`` are the axes, targets, planes or parameters that the advice is of (of BAR_DIRECTION the rotary axis, the
     gain along it and those across), ``meanings`` what a boundary condition of each name fixes, in English; ``count`` is
-    how many modules are needed or angles were there, ``run`` the run that lacks a target. ``text`` belongs to OWN_WORDS.
+    how many modules are needed or angles were there, ``run`` the run that lacks a target. ``text`` belongs to
+    OWN_WORDS.
     """
 
     kind: AdviceKind

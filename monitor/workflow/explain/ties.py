@@ -44,7 +44,7 @@ class TieBreak(Enum):
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
     INSTRUMENT = "instrument"
-    #: No pose of the present set-up does; another stylus does, or targets that stand elsewhere (``setup``).
+    #: No pose of the present set-up does; ``runs`` with another stylus do, or with targets elsewhere (``setup``).
     SETUP = "setup"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
@@ -71,24 +71,34 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) ->
     """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_planned`` says that
     `monitor plan --separate` selects poses for the campaign."""
     actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None], list[str]] = {}
+    runs: dict[SecondSetup | None, int] = {}
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
-        setup = _setup(effect, rival) if kind is TieBreak.NOTHING else None
-        if setup is not None:
-            kind = TieBreak.SETUP
+        setup = None
+        if kind is TieBreak.NOTHING and (anew := _setup(effect, rival)) is not None:
+            kind, setup = TieBreak.SETUP, anew[0]
+            runs[setup] = max(anew[1], runs.get(setup, 0))
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
             kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
         if kind is TieBreak.PLAN and not is_planned:
             kind, axes = TieBreak.MORE_POSES, axes_of(effect.effect, rival)
         actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(
-        Tie(tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, setup=setup)
+        Tie(
+            tuple(names),
+            kind,
+            drivers,
+            axes,
+            kind is TieBreak.DRIVERS and effect.within_runs,
+            runs.get(setup),
+            setup=setup,
+        )
         for (kind, drivers, axes, setup), names in actions.items()
     )
 
 
-def _setup(effect: ChainMissing, rival: str) -> SecondSetup | None:
-    """The second set-up that tells a rival which no pose does."""
+def _setup(effect: ChainMissing, rival: str) -> tuple[SecondSetup, int] | None:
+    """The second set-up that tells a rival which no pose does, and in how many runs."""
     pairs = zip(effect.separation.together, effect.separation.setups, strict=False)
     return next((setup for pair, setup in pairs if {effect.effect, rival} == set(pair)), None)
 

@@ -18,7 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
-from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
+from monitor.discovery.machine.separation.setups import Moved, runs_that_decide, setups_of
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always, EachRun, RunTime
 from monitor.effects.drivers.gravity import Gravity
@@ -44,14 +44,14 @@ STRETCH = 1.25
 class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
-    separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, None where none
-    does."""
+    separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, with how many
+    runs in them do, None where none does."""
 
     poses: tuple[dict[str, float], ...]
     before: float
     after: float
     together: tuple[tuple[str, str], ...] = ()
-    setups: tuple[SecondSetup | None, ...] = ()
+    setups: tuple[tuple[SecondSetup, int] | None, ...] = ()
 
 
 NO_POSES = Separation((), 0.0, 0.0)
@@ -165,18 +165,21 @@ def _second_setups(
     coefficients: Array,
     alike: Sequence[tuple[int, int]],
     strokes: Mapping[str, tuple[float, float]],
-) -> tuple[SecondSetup | None, ...]:
-    """For each pair that no pose separates the easiest second set-up that does, at the poses of the present plan."""
-    told_apart: dict[tuple[int, int], SecondSetup] = {}
+) -> tuple[tuple[SecondSetup, int] | None, ...]:
+    """For each pair that no pose separates the easiest second set-up that does, at the poses of the present plan, and
+    in how many runs."""
+    told_apart: dict[tuple[int, int], tuple[SecondSetup, int]] = {}
     if not alike:
         return ()
     tip = fit.problem.own_of(fit.solution.local)[0, -3:]
     for moved in setups_of(fit.problem.context.chain, tip):
         pairs = _pairs_in(moved, fit, group, present, coefficients, strokes)
         for pair in pairs:
-            is_open = pair.effects in alike and pair.effects not in told_apart
-            if is_open and decides(pair, present.nuisance.shape[-1], len(fit.problem.runs)):
-                told_apart[pair.effects] = moved.setup
+            if pair.effects not in alike or pair.effects in told_apart:
+                continue
+            runs = runs_that_decide(pair, present.nuisance.shape[-1], len(fit.problem.runs))
+            if runs is not None:
+                told_apart[pair.effects] = (moved.setup, runs)
         if len(told_apart) == len(alike):
             break
     return tuple(told_apart.get(pair) for pair in alike)
