@@ -10,7 +10,7 @@ from by_path import simulator
 
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.separation import separate
-from monitor.discovery.machine.separation.distances import Pair, distance_of
+from monitor.discovery.machine.separation.distances import Pair, distance_of, select_poses
 from monitor.discovery.machine.separation.setups import of_effects, runs_that_decide, setups_of
 from monitor.effects import parse_effect
 from monitor.machine import parse_topology
@@ -211,3 +211,22 @@ def test_a_second_set_up_that_reaches_no_pose_is_none(virtual_campaigns, monkeyp
     moved = next(iter(setups_of(fitted.problem.context.chain, np.zeros(3))))
     assert separate._pairs_in(moved, fitted, effects, None, np.array([1e-3]), {}) == []
     assert separate.separating_poses(fitted, effects[0], np.array([1e-3]), effects[1:]) == separate.NO_POSES
+
+
+def test_no_pose_is_offered_twice_nor_one_that_the_plan_has(virtual_campaigns):
+    context = problem_of(virtual_campaigns.on_machine("one rotary table", 7)[0]).context
+    turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+    measured = separate._is_measured(
+        np.concatenate([context.positions[:5], context.positions[:5] + 0.1]), context
+    )
+    assert measured[:5].all()
+    beside = np.abs(context.positions[:5, None, turning] + 0.1 - context.positions[:, turning]).max(axis=2)
+    np.testing.assert_array_equal(measured[5:], beside.min(axis=1) < np.radians(0.5))
+    rng = np.random.default_rng(3)
+    rows = [scale * rng.standard_normal((12, 3)) for scale in (0.05, 2.0, 1.5, 1.0, 0.8)]
+    pair = Pair((0, 1), rows[0].T @ rows[0], np.stack([each.T @ each for each in rows[1:]]))
+    nothing = np.zeros(4, dtype=bool)
+    first, *others = select_poses([pair], 1, nothing).poses
+    assert first not in others
+    assert first not in select_poses([pair], 1, np.arange(4) == first).poses
+    assert select_poses([pair], 1, ~nothing).poses == ()

@@ -29,6 +29,8 @@ from monitor.records import Array, SecondSetup
 
 # The grid of rotary positions; finer ones change the choice, not what it achieves.
 STEP_RAD = np.pi / 6.0
+# Half a degree beside a pose is that pose.
+SAME_RAD = np.radians(0.5)
 # A spindle is oriented to any angle: quarters of a turn for its base parameters, eighths for its harmonics.
 QUARTERS, EIGHTHS = 4, 8
 # Effects of a group that are separated from each other, the most convincing ones: groups of 5 300 campaigns had ten at
@@ -78,6 +80,14 @@ def _positions(
     if high <= low:
         return np.array([low])
     return np.linspace(low, high, max(int((high - low) / STEP_RAD) + 1, 2))
+
+
+def _is_measured(grid: Array, context: Context) -> npt.NDArray[np.bool_]:
+    """Mark the rotary positions (P, J) of a grid at which the plan already touches; more runs repeat those."""
+    turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+    present = np.unique(np.round(context.positions[:, turning], 6), axis=0)
+    apart = np.abs(grid[:, None, turning] - present).max(axis=2, initial=0.0)
+    return np.asarray(apart.min(axis=1) < SAME_RAD)
 
 
 @dataclass(frozen=True)
@@ -147,11 +157,11 @@ def separating_poses(
     first = context.run == problem.runs[0]
     present = _rows(fit, group, np.flatnonzero(first))
     pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
-    selection = select_poses(pairs, len(problem.runs))
+    numbers = np.unique(new.run)
+    selection = select_poses(pairs, len(problem.runs), _is_measured(grid[numbers], context))
     together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
     setups = _second_setups(fit, group, present, coefficients, selection.alike, strokes)
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
-    numbers = np.unique(new.run)
     poses = tuple(
         {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
     )
