@@ -23,6 +23,7 @@ class AdviceKind(Enum):
     SWAPPED_TABLES = "swapped_tables"
     MORE_ANGLES = "more_angles"
     MORE_INDEXATIONS = "more_indexations"
+    BAR_DIRECTION = "bar_direction"
     MORE_FACES = "more_faces"
     PIECE_PLANES = "piece_planes"
     MORE_MODULES = "more_modules"
@@ -47,9 +48,10 @@ _CAUSES = frozenset({
 class Advice:
     """What a plan would have to do for parameters that one run cannot separate.
 
-    ``names`` are the axes, targets, planes or parameters that the advice is of, ``meanings`` what a boundary condition
-    of each name fixes, in English; ``count`` is how many modules are needed or angles were there, ``run`` the run
-    that lacks a target. ``text`` belongs to OWN_WORDS.
+    ``names`` are the axes, targets, planes or parameters that the advice is of (of BAR_DIRECTION the rotary axis, the
+    gain along it and those across), ``meanings`` what a boundary condition of each name fixes, in English; ``count`` is
+    how many modules are needed or angles were there, ``run`` the run that lacks a target. ``text`` belongs to
+    OWN_WORDS.
     """
 
     kind: AdviceKind

@@ -14,6 +14,7 @@ from monitor.reporting.runs_that_tell import (
     MOVED_ONCE,
     NO_POSE_TELLS,
     WHO_MOVED,
+    further_runs,
     more_runs,
     poses_that_tell,
     runs_in_reversed_order,
@@ -233,7 +234,7 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
     if tie.broken_by is TieBreak.MORE_POSES:
         return f"to tell {rivals} apart, measure {poses_that_tell(tie.axes, (effect, *tie.rivals))}"
     if tie.setup is not None:
-        return f"no pose of this set-up tells {rivals} apart: measure a run more {IN_WORDS[tie.setup]}"
+        return f"no pose of this set-up tells {rivals} apart: {further_runs(tie.runs or 1)} {IN_WORDS[tie.setup]}"
     return (
         f"no touch of these targets tells {rivals} apart: they move the tip alike, and one correction serves both "
         "with this stylus"

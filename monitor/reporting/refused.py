@@ -86,11 +86,15 @@ def _advice(advice: Advice, say: Texts) -> str:
     key, several = f"sentences.{advice.kind.value}", f"sentences.{advice.kind.value}_several"
     # What a condition fixes is stored in English.
     meanings = (advice.meanings or ()) if say.language == ENGLISH else ()
+    axis, along, *across = (*advice.names, "", "")
     conditions = [f"{name} = 0 ({meaning})" for name, meaning in zip(advice.names, meanings, strict=False)]
     return say(
         several if len(advice.names) > 1 and several in say.sentences else key,
         names=", ".join(advice.names),
         joined=_joined(advice.names, "both", say),
+        axis=axis,
+        along=along,
+        across=_joined([name for name in across if name], "both", say),
         planes=_joined(advice.names, "planes", say),
         conditions="; ".join(conditions or [f"{name} = 0" for name in advice.names]),
         count=advice.count,

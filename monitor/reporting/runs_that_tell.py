@@ -41,7 +41,12 @@ NO_POSE_TELLS = "no pose that this machine reaches tells"
 
 def more_runs(runs: int) -> str:
     """Return how many ``runs`` more tell effects apart which the poses do not, or not yet."""
-    return f"measure {runs} {'run' if runs == 1 else 'runs'} more at the present poses"
+    return f"{further_runs(runs)} at the present poses"
+
+
+def further_runs(runs: int) -> str:
+    """Return how many ``runs`` more to measure."""
+    return f"measure {runs} {'run' if runs == 1 else 'runs'} more"
 
 
 def runs_in_reversed_order(runs: int) -> str:

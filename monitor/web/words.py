@@ -16,6 +16,7 @@ from monitor.reporting.runs_that_tell import (
     MOVED_ONCE,
     NO_POSE_TELLS,
     WHO_MOVED,
+    further_runs,
     more_runs,
     poses_that_tell,
     runs_in_reversed_order,
@@ -321,7 +322,7 @@ def what_breaks(tie: Tie) -> str:
         TieBreak.REVERSED_ORDER: runs_in_reversed_order(tie.runs or 1),
         TieBreak.MORE_POSES: f"measure {poses_that_tell(tie.axes, tie.rivals)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
-        TieBreak.SETUP: f"measure a run more {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
+        TieBreak.SETUP: f"{further_runs(tie.runs or 1)} {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
         TieBreak.NOTHING: (
             "no touch of these targets does: they move the tip alike, and one correction serves both with this stylus"
         ),

@@ -10,8 +10,8 @@ from by_path import simulator
 
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.separation import separate
-from monitor.discovery.machine.separation.distances import Pair, distance_of
-from monitor.discovery.machine.separation.setups import decides, of_effects, setups_of
+from monitor.discovery.machine.separation.distances import Pair, distance_of, select_poses
+from monitor.discovery.machine.separation.setups import of_effects, runs_that_decide, setups_of
 from monitor.effects import parse_effect
 from monitor.machine import parse_topology
 from monitor.methods.samba.method import problem_of
@@ -107,8 +107,8 @@ def test_another_stylus_is_named_where_no_pose_tells_a_tilt_from_a_shift():
         return rows(setup, length_mm).T @ rows(setup, length_mm)
 
     one, other, same = products(0, 120.0), products(1, 170.0), products(1, 120.0)
-    assert not decides(Pair((0, 1), one, same[None]), 3, runs=4)
-    assert decides(Pair((0, 1), one, other[None]), 3, runs=4)
+    assert runs_that_decide(Pair((0, 1), one, same[None]), 3, runs=4) is None
+    assert runs_that_decide(Pair((0, 1), one, other[None]), 3, runs=4) == 1
     nothing = np.zeros((40, 3))
     free = np.block(
         [[own[0], nothing, direction[:, None]], [nothing, own[1], direction[:, None]]],
@@ -117,6 +117,28 @@ def test_another_stylus_is_named_where_no_pose_tells_a_tilt_from_a_shift():
     left = tilt - free @ np.linalg.lstsq(free, tilt, rcond=None)[0]
     apart = distance_of(of_effects(one, 3) + of_effects(other, 3), 4)
     assert apart == pytest.approx(2.0 * np.linalg.norm(left), rel=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.6, 0.8])
+def test_so_many_runs_are_asked_as_tell_apart_beside_the_present_ones(noise):
+    """Against least squares of eight runs with one stylus and so many with a longer one, each with its own unknowns."""
+    rng = np.random.default_rng(6)
+    direction, own = rng.choice([-1.0, 1.0], 40), rng.standard_normal((40, 3))
+    rows = [np.column_stack([own, direction, 8e-3 * length * direction]) / noise for length in (120.0, 170.0)]
+    one, other = (each.T @ each for each in rows)
+    runs = runs_that_decide(Pair((0, 1), one, other[None]), 3, runs=8)
+
+    def apart(more):
+        setups = [rows[0]] * 8 + [rows[1]] * more
+        free = np.zeros((40 * len(setups), 3 * len(setups) + 1))
+        for index, each in enumerate(setups):
+            free[40 * index : 40 * index + 40, 3 * index : 3 * index + 3] = each[:, :3]
+            free[40 * index : 40 * index + 40, -1] = each[:, 3]
+        tilt = np.concatenate([each[:, 4] for each in setups])
+        return np.linalg.norm(tilt - free @ np.linalg.lstsq(free, tilt, rcond=None)[0])
+
+    assert 1 < runs < 8
+    assert apart(runs - 1) < 5.0 <= apart(runs)
 
 
 def test_set_ups_move_the_tip_or_the_targets():
@@ -189,3 +211,22 @@ def test_a_second_set_up_that_reaches_no_pose_is_none(virtual_campaigns, monkeyp
     moved = next(iter(setups_of(fitted.problem.context.chain, np.zeros(3))))
     assert separate._pairs_in(moved, fitted, effects, None, np.array([1e-3]), {}) == []
     assert separate.separating_poses(fitted, effects[0], np.array([1e-3]), effects[1:]) == separate.NO_POSES
+
+
+def test_no_pose_is_offered_twice_nor_one_that_the_plan_has(virtual_campaigns):
+    context = problem_of(virtual_campaigns.on_machine("one rotary table", 7)[0]).context
+    turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+    measured = separate._is_measured(
+        np.concatenate([context.positions[:5], context.positions[:5] + 0.1]), context
+    )
+    assert measured[:5].all()
+    beside = np.abs(context.positions[:5, None, turning] + 0.1 - context.positions[:, turning]).max(axis=2)
+    np.testing.assert_array_equal(measured[5:], beside.min(axis=1) < np.radians(0.5))
+    rng = np.random.default_rng(3)
+    rows = [scale * rng.standard_normal((12, 3)) for scale in (0.05, 2.0, 1.5, 1.0, 0.8)]
+    pair = Pair((0, 1), rows[0].T @ rows[0], np.stack([each.T @ each for each in rows[1:]]))
+    nothing = np.zeros(4, dtype=bool)
+    first, *others = select_poses([pair], 1, nothing).poses
+    assert first not in others
+    assert first not in select_poses([pair], 1, np.arange(4) == first).poses
+    assert select_poses([pair], 1, ~nothing).poses == ()

@@ -13,8 +13,9 @@ from monitor.discovery.machine.mistakes.column_mistakes import column_mistakes
 from monitor.discovery.machine.mistakes.cures import cured_rms
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.samba.method import problem_of
+from monitor.methods.samba.method import METHOD, problem_of
 from monitor.readers import read_campaign
+from monitor.refusal import Advice, AdviceKind
 from monitor.workflow.identify.mistaken_columns import refusal_of
 
 BALLS = {
@@ -83,6 +84,20 @@ def test_gains_that_no_reading_tells_apart_stay_small(tmp_path: Path, balls) -> 
         solution.local_covariance[:, problem.base_names.index("EA0B"), problem.base_names.index("EA0B")]
     )
     assert np.all(np.abs(np.abs(angle) - TILT) < 4.0 * u)
+
+
+ACROSS = {**BALLS, "S2": (-20.0, 40.0, 60.0)}
+
+
+@pytest.mark.parametrize(
+    ("balls", "none"), [(BALLS, {"EXX", "EYY", "EZZ"}), (ALONG, {"EXX", "EZZ"}), (ACROSS, {"EYY"})]
+)
+def test_the_advice_is_a_bar_that_lies_otherwise(tmp_path: Path, balls, none) -> None:
+    """Which gains a bar gives is what the fit gives with it."""
+    found = METHOD.identify(campaign(tmp_path / "c", balls, runs=1))
+    (refused,) = found.runs[0].refused
+    assert set(refused.parameters) == none
+    assert refused.reason.advice == Advice(AdviceKind.BAR_DIRECTION, ("B", "EYY", "EXX", "EZZ"))
 
 
 def test_a_longer_stylus_moves_the_tip_and_no_ball(tmp_path: Path) -> None:

@@ -112,6 +112,18 @@ REFUSALS = [
     ),
     (
         Refusal(
+            ("EXX", "EZZ"),
+            Reason(
+                ReasonKind.NOT_SEPARATED, (), Advice(AdviceKind.BAR_DIRECTION, ("B", "EYY", "EXX", "EZZ"))
+            ),
+        ),
+        "with this plan EXX and EZZ cannot be told apart; no more angles of B tell a length: a bar across B gives EXX "
+        "and EZZ, a bar along it EYY",
+        "mit diesem Messplan nicht voneinander zu trennen: EXX und EZZ; weitere Winkel von B geben keine Länge: ein "
+        "Maßstab quer zu B gibt EXX und EZZ, einer längs dazu EYY",
+    ),
+    (
+        Refusal(
             tuple(f"EXX({place})" for place in range(9)),
             Reason(ReasonKind.NOT_SEPARATED, ("lattice",), Advice(AdviceKind.PIECE_PLANES, ("XY", "YZ"))),
         ),

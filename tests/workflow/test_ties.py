@@ -35,7 +35,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POSES = Separation(({"C": 0.5},), 0.1, 12.0, (("EXC:harmonic2", "EYC:harmonic2"),))
 STYLUS = Separation(
     (), 0.0, 0.0, (("EAY:reversal", "EYY:reversal"), ("EAY:reversal", "EZY:reversal")),
-    (SecondSetup.LONGER_STYLUS, None),
+    ((SecondSetup.LONGER_STYLUS, 3), None),
 )  # fmt: skip
 NONE = Separation((), 0.0, 0.0)
 
@@ -51,7 +51,7 @@ NONE = Separation((), 0.0, 0.0)
         (
             "EAY:reversal", STYLUS, ("EYY:reversal", "EZY:reversal"),
             (
-                Tie(("EYY:reversal",), TieBreak.SETUP, setup=SecondSetup.LONGER_STYLUS),
+                Tie(("EYY:reversal",), TieBreak.SETUP, runs=3, setup=SecondSetup.LONGER_STYLUS),
                 Tie(("EZY:reversal",), TieBreak.NOTHING),
             ),
         ),

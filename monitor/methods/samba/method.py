@@ -93,11 +93,27 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
         return Advice(AdviceKind.NOT_PROBED, tuple(missing), run=run)
     still = still_joints(problem, run, "rotary", "spindle")
     if not still:
-        return Advice(AdviceKind.MORE_INDEXATIONS)
+        return _of_bar(problem, parameters) or Advice(AdviceKind.MORE_INDEXATIONS)
     spindle = next((joint.name for joint in still if joint.kind == "spindle"), None)
     if spindle is not None and any(name.endswith(f"0{spindle}") for name in parameters):
         return Advice(AdviceKind.SPINDLE_STILL, (spindle,))
     return Advice(AdviceKind.AXIS_STILL, tuple(joint.name for joint in still))
+
+
+def _of_bar(problem: ChainProblem, parameters: tuple[str, ...]) -> Advice | None:
+    """Which way a bar would have to lie for gains that one rotary axis cannot tell, whatever its angles: it compares
+    the scales across it with each other, and a length with none. None where that is not what is missing."""
+    turning = [joint for joint in problem.context.chain.joints if joint.turns]
+    gains = {
+        effect.joint.main: effect.term.symbol
+        for effect in problem.base
+        if isinstance(effect, ChainEffect) and effect.is_gain
+    }
+    if len(turning) != 1 or len(gains) != 3 or not set(parameters) <= _gains(problem):
+        return None
+    (axis,) = turning
+    across = sorted(symbol for main, symbol in gains.items() if main != axis.main)
+    return Advice(AdviceKind.BAR_DIRECTION, (axis.name, gains[axis.main], *across))
 
 
 def _bar_ends_missing(problem: ChainProblem, run: int) -> list[str]:

@@ -47,7 +47,7 @@ class TieBreak(Enum):
     MORE_POSES = "more_poses"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
     INSTRUMENT = "instrument"
-    #: No pose of the present set-up does; another stylus does, or targets that stand elsewhere (``setup``).
+    #: No pose of the present set-up does; ``runs`` with another stylus do, or with targets elsewhere (``setup``).
     SETUP = "setup"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
@@ -73,33 +73,39 @@ class Tie:
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) -> tuple[Tie, ...]:
     """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_planned`` says that
     `monitor plan --separate` selects poses for the campaign."""
-    actions: dict[
-        tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None, int | None], list[str]
-    ] = {}
+    actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...], SecondSetup | None], list[str]] = {}
     in_order = dict(effect.separation.by_order)
+    runs: dict[tuple[TieBreak, SecondSetup | None], int] = {}
     for rival in rivals:
         kind, drivers, axes = _action(effect, rival)
-        setup = _setup(effect, rival) if kind is TieBreak.NOTHING else None
-        if setup is not None:
-            kind = TieBreak.SETUP
+        setup, wanted = None, None
+        if kind is TieBreak.NOTHING and (anew := _setup(effect, rival)) is not None:
+            kind, (setup, wanted) = TieBreak.SETUP, anew
         if kind is not TieBreak.DRIVERS and any(map(is_of_instrument, (effect.effect, rival))):
-            kind, drivers, axes = TieBreak.INSTRUMENT, (), ()
-        runs = in_order.get(rival) if kind is TieBreak.PLAN else None
-        if runs is not None:
-            kind = TieBreak.REVERSED_ORDER
+            kind, drivers, axes, setup, wanted = TieBreak.INSTRUMENT, (), (), None, None
+        if kind is TieBreak.PLAN and rival in in_order:
+            kind, wanted = TieBreak.REVERSED_ORDER, in_order[rival]
         if kind is TieBreak.PLAN and not is_planned:
             kind, axes = TieBreak.MORE_POSES, axes_of(effect.effect, rival)
-        actions.setdefault((kind, drivers, axes, setup, runs), []).append(rival)
+        if wanted is not None:
+            runs[kind, setup] = max(wanted, runs.get((kind, setup), 0))
+        actions.setdefault((kind, drivers, axes, setup), []).append(rival)
     return tuple(
         Tie(
-            tuple(names), kind, drivers, axes, kind is TieBreak.DRIVERS and effect.within_runs, runs=runs, setup=setup
+            tuple(names),
+            kind,
+            drivers,
+            axes,
+            kind is TieBreak.DRIVERS and effect.within_runs,
+            runs.get((kind, setup)),
+            setup=setup,
         )
-        for (kind, drivers, axes, setup, runs), names in actions.items()
-    )  # fmt: skip
+        for (kind, drivers, axes, setup), names in actions.items()
+    )
 
 
-def _setup(effect: ChainMissing, rival: str) -> SecondSetup | None:
-    """The second set-up that tells a rival which no pose does."""
+def _setup(effect: ChainMissing, rival: str) -> tuple[SecondSetup, int] | None:
+    """The second set-up that tells a rival which no pose does, and in how many runs."""
     pairs = zip(effect.separation.together, effect.separation.setups, strict=False)
     return next((setup for pair, setup in pairs if {effect.effect, rival} == set(pair)), None)
 

@@ -100,8 +100,9 @@ def _unseen(nuisance: Array, columns: Array) -> Array:
     return hidden
 
 
-def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
-    """Select the poses, one after the other, that separate the closest pair most over a number of runs."""
+def select_poses(pairs: Sequence[Pair], runs: int, measured: npt.NDArray[np.bool_]) -> Selection:
+    """Select the poses, one after the other, that separate the closest pair most over a number of runs; none twice and
+    none that is ``measured`` (P,) already, since those are more runs and no other poses."""
     close = [pair for pair in pairs if distance_of(pair.present, runs) <= DECIDES]
     separable = [pair for pair in close if _is_separable(pair, runs)]
     alike = tuple(pair.effects for pair in close if not _is_separable(pair, runs))
@@ -110,11 +111,14 @@ def select_poses(pairs: Sequence[Pair], runs: int) -> Selection:
     grams = [pair.present for pair in separable]
     before = after = min(distance_of(gram, runs) for gram in grams)
     selected: list[int] = []
-    for _ in range(MOST_POSES):
+    is_open = ~measured
+    for _ in range(min(MOST_POSES, int(is_open.sum()))):
         each = [_distances(gram + pair.additions, runs) for gram, pair in zip(grams, separable, strict=True)]
         # The pair that is closest counts; what lies far enough apart already does not.
         closest = np.min(np.minimum(each, 2.0 * DECIDES), axis=0)
-        best = int((closest + 1e-9 * np.sum(np.minimum(each, 1e3 * DECIDES), axis=0)).argmax())
+        gained = closest + 1e-9 * np.sum(np.minimum(each, 1e3 * DECIDES), axis=0)
+        best = int(np.where(is_open, gained, -1.0).argmax())
+        is_open[best] = False
         selected.append(best)
         grams = [gram + pair.additions[best] for gram, pair in zip(grams, separable, strict=True)]
         after = min(float(distances[best]) for distances in each)

@@ -17,7 +17,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.separation.aliases import whitened
 from monitor.discovery.machine.separation.distances import DECIDES, PlanRows, distance_of, pairs_of
-from monitor.discovery.machine.separation.setups import Moved, decides, of_effects, setups_of
+from monitor.discovery.machine.separation.setups import Moved, of_effects, runs_that_decide, setups_of
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context
 from monitor.effects.shapes.free import Free, parts_of_axis
@@ -41,9 +41,10 @@ def second_ball(
     coefficients: Array,
     rival: ChainEffect,
     strokes: Mapping[str, tuple[float, float]],
-) -> SecondSetup | None:
+) -> tuple[SecondSetup, int] | None:
     """The easiest second set-up of a campaign's R-test that tells an effect of the given coefficients (k,) from a rival
-    which the present plan leaves close; None where none does, or where the campaign has no R-test.
+    which the present plan leaves close, and how many runs in it do; None where none does, or where the campaign has no
+    R-test.
 
     ``strokes`` gives the range of axes in mm or rad where the machine file has one. Drifts and scales of the second
     set-up are taken as known.
@@ -63,8 +64,9 @@ def second_ball(
         (pair,) = pairs_of(present, fresh, np.zeros(len(new), dtype=np.int64), coefficients)
         if distance_of(of_effects(pair.present, unknowns), runs) >= DECIDES:
             return None
-        if decides(pair, unknowns, runs):
-            return moved.setup
+        more = runs_that_decide(pair, unknowns, runs)
+        if more is not None:
+            return moved.setup, more
     return None
 
 

@@ -20,7 +20,7 @@ from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
 from monitor.discovery.machine.separation.orders import runs_in_reversed_order
 from monitor.discovery.machine.separation.second_ball import second_ball
-from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
+from monitor.discovery.machine.separation.setups import Moved, runs_that_decide, setups_of
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always, EachRun, RunTime
 from monitor.effects.drivers.gravity import Gravity
@@ -31,6 +31,8 @@ from monitor.records import Array, SecondSetup
 
 # The grid of rotary positions; finer ones change the choice, not what it achieves.
 STEP_RAD = np.pi / 6.0
+# Half a degree beside a pose is that pose.
+SAME_RAD = np.radians(0.5)
 # A spindle is oriented to any angle: quarters of a turn for its base parameters, eighths for its harmonics.
 QUARTERS, EIGHTHS = 4, 8
 # Effects of a group that are separated from each other, the most convincing ones: groups of 5 300 campaigns had ten at
@@ -46,14 +48,15 @@ STRETCH = 1.25
 class Separation:
     """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
     the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
-    separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, None where none
-    does. ``by_order`` are rivals that the plan in the reversed order tells, with how many runs of it do."""
+    separates; they do not count beside others. ``setups`` are second set-ups that separate such pairs, with how many
+    runs in them do, None where none does. ``by_order`` are rivals that the plan in the reversed order tells, with how
+    many runs of it do."""
 
     poses: tuple[dict[str, float], ...]
     before: float
     after: float
     together: tuple[tuple[str, str], ...] = ()
-    setups: tuple[SecondSetup | None, ...] = ()
+    setups: tuple[tuple[SecondSetup, int] | None, ...] = ()
     by_order: tuple[tuple[str, int], ...] = ()
 
 
@@ -81,6 +84,14 @@ def _positions(
     if high <= low:
         return np.array([low])
     return np.linspace(low, high, max(int((high - low) / STEP_RAD) + 1, 2))
+
+
+def _is_measured(grid: Array, context: Context) -> npt.NDArray[np.bool_]:
+    """Mark the rotary positions (P, J) of a grid at which the plan already touches; more runs repeat those."""
+    turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+    present = np.unique(np.round(context.positions[:, turning], 6), axis=0)
+    apart = np.abs(grid[:, None, turning] - present).max(axis=2, initial=0.0)
+    return np.asarray(apart.min(axis=1) < SAME_RAD)
 
 
 @dataclass(frozen=True)
@@ -149,11 +160,11 @@ def separating_poses(
     first = context.run == problem.runs[0]
     present = _rows(fit, group, np.flatnonzero(first))
     pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
-    selection = select_poses(pairs, len(problem.runs))
+    numbers = np.unique(new.run)
+    selection = select_poses(pairs, len(problem.runs), _is_measured(grid[numbers], context))
     together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
     setups = _second_setups(fit, group, present, coefficients, selection.alike, strokes)
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
-    numbers = np.unique(new.run)
     poses = tuple(
         {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
     )
@@ -170,7 +181,7 @@ def _by_other_means(
     """What is known of rivals where no poses are selected: which nothing tells, which a second set-up of an R-test
     does, and which of the rest another order."""
     context = fit.problem.context
-    setups: dict[tuple[str, str], SecondSetup | None] = {}
+    setups: dict[tuple[str, str], tuple[SecondSetup, int] | None] = {}
     orders: dict[str, int | None] = {}
     for index, rival in enumerate(rivals):
         pair, setup = (effect.text, rival.text), None
@@ -198,18 +209,21 @@ def _second_setups(
     coefficients: Array,
     alike: Sequence[tuple[int, int]],
     strokes: Mapping[str, tuple[float, float]],
-) -> tuple[SecondSetup | None, ...]:
-    """For each pair that no pose separates the easiest second set-up that does, at the poses of the present plan."""
-    told_apart: dict[tuple[int, int], SecondSetup] = {}
+) -> tuple[tuple[SecondSetup, int] | None, ...]:
+    """For each pair that no pose separates the easiest second set-up that does, at the poses of the present plan, and
+    in how many runs."""
+    told_apart: dict[tuple[int, int], tuple[SecondSetup, int]] = {}
     if not alike:
         return ()
     tip = fit.problem.own_of(fit.solution.local)[0, -3:]
     for moved in setups_of(fit.problem.context.chain, tip):
         pairs = _pairs_in(moved, fit, group, present, coefficients, strokes)
         for pair in pairs:
-            is_open = pair.effects in alike and pair.effects not in told_apart
-            if is_open and decides(pair, present.nuisance.shape[-1], len(fit.problem.runs)):
-                told_apart[pair.effects] = moved.setup
+            if pair.effects not in alike or pair.effects in told_apart:
+                continue
+            runs = runs_that_decide(pair, present.nuisance.shape[-1], len(fit.problem.runs))
+            if runs is not None:
+                told_apart[pair.effects] = (moved.setup, runs)
         if len(told_apart) == len(alike):
             break
     return tuple(told_apart.get(pair) for pair in alike)

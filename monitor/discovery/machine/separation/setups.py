@@ -58,13 +58,16 @@ def setups_of(chain: Chain, tip: Array) -> list[Moved]:
     ]
 
 
-def decides(pair: Pair, unknowns: int, runs: int) -> bool:
-    """Whether as many runs in the second set-up, whose products are the additions of a pair, tell its effects apart;
-    the first ``unknowns`` belong to each set-up by itself."""
+def runs_that_decide(pair: Pair, unknowns: int, runs: int) -> int | None:
+    """How many runs in the second set-up, whose products are the additions of a pair, tell its effects apart beside the
+    present ``runs``, no more than these; None where none do. The first ``unknowns`` belong to each run by itself."""
     present = of_effects(pair.present, unknowns)
-    both = present + of_effects(pair.additions.sum(axis=0), unknowns)
-    after = distance_of(both, runs)
-    return after >= DECIDES and after >= WORTHWHILE * distance_of(present, runs)
+    added = of_effects(pair.additions.sum(axis=0), unknowns)
+    wanted = max(DECIDES, WORTHWHILE * distance_of(present, runs))
+    return next(
+        (more for more in range(1, runs + 1) if distance_of(runs * present + more * added, 1) >= wanted),
+        None,
+    )
 
 
 def of_effects(products: Array, unknowns: int) -> Array:
