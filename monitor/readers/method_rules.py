@@ -22,7 +22,8 @@ class Plan:
     """What was probed, for a method to judge.
 
     ``probings`` are the rows that could be read (n), ``lines`` the line of each in the file (n,), ``runs`` the
-    runs without a damaged row: only these may be judged, ``turning`` the rotary axes and the spindle.
+    runs without a damaged row: only these may be judged, ``turning`` the rotary axes and the spindle. ``is_whole``:
+    every row could be read, so that what has none there has none in the file.
     """
 
     file: str
@@ -31,6 +32,7 @@ class Plan:
     runs: tuple[int, ...]
     turning: tuple[str, ...]
     artefact: Artefact
+    is_whole: bool = True
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from monitor.exceptions import CampaignError
 from monitor.readers import doubts, read_campaign
 from monitor.records import Array, Campaign
 from monitor.workflow.tool_frames import tool_frames
@@ -77,4 +78,16 @@ def test_a_tip_that_the_axes_keep_in_place_is_not_read_in_metres(tmp_path: Path,
 
 def test_points_in_metres_are_named_where_the_axes_moved_the_tip(tmp_path: Path) -> None:
     (sentence,) = told(tmp_path, anywhere(), anywhere() / 1000.0)
-    assert "point_x_mm, point_y_mm and point_z_mm span 0.39" in sentence
+    assert "point_x_mm, point_y_mm and point_z_mm of setup p span 0.39" in sentence
+
+
+def test_a_setup_whose_rows_cannot_be_read_is_not_said_to_have_none(tmp_path: Path) -> None:
+    """Was: "setup 'p' has no row in probings.csv" beside forty faults of its forty rows."""
+    told(tmp_path, anywhere(), anywhere())
+    file = tmp_path / "probings.csv"
+    header, *rows = file.read_text(encoding="utf-8").splitlines()
+    spoilt = [",".join([*row.split(",")[:5], "1:2", *row.split(",")[6:]]) for row in rows]
+    file.write_text("\n".join([header, *spoilt]) + "\n", encoding="utf-8")
+    with pytest.raises(CampaignError, match="'1:2' is not a number") as refused:
+        read_campaign(tmp_path)
+    assert {fault.file for fault in refused.value.faults} == {"probings.csv"}

@@ -133,7 +133,10 @@ def _check_plan(head: Head, part: probings_file.ProbingsPart, faults: Faults) ->
         return
     intact = set(part.probings.run.tolist()) - part.damaged_runs
     turning = tuple(axis.name for axis in head.machine.axes if axis.kind != "linear")
-    plan = Plan(probings_file.FILE, part.probings, part.lines, tuple(sorted(intact)), turning, head.artefact)
+    plan = Plan(
+        probings_file.FILE, part.probings, part.lines, tuple(sorted(intact)), turning, head.artefact,
+        is_whole=not part.damaged_runs,
+    )  # fmt: skip
     faults.extend(head.rules.check(plan))
 
 

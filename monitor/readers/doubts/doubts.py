@@ -116,19 +116,24 @@ def _travel(campaign: Campaign, frames: ToolFrames | None) -> Iterator[str]:
             if machine.is_linear(axis)
         },
         {name: values for name, values in probings.channels.items() if name.startswith("tracker_")},
-        *(() if frames is None else _points_of_setups(campaign, frames)),
     )
-    for columns in groups:
-        spans = _spans(columns)
-        largest = max(spans.values(), default=0.0)
-        if 0.0 < largest < SHORTEST_TRAVEL:
-            yield (
-                f"{and_of(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
-            )
+    notes = [_span_in_metres(columns, "") for columns in groups]
+    of_setups = {} if frames is None else dict(_points_of_setups(campaign, frames))
+    notes += [_span_in_metres(columns, f" of setup {setup}") for setup, columns in of_setups.items()]
+    yield from filter(None, notes)
 
 
-def _points_of_setups(campaign: Campaign, frames: ToolFrames) -> Iterator[dict[str, Array]]:
-    """The columns of points that each setup read, of its own rows, where the axes moved every point of the tool.
+def _span_in_metres(columns: dict[str, Array], of: str) -> str:
+    """What is said of columns that span so little as if they were in metres; nothing of others."""
+    spans = _spans(columns)
+    largest = max(spans.values(), default=0.0)
+    if not 0.0 < largest < SHORTEST_TRAVEL:
+        return ""
+    return f"{and_of(spans)}{of} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
+
+
+def _points_of_setups(campaign: Campaign, frames: ToolFrames) -> Iterator[tuple[str, dict[str, Array]]]:
+    """The setups and the columns of points that each read of its own rows, where the axes moved all points of the tool.
 
     Axes that turn a head about its tip keep that in place (ISO 10791-6): a camera reads micrometres there.
     """
@@ -144,7 +149,7 @@ def _points_of_setups(campaign: Campaign, frames: ToolFrames) -> Iterator[dict[s
             apart(frames(mine[probings.run[mine] == run])) > SHORTEST_TRAVEL
             for run in np.unique(probings.run[mine])
         ):
-            yield columns
+            yield setup.id, columns
 
 
 def _places(campaign: Campaign) -> Iterator[str]:

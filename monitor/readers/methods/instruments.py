@@ -40,9 +40,10 @@ def check(plan: Plan) -> Iterable[Fault]:
         rows = np.flatnonzero(number == index)
         form = FORMATS[setup.reading]
         if not len(rows):
-            yield Fault(
-                "campaign.toml", None, "setups", f"setup {quoted(setup.id)} has no row in {plan.file}"
-            )
+            # Its rows may be those that could not be read, of which each has its own fault.
+            if plan.is_whole:
+                message = f"setup {quoted(setup.id)} has no row in {plan.file}"
+                yield Fault("campaign.toml", None, "setups", message)
             continue
         if setup.along is not None and setup.along not in plan.probings.readings:
             axes = ", ".join(plan.probings.readings)

@@ -138,12 +138,16 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
 
 
 def _same_drift(effect: MachineEffect, chain: Chain) -> list[ChainVariant]:
-    """A drift of an axis as the same drift of every other: the catalogue has few of them, and one may stand for all."""
+    """A drift of an axis as the same drift of every other: the catalogue has few of them, and one may stand for all.
+
+    The growth of a spindle is told as that: it is what warms up first there.
+    """
     if (
         not isinstance(effect, ChainEffect)
         or not isinstance(effect.shape, Const)
         or isinstance(effect.driver, Always | Gravity)
         or effect.term.stage != MOTION
+        or effect.joint.kind == "spindle"
     ):
         return []
     names = [joint.name for joint in chain.joints if joint != effect.joint]
