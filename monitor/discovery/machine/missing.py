@@ -15,6 +15,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.discovery.machine.shapes.curves import Curve
+from monitor.discovery.machine.shapes.held_place import HeldPlace, held_place
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
@@ -50,7 +51,7 @@ class ChainMissing(Missing):
     the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
-    is the absolute value of.
+    is the absolute value of. ``held`` is where a plate that grows is held, by axis.
     """
 
     held_out_days_before: float | None
@@ -66,6 +67,7 @@ class ChainMissing(Missing):
     unit: Unit | None = None
     within_runs: bool = False
     largest: str | None = None
+    held: tuple[HeldPlace, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -304,6 +306,7 @@ def _missing(
         nearest=candidate.variant.nearest,
         curve=size.curve,
         largest=size.largest,
+        held=held_place(scene, candidate, except_for(selection.candidates, index)),
     )
 
 
