@@ -273,6 +273,12 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(f"   {_searched(effect.searched)}")
     for step in effect.steps or ():
         output.say(f"   {_step_words(effect, step)}")
+    if effect.held_at is not None:
+        places = (
+            f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"
+            for held in effect.held_at
+        )
+        output.say(f"   held at {', '.join(places)}")
     if effect.travelled_periods is not None:
         output.say(
             f"   the axis turned {effect.travelled_periods:.2f} of its period: over less than 1.5 it is a smooth bend, "

@@ -74,6 +74,17 @@ def test_a_wave_of_fewer_than_two_periods_is_a_free_shape(tmp_path: Path, seed: 
     assert missing.effect.startswith("EYY:free(")
 
 
+def test_of_pitches_that_are_one_at_the_positions_the_longest_leads(tmp_path: Path) -> None:
+    """A wave of 200 mm was one of 173.5 mm: 1/93 - 1/200 = 1/173.8. It is named with it now."""
+    wave = lambda part: 6e-3 * np.sin(2.0 * np.pi * 279.0 * part / 200.0 + 0.7)  # noqa: E731
+    (missing,) = found_in(part_of_70(tmp_path / "part", 3, wave)).missing
+    assert missing.searched is not None
+    assert missing.searched.u is not None
+    assert abs(missing.searched.value - 200.0) < 3.0 * missing.searched.u
+    assert missing.searched.value > 2.0 * 93.0
+    assert "EYY:cyclic173.5" in {rival.effect[:15] for rival in missing.rivals}
+
+
 def tracked_machine_with_a_bump(folder: Path, seed: int) -> Path:
     """Three axes read by a tracker at 231 poses of two runs, Y at seven positions 93 mm apart; Y has the bump, and the
     frame warms up by 3 K, of which nothing moves."""

@@ -72,6 +72,9 @@ def test_two_axes_that_grow_alike_are_the_part(
     assert missing.effect.endswith(")@plate_degC")
     # What is stated of the points grows less by as much: the coefficient is of the statement.
     assert 1e6 * abs(missing.amplitude) == pytest.approx(11.5, abs=2.0)
+    assert {place.axis for place in missing.held} == {"X", "Y"}
+    for place in missing.held:
+        assert abs(place.reading - held["XY".index(place.axis)]) < 3.0 * place.u
     # That two screws grow alike is possible, where the part is held at the zeros of both.
     screws = {"EXX:poly1@plate_degC", "EYY:poly1@plate_degC"}
     assert (screws <= {rival.effect for rival in missing.rivals}) == (held == (0.0, 0.0))

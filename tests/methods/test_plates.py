@@ -147,8 +147,13 @@ def test_an_axis_that_stands_still_shows_no_lead(tmp_path: Path) -> None:
 def test_a_plate_that_grows_is_no_screw_that_warms_up(seed: int, tmp_path: Path) -> None:
     """Was: EYY:poly1@run_time alone."""
     (finding,) = missing(plate(tmp_path, seed, lambda x: np.zeros((len(x), 2)), growth=25e-6))
-    assert finding.effect.partition("(")[0].partition("@")[0] == "instrument:plate:expansion"
-    assert finding.effect.endswith("@run_time")
+    held = ",".join(f"{place.axis}={place.reading:g}" for place in finding.held)
+    assert finding.effect == f"instrument:plate:expansion{f'({held})' if held else ''}@run_time"
+    # It grows about (250, 200), the middle of its balls, as where no place is named; one that is named beside it says
+    # more than the middle, which chance does from some 3 u on.
+    for place in finding.held:
+        assert abs(place.reading - {"X": 250.0, "Y": 200.0}[place.axis]) < 4.0 * place.u
+        assert place.u < 100.0
     assert abs(finding.amplitude - 25e-6) < 4.0 * finding.u
 
 

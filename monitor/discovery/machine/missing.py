@@ -15,6 +15,7 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.discovery.machine.shapes.curves import Curve, follows
+from monitor.discovery.machine.shapes.held_place import HeldPlace, held_place
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.scale_steps import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -54,7 +55,8 @@ class ChainMissing(Missing):
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
     is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
-    of several. ``steps`` says between which readings each step of an error lies.
+    of several. ``steps`` says between which readings each step of an error lies, ``held`` where a plate that grows is
+    held, by axis.
     """
 
     held_out_days_before: float | None
@@ -72,6 +74,7 @@ class ChainMissing(Missing):
     largest: str | None = None
     error_peak: float | None = None
     steps: tuple[Between, ...] = ()
+    held: tuple[HeldPlace, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -315,6 +318,7 @@ def _missing(
         curve=size.curve,
         largest=size.largest,
         steps=steps_between(scene, candidate, except_for(selection.candidates, index)),
+        held=held_place(scene, candidate, except_for(selection.candidates, index)),
     )
 
 

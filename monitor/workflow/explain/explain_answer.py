@@ -31,6 +31,16 @@ class SearchedValue:
 
 
 @dataclass(frozen=True)
+class HeldAt:
+    """Where a plate that grows is held: the reading of a linear axis there."""
+
+    axis: str
+    value: float
+    u: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class DeviationsApart:
     """How many standard deviations apart two effects are with the present plan, and with the added poses."""
 
@@ -115,6 +125,7 @@ class MachineMissing:
     largest: str | None = field(default=None, metadata=OMITTED)
     error_peak_um: float | None = field(default=None, metadata=OMITTED)
     steps: tuple[StepBetween, ...] | None = field(default=None, metadata=OMITTED)
+    held_at: tuple[HeldAt, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

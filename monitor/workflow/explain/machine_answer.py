@@ -28,7 +28,7 @@ from monitor.reporting.machine_finding import (
     fits_too_well,
     machine_sentences,
 )
-from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, Unit
+from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, MILLIMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -36,6 +36,7 @@ from monitor.workflow.explain.explain_answer import (
     ChangedTarget,
     CurvePoint,
     DeviationsApart,
+    HeldAt,
     InstrumentAlias,
     MachineExplanation,
     MachineMissing,
@@ -172,6 +173,8 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
         largest=effect.largest,
         error_peak_um=micrometres(effect.error_peak),
+        held_at=tuple(HeldAt(held.axis, held.reading, held.u, MILLIMETRE.name) for held in effect.held)
+        or None,
         steps=_steps_between(effect),
     )
 

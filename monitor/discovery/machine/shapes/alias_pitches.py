@@ -40,8 +40,8 @@ def aliases_of(effect: MachineEffect, context: Context) -> list[ChainVariant]:
     none where positions lie anyhow, or where the longest has fewer than two periods there."""
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Cyclic):
         return []
-    told = effect.shape.pitch
-    others = [pitch for pitch in _alike(effect, context) if abs(pitch / told - 1.0) > SAME_PITCH]
+    pitch_found = effect.shape.pitch
+    others = [pitch for pitch in _alike(effect, context) if abs(pitch / pitch_found - 1.0) > SAME_PITCH]
     return [_with_pitch(effect, pitch) for pitch in others if pitch >= SHORTEST_PITCH_MM]
 
 

@@ -13,23 +13,21 @@ from itertools import combinations
 
 import numpy as np
 
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.free_parts import priced
+from monitor.discovery.machine.shapes.held_place import ARM_MM, held_at, with_shifts
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.search.amplitudes import amplitudes
-from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
 from monitor.effects import InstrumentEffect
 from monitor.effects.instrument.plate import PlateExpansion
-from monitor.records import Array
 
 #: Whether the second is believed beside the first.
 Accepts = Callable[[Sequence[ChainCandidate], ChainCandidate], bool]
 # A plate is held within this many travels of the axes about their middle, or its place is not seen.
 WITHIN_TRAVELS = 3.0
-ARM_MM = 1000.0
 
 
 def plate_instead(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tuple[ChainScene, ChainScan]:
@@ -82,24 +80,9 @@ def _held(
     middle = np.array([float(reading.min() + reading.max()) / 2.0 for _, reading in axes])
     travel = np.array([float(np.ptp(reading)) for _, reading in axes])
 
-    def at(readings: Array, tries: int = 1) -> ChainCandidate:
-        effect = plate.effect
-        assert isinstance(effect, InstrumentEffect)
-        assert isinstance(effect.change, PlateExpansion)
-        held = tuple(
-            (name, round(value, 1)) for (name, _), value in zip(axes, readings.tolist(), strict=True)
-        )
-        moved = replace(effect, change=replace(effect.change, held=held))
-        return scene_of(scene.fit, [Variant(moved.text, moved, tries)]).candidates[0]
-
-    about = at(middle)
-    columns = [about.columns]
-    for axis in range(len(axes)):
-        beside = middle.copy()
-        beside[axis] += ARM_MM
-        columns.append(at(beside).columns - about.columns)
-    together = replace(about, columns=np.concatenate(columns, axis=1))
-    growth, *shifts = amplitudes(scene, [*others, together]).estimate[-len(columns) :]
+    names = [name for name, _ in axes]
+    together = with_shifts(scene, plate, names, middle)
+    growth, *shifts = amplitudes(scene, [*others, together]).estimate[-len(axes) - 1 :]
     if not growth:
         return None
     best = middle + ARM_MM * np.array(shifts) / growth
@@ -107,4 +90,4 @@ def _held(
         return None
     # Each number of the place is at the price of a coefficient: half the logarithm of the degrees of freedom a try.
     dof = scene.degrees_of_freedom
-    return at(best, round(dof ** (len(axes) / 2.0)))
+    return held_at(scene, plate, names, best, round(dof ** (len(axes) / 2.0)))

@@ -14,6 +14,7 @@ from monitor.discovery.machine.shapes.variants import (
     TIME_CONSTANTS_S,
     frequency_step,
     longest_pitch,
+    pitch_limits,
     with_drivers,
 )
 from monitor.discovery.search.amplitudes import amplitudes
@@ -61,8 +62,7 @@ class Refined:
 @dataclass(frozen=True)
 class _Range:
     """A value that is searched: its name, unit and start, the half ``width`` of its range in the logarithm and the
-    tolerance there, the variant for any other value, and the nearest value that is likelier beforehand; none lies above
-    ``largest``."""
+    tolerance there, the variant for any other value, the nearest value that is likelier beforehand, and its limits."""
 
     name: str
     unit: str
@@ -71,7 +71,7 @@ class _Range:
     tolerance: float
     variant: Callable[[float], ChainVariant]
     likely: Callable[[float], float | None]
-    largest: float = float("inf")
+    limits: tuple[float, float] = (0.0, float("inf"))
 
 
 def _range_of(candidate: ChainCandidate) -> _Range | None:
@@ -93,7 +93,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
         return None
     if isinstance(effect.shape, Cyclic) and family.endswith(":cyclic"):
         pitch = effect.shape.pitch
-        travel = float(np.ptp(candidate.fit.problem.context.positions[:, effect.term.joint]))
+        shortest, travel = pitch_limits(candidate.fit.problem.context)[effect.joint.name]
         return _Range(
             "pitch",
             "mm",
@@ -102,7 +102,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
-            max(pitch, longest_pitch(travel)),
+            (min(shortest, pitch), max(pitch, longest_pitch(travel))),
         )
     if isinstance(effect.shape, WindUp):
         return _Range(
@@ -196,10 +196,12 @@ def _best_logarithm(badness: Callable[[float], float], searched: _Range) -> floa
         middle = float(widths[int(np.argmin([badness(width) for width in widths.tolist()]))])
         searched = replace(searched, width=float(widths[1] - widths[0]))
     for _ in range(MOST_BELOW_GRID if searched.unit == "min" else 1):
-        low, high = middle - searched.width, middle + searched.width
+        with np.errstate(divide="ignore"):
+            least, most = np.log(searched.limits).tolist()
+        low, high = max(middle - searched.width, least), middle + searched.width
         best = scipy.optimize.minimize_scalar(
             badness,
-            bounds=(low, min(high, float(np.log(searched.largest)))),
+            bounds=(low, min(high, most)),
             method="bounded",
             options={"xatol": searched.tolerance, "maxiter": 30},
         )
