@@ -18,7 +18,7 @@ from monitor.discovery.machine.shapes.curves import Curve
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
-from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, size_of, spread_or_length
+from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn, size_of, spread_or_length
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -51,7 +51,7 @@ class ChainMissing(Missing):
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
     is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
-    of several.
+    of several. ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre.
     """
 
     held_out_days_before: float | None
@@ -68,6 +68,7 @@ class ChainMissing(Missing):
     within_runs: bool = False
     largest: str | None = None
     error_peak: float | None = None
+    turns: bool = False
 
 
 @dataclass(frozen=True)
@@ -288,6 +289,7 @@ def _missing(
         amplitude=size.amplitude,
         u=size.u,
         peak=peak_of(scene, candidate, size.raw, coefficients),
+        turns=seen_as_turn(scene, size.raw @ coefficients),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,

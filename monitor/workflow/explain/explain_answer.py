@@ -65,7 +65,8 @@ class MachineMissing:
     that stand out beside it but not beside its error in any shape: they cannot be separated from it. ``refers_to``
     says in words what its coefficients are stated relative to, where it is an error of the chain. ``largest`` is the
     coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes. ``error_peak_um`` stands in
-    the first of several effects of one error of the chain: the largest displacement of all of them together.
+    the first of several effects of one error of the chain: the largest displacement of all of them together. Where rows
+    of angles alone show an effect, ``peak_urad`` is its largest turn, and displacements are on a lever of one metre.
     """
 
     rank: int
@@ -102,6 +103,7 @@ class MachineMissing:
     refers_to: str | None = field(default=None, metadata=OMITTED)
     largest: str | None = field(default=None, metadata=OMITTED)
     error_peak_um: float | None = field(default=None, metadata=OMITTED)
+    peak_urad: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

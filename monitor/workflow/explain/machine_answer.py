@@ -171,6 +171,7 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
         largest=effect.largest,
         error_peak_um=micrometres(effect.error_peak),
+        peak_urad=um(effect.peak) if effect.turns else None,
     )
 
 
