@@ -248,11 +248,10 @@ def _size_words(effect: MachineMissing) -> str:
 
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
     at = "tip" if explanation.target_word == "ball" else f"{explanation.target_word}s"
+    unit = "µm" if effect.peak_urad is None else "µrad"
+    p_and_q = f"{output.stated('p', effect.p_value)}, {output.stated('q', effect.q_value)}"
     output.say(f"{effect.rank}. {effect.effect}: {effect.description.meaning}")
-    output.say(
-        f"   {_size_words(effect)}, at most {effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
-        f"{output.stated('q', effect.q_value)}"
-    )
+    output.say(f"   {_size_words(effect)}, at most {effect.peak_um:.1f} {unit} at the {at}; {p_and_q}")
     if explanation.rate is not None and effect.q_value > explanation.rate:
         output.say(
             f"   q is that of the whole scan and above its rate of {explanation.rate:g}: this was asked for "
@@ -260,7 +259,9 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         )
     if effect.error_peak_um is not None:
         error = effect.effect.partition(":")[0]
-        output.say(f"   {error} with all of its effects: at most {effect.error_peak_um:.1f} µm at the {at}")
+        output.say(
+            f"   {error} with all of its effects: at most {effect.error_peak_um:.1f} {unit} at the {at}"
+        )
     if effect.refers_to is not None:
         output.say(f"   relative to: {effect.refers_to}")
     if effect.shape_unknown:

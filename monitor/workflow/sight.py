@@ -11,7 +11,8 @@ from monitor.discovery.machine.scene import DETECTABLE, scene_of
 from monitor.discovery.machine.sizes import peak_of
 from monitor.discovery.search.candidate import Variant
 from monitor.documents import OMITTED
-from monitor.effects import parse_effect
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes import Poly
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.reporting import rehearsal_words
@@ -30,7 +31,8 @@ class EffectSight:
     ``standard_deviations`` is its length in those of the readings; 0 for a blind spot, which the other errors of the
     model take up whole. ``certain_from_um`` is the largest displacement from which a search sees that something is
     missing; to name it among effects that are much alike may take more. None for a blind spot. ``told_um`` is the
-    peak that a search tells of it, beyond the constant and the straight line that the model takes up.
+    peak that a search tells of a power of a position, beyond the constant and the straight line that the model takes
+    up; None of other effects.
     """
 
     standard_deviations: float
@@ -68,8 +70,10 @@ def effect_sight(problem: ChainProblem, text: str, peak: float) -> EffectSight:
     shown = peak * float(np.linalg.norm(remaining))
     if shown < NOTHING:
         return EffectSight(0.0, None)
-    of_one = peak_of(scene, candidate, candidate.raw, np.ones(candidate.raw.shape[2]))
-    told_um = peak * of_one / largest / MICROMETRE.factor
+    told_um = None
+    if isinstance(effect, ChainEffect) and isinstance(effect.shape, Poly):
+        of_one = peak_of(scene, candidate, candidate.raw, np.ones(candidate.raw.shape[2]))
+        told_um = peak * of_one / largest / MICROMETRE.factor
     return EffectSight(shown, peak * DETECTABLE / shown / MICROMETRE.factor, told_um)
 
 

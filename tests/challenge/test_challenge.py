@@ -6,12 +6,21 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from by_path import load
 
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.sizes import peak_of, size_of
+from monitor.discovery.search.candidate import Variant
+from monitor.effects import parse_effect
+from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 
 HERE = Path(__file__).resolve().parent
+EXAMPLES = HERE.parents[1] / "examples"
+answerer = load("challenge_answer", HERE / "answer.py")
 generate = load("challenge_generate", HERE / "generate.py")
 scorer = load("challenge_score", HERE / "score.py")
 
@@ -77,3 +86,28 @@ def test_what_is_right_false_and_covered() -> None:
 def test_nothing_answered_is_nothing_found() -> None:
     result = scorer.score(TRUTH, [])
     assert (result.right, result.false, result.clean, result.hidden) == (0, 0, 3, 4)
+
+
+def test_the_peak_of_the_challenge_is_the_products_where_no_straight_line_takes_part() -> None:
+    """The challenge tells what an effect causes by itself; the product takes a constant and a line from powers."""
+    fitted = fit(problem_of(read_campaign(EXAMPLES / "hidden-reversal-x")))
+    texts = ("EXX:reversal", "EBB:harmonic2", "EXX:cyclic30mm", "EXX:poly2")
+    variants = [Variant(text, parse_effect(text, fitted.problem.context.chain)) for text in texts]
+    scene, parts = scene_of(fitted, variants), {}
+    for candidate in scene.candidates:
+        sizes = np.arange(1.0, candidate.raw.shape[2] + 1.0) * 1e-3
+        raw = size_of(candidate, sizes, np.eye(len(sizes))).raw
+        told = peak_of(scene, candidate, raw, sizes)
+        parts[candidate.family] = told / answerer.peak_by_itself(fitted, candidate.effect.text, sizes)
+    assert parts.pop("EXX:poly2") < 0.9
+    assert parts == {text: pytest.approx(1.0, rel=1e-9) for text in texts[:3]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", ["hidden-reversal-x", "hidden-b-indexing"])
+def test_the_peak_that_explain_tells_is_that_of_the_challenge(example: str) -> None:
+    campaign = read_campaign(EXAMPLES / example)
+    explanation = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))
+    (effect,) = explanation.missing
+    by_itself = answerer.peak_by_itself(explanation.final, effect.effect, effect.coefficients)
+    assert effect.peak == pytest.approx(by_itself, rel=1e-4)

@@ -25,6 +25,8 @@ OTHER = frozenset(
             "neighbours",
             "further",
             "time_constant_days",
+            # Always in µrad, beside peaks in µm.
+            "peak_urad",
             # Of a condition, in its unit.
             "least",
             "greatest",

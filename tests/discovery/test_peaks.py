@@ -10,11 +10,12 @@ import pytest
 from monitor.discovery import fit
 from monitor.discovery.machine.scene import ChainScene, scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
-from monitor.discovery.machine.sizes import peak_of, peaks_of_errors
+from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn
 from monitor.effects import parse_effect
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.workflow.sight import effect_sight
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain
 
 #: Length of the tool, and where X was measured, far from the zero of its scale, mm.
@@ -25,11 +26,16 @@ EFFECTS = ("EXX:poly1", "EXX:poly2", "EXX:poly3", "EBX:poly1", "EBX:reversal")
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> ChainScene:
     """A laser and an autocollimator along X, which carries a tool of one length."""
+    return _scene(tmp_path_factory.mktemp("peaks") / "peaks", TOOL)
+
+
+def _scene(folder: Path, tool: float) -> ChainScene:
+    """The effects of a laser that stands ``tool`` mm below the way, and of an autocollimator."""
     ways = {"Z": (0.0, 0.0, 1.0), "X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0)}
     chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in ways.items()))
     laser = (
         '\n[[setups]]\nid = "laser"\nreading = "displacement"\ninstrument = "laser"\nstandard_uncertainty_um = 0.3\n'
-        f'tool_point_mm = [0.0, 0.0, {-TOOL}]\ndirection = "X"\n'
+        f'tool_point_mm = [0.0, 0.0, {-tool}]\ndirection = "X"\n'
     )
     angle = (
         '\n[[setups]]\nid = "ac"\nreading = "angle"\ninstrument = "autocollimator"\n'
@@ -40,9 +46,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> ChainScene:
         for place in PLACES:
             read = rng.normal(0.0, 0.3) + (1e3 * place if setup == "laser" else 0.0)
             rows.append({"setup": setup, "X": place, "Y": 0.0, "Z": 0.0, column: read})
-    campaign = read_campaign(
-        chain.write(Path(tmp_path_factory.mktemp("peaks")) / "peaks", laser + angle, rows)
-    )
+    campaign = read_campaign(chain.write(folder, laser + angle, rows))
     assert isinstance(campaign, Campaign)
     problem = campaign_method(campaign).problem_of(campaign)
     effects = [parse_effect(text, problem.context.chain) for text in EFFECTS]
@@ -68,6 +72,16 @@ def test_a_bow_is_as_high_as_it_stands_beyond_a_straight_line(scene: ChainScene)
 def test_a_tilt_moves_the_tip_by_its_lever_whatever_measures_angles(scene: ChainScene) -> None:
     """Was: a microradian counted as a micrometre where an autocollimator took part."""
     assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * TOOL, rel=1e-6)
+
+
+def test_a_tilt_that_a_laser_does_not_see_is_as_large_as_it_turns(tmp_path: Path) -> None:
+    """Was: 0.0 µm at most, and in a rehearsal a straight line that the model takes up."""
+    scene = _scene(tmp_path / "in-line", 0.0)
+    (tilt,) = (each for each in scene.candidates if each.effect.text == "EBX:reversal")
+    assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * 1000.0, rel=1e-6)
+    assert seen_as_turn(scene, tilt.raw @ np.array([20e-6]))
+    sight = effect_sight(scene.fit.problem, "EBX:cyclic160mm", 5e-3)
+    assert sight.words("EBX:cyclic160mm", 5.0) == ""
 
 
 def test_an_error_of_several_effects_has_one_peak_of_all_of_them(scene: ChainScene) -> None:

@@ -66,3 +66,29 @@ def test_four_poses_have_12_readings_and_13_names(tmp_path: Path) -> None:
         assert estimate.u < 8.0
     named = {name for refusal in run.refused for name in refusal.parameters}
     assert named == {"EX0C", "EB0Z", "EY0C", "EA0Z", "EXX", "EYY", "EZZ"}
+
+
+@pytest.mark.slow
+def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_it(tmp_path: Path) -> None:
+    """Was: "measure more poses", as if nothing could be said of the four runs that have them."""
+    for name, broken_off in (("broken-off", True), ("whole", False)):
+        folder = _few(tmp_path / name, (1, 6, 11, 16, 3))
+        table = folder / "probings.csv"
+        head, *rows = table.read_text(encoding="utf-8").splitlines()
+        runs = [row.partition(",")[2] for row in rows]
+        lines = [f"{run},{row}" for run in range(1, 5) for row in runs]
+        lines += [f"5,{row}" for row in runs if row.split(",")[0] in ("1", "6", "11")] if broken_off else []
+        table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+        head, first, *_ = (folder / "runs.csv").read_text(encoding="utf-8").splitlines()
+        lines = [f"{run},{first.partition(',')[2]}" for run in range(1, 6 if broken_off else 5)]
+        (folder / "runs.csv").write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    with monitor.open(tmp_path / "m.duckdb", new=True) as db:
+        db.add(tmp_path / "broken-off")
+        for question in QUESTIONS:
+            with pytest.raises(
+                TooFewReadingsError, match=r"9 readings of run 5 .* or leave run 5 out: remove its rows"
+            ):
+                db.ask(question, campaign="r-test")
+    with monitor.open(tmp_path / "n.duckdb", new=True) as db:
+        db.add(tmp_path / "whole")
+        assert len(db.ask("identify", campaign="r-test").runs) == 4

@@ -20,7 +20,7 @@ from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.scale_steps import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
-from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, size_of, spread_or_length
+from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn, size_of, spread_or_length
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
@@ -56,7 +56,7 @@ class ChainMissing(Missing):
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
     is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
     of several. ``steps`` says between which readings each step of an error lies, ``held`` where a plate that grows is
-    held, by axis.
+    held, by axis. ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre.
     """
 
     held_out_days_before: float | None
@@ -75,6 +75,7 @@ class ChainMissing(Missing):
     error_peak: float | None = None
     steps: tuple[Between, ...] = ()
     held: tuple[HeldPlace, ...] = ()
+    turns: bool = False
 
 
 @dataclass(frozen=True)
@@ -295,6 +296,7 @@ def _missing(
         amplitude=size.amplitude,
         u=size.u,
         peak=peak_of(scene, candidate, size.raw, coefficients),
+        turns=seen_as_turn(scene, size.raw @ coefficients),
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,

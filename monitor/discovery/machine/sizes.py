@@ -27,6 +27,9 @@ from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.units import Unit
 
+#: Rows that an effect moves by less than this part of their standard uncertainty show nothing of it.
+SEEN = 0.01
+
 
 @dataclass(frozen=True)
 class Size:
@@ -89,8 +92,9 @@ def largest_deviation(columns: Array, coefficients: Array, covariance: Array) ->
 
 
 def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficients: Array) -> float:
-    """The largest displacement in mm where points were measured, of displacements ``raw`` (n, d, k); no more than what
-    a power of the position of an axis makes beyond the constant and the slope that the base takes up.
+    """The largest displacement in mm where lengths were measured, of displacements ``raw`` (n, d, k); no more than what
+    a power of the position of an axis makes beyond the constant and the slope that the base takes up. Where those rows
+    show nothing it is that of the rows of angles.
 
     Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
     """
@@ -121,10 +125,19 @@ def peaks_of_errors(
     return peaks
 
 
+def seen_as_turn(scene: ChainScene, displacement: Array) -> bool:
+    """Whether displacements (n, d) in mm show in rows of angles alone: those of an angle are on a lever of a metre."""
+    problem = scene.fit.problem
+    lengths = problem.is_length
+    moved = np.where(np.isfinite(problem.sigma), np.abs(displacement) / problem.sigma, 0.0)
+    return not (moved[lengths] > SEEN).any() and bool((moved[~lengths] > SEEN).any())
+
+
 def _largest(scene: ChainScene, displacement: Array) -> float:
-    """The largest of displacements (n, d) in mm where lengths were measured, else of the angles' own."""
-    is_length = scene.fit.problem.is_length
-    rows = is_length if is_length.any() else ~is_length
+    """The largest of displacements (n, d) in mm where lengths were measured; where those show nothing, of angles."""
+    rows = scene.fit.problem.is_length
+    if not rows.any() or seen_as_turn(scene, displacement):
+        rows = ~rows
     return float(np.linalg.norm(displacement[rows], axis=1).max())
 
 

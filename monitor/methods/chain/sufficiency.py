@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NoReturn
+
 import numpy as np
 
 from monitor.exceptions import TooFewReadingsError
@@ -24,20 +27,32 @@ def refuse_exact_fits(problem: ChainProblem, solution: Solution) -> None:
     """Raise TooFewReadingsError where a run, or all together, determine as many unknowns as they have
     readings and calibrated numbers.
 
-    What a run does not determine takes none of its numbers: it is named, and has none itself.
+    What a run does not determine takes none of its numbers: it is named, and has none itself. Where other runs have
+    more, those that have not, such as one that was broken off, are all named: without them the others are answered.
     """
     calibrated = len(problem.extra_names)
     numbers = [
         int(np.isfinite(problem.sigma[problem.context.run == run]).sum()) + calibrated for run in problem.runs
     ]
-    for run, of_run, rank in zip(problem.runs, numbers, solution.rank, strict=True):
-        _refuse_nothing_left(f"run {run}", of_run, int(rank))
-    _refuse_nothing_left("the campaign", sum(numbers), int(solution.rank.sum() + solution.common_free.sum()))
+    exact = {
+        int(run): of_run
+        for run, of_run, rank in zip(problem.runs, numbers, solution.rank, strict=True)
+        if of_run <= rank
+    }
+    for run, of_run in exact.items():
+        _refuse(f"run {run}", of_run, list(exact) if len(exact) < len(numbers) else [])
+    if sum(numbers) <= int(solution.rank.sum() + solution.common_free.sum()):
+        _refuse("the campaign", sum(numbers), [])
 
 
-def _refuse_nothing_left(whose: str, numbers: int, determined: int) -> None:
-    if numbers <= determined:
-        raise TooFewReadingsError(
-            f"the {numbers} readings of {whose} determine as many unknowns of the model: nothing is left over to judge "
-            "it by; measure more poses"
-        )
+def _refuse(whose: str, numbers: int, without: Sequence[int]) -> NoReturn:
+    """Raise that nothing is left over, and which runs the campaign is answered ``without``; none where no other is."""
+    listed = f"run{'s' * (len(without) > 1)} {', '.join(map(str, without))}"
+    advice = (
+        f"; or leave {listed} out: remove {'its' if len(without) == 1 else 'their'} rows from runs.csv and "
+        "probings.csv, withdraw the campaign and import it again"
+    )
+    raise TooFewReadingsError(
+        f"the {numbers} readings of {whose} determine as many unknowns of the model: nothing is left over to judge it "
+        f"by; measure more poses{advice if without else ''}"
+    )

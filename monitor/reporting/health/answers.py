@@ -163,7 +163,8 @@ def _unexplained(health: MachineHealth) -> str:
     if not health.model.missing:
         return health.model.answer
     effect = health.model.missing[0]
-    size = "" if effect.peak_um is None else f", up to {effect.peak_um:.1f} µm"
+    unit = "µm" if effect.peak_urad is None else "µrad"
+    size = "" if effect.peak_um is None else f", up to {effect.peak_um:.1f} {unit}"
     return f"the measurements show what the model does not have: {effect.meaning} ({effect.effect}){size}"
 
 

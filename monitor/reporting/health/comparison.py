@@ -20,7 +20,7 @@ class ReversalValue:
 @dataclass(frozen=True)
 class MissingEffect:
     """An effect that the model lacks, its cause and what to do; of a play its ``reversal`` value; ``refers_to`` says
-    in words what it is stated relative to."""
+    in words what it is stated relative to. ``peak_urad`` is its largest turn, where angles alone show it."""
 
     effect: str
     meaning: str
@@ -32,6 +32,7 @@ class MissingEffect:
     not_ruled_out: tuple[str, ...]
     reversal: ReversalValue | None = field(default=None, metadata=OMITTED)
     refers_to: str | None = field(default=None, metadata=OMITTED)
+    peak_urad: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

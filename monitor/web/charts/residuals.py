@@ -191,7 +191,8 @@ def ranking_chart(missing: Sequence[MachineMissing]) -> Chart:
         traces=[
             {
                 "type": "bar", "orientation": "h", "y": names, "x": [effect.peak_um for effect in missing],
-                "marker": {"color": "@orange"}, "hovertemplate": "%{y}: %{x:.2f} µm at most<extra></extra>",
+                "marker": {"color": "@orange"}, "hovertemplate": "%{y}: %{x:.2f} %{customdata} at most<extra></extra>",
+                "customdata": ["µm" if effect.peak_urad is None else "µrad" for effect in missing],
             }
         ],
         layout={

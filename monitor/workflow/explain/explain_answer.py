@@ -87,7 +87,9 @@ class MachineMissing:
     says in words what its coefficients are stated relative to, where it is an error of the chain. ``largest`` is the
     coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes, or of several ``steps``,
     each of which lies somewhere between two readings. ``error_peak_um`` stands in the first of several effects of one
-    error of the chain: the largest displacement of all of them together.
+    error of the chain: the largest displacement of all of them together. ``held_at`` is where a plate that grows is
+    held. Where rows of angles alone show an effect, ``peak_urad`` is its largest turn, and displacements are on a lever
+    of one metre.
     """
 
     rank: int
@@ -126,6 +128,7 @@ class MachineMissing:
     error_peak_um: float | None = field(default=None, metadata=OMITTED)
     steps: tuple[StepBetween, ...] | None = field(default=None, metadata=OMITTED)
     held_at: tuple[HeldAt, ...] | None = field(default=None, metadata=OMITTED)
+    peak_urad: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -173,6 +173,7 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         refers_to=refers_to((effect.effect,), chain).get(effect.effect),
         largest=effect.largest,
         error_peak_um=micrometres(effect.error_peak),
+        peak_urad=um(effect.peak) if effect.turns else None,
         held_at=tuple(HeldAt(held.axis, held.reading, held.u, MILLIMETRE.name) for held in effect.held)
         or None,
         steps=_steps_between(effect),

@@ -52,6 +52,7 @@ def model_health(
                 effect.indistinguishable_from,
                 _reversal(effect.reversal_value),
                 effect.refers_to,
+                effect.peak_urad,
             )
             for effect in explanation.missing
         ),

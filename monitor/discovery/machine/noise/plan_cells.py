@@ -68,8 +68,8 @@ def _rows_of(
     count, order = np.bincount(cell), np.argsort(cell, kind="stable")
     of_asked = np.repeat(np.arange(len(asked)), count[asked])
     before = np.cumsum(count[asked]) - count[asked]
-    place = np.arange(len(of_asked)) - before[of_asked]
-    return of_asked, order[(np.cumsum(count) - count)[asked][of_asked] + place]
+    in_cell = np.arange(len(of_asked)) - before[of_asked]
+    return of_asked, order[(np.cumsum(count) - count)[asked][of_asked] + in_cell]
 
 
 def _visits(problem: ChainProblem, planned: Array) -> npt.NDArray[np.int64]:
