@@ -61,6 +61,8 @@ QUIET, QUIETS = 0.3, 0.05
 AS_WELL = 13.8
 #: What cures a setup that contradicts itself takes away what that scatters beyond; one step foresees half of it.
 FORESEEN = 0.5
+#: A setup with less than this part of all rows is fitted alone in less time than one step of all takes.
+SMALL = 1 / 15
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
@@ -196,6 +198,7 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
     one."""
     rows = _rows_of(campaign, doubted.setups)
+    is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
     part = _part(campaign, rows)
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
@@ -213,7 +216,7 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         cures = []
         for what, undo in trials:
             undone_in = partial(_undone, setups=doubted.setups, undo=undo)
-            if doubted.excess and _contradicts_itself(_part(undone_in(campaign), rows), problem_of, run):
+            if is_small and _contradicts_itself(_part(undone_in(campaign), rows), problem_of, run):
                 continue
             problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
             fit = None if problem is None else fitted_problem(problem)
