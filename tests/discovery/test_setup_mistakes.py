@@ -13,7 +13,7 @@ import pytest
 
 from monitor.discovery import find_reading_mistakes, find_setup_mistakes, fit, robust_fit
 from monitor.discovery.machine.mistakes.fewer_rows import fewer_rows
-from monitor.discovery.machine.mistakes.setup_mistakes import _doubted, _explains
+from monitor.discovery.machine.mistakes.setup_mistakes import _contradicts_itself, _doubted, _explains
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.method import SetupScatter
@@ -70,6 +70,23 @@ def test_what_is_wrong_in_one_setup_is_said_in_its_name(
     right: Campaign, setup: str, change: dict[str, tuple[str, float]], what: str
 ) -> None:
     assert f"{what} in setup {setup}" in _told(_spoilt(right, setup, change))
+
+
+@pytest.mark.parametrize(
+    ("change", "contradicts"),
+    [
+        ({}, False),
+        ({"dx_um": ("dy_um", 1.0), "dy_um": ("dx_um", 1.0)}, True),
+        # With all signs turned it contradicts the others, not itself.
+        ({name: (name, -1.0) for name in ("dx_um", "dy_um", "dz_um")}, False),
+    ],
+)
+def test_a_setup_alone_contradicts_itself_where_no_machine_reads_so(
+    right: Campaign, change: dict[str, tuple[str, float]], contradicts: bool
+) -> None:
+    spoilt = _spoilt(right, "r-test", change)
+    alone = replace(spoilt, probings=spoilt.probings.rows(spoilt.probings.target == "r-test"))
+    assert _contradicts_itself(alone, _of_machine, int(alone.probings.run[0])) is contradicts
 
 
 def test_right_setups_and_errors_of_an_instrument_are_no_mistake(right: Campaign, tmp_path: Path) -> None:

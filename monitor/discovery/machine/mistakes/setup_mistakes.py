@@ -61,6 +61,8 @@ QUIET, QUIETS = 0.3, 0.05
 AS_WELL = 13.8
 #: What cures a setup that contradicts itself takes away what that scatters beyond; one step foresees half of it.
 FORESEEN = 0.5
+#: A setup with less than this part of all rows is fitted alone in less time than one step of all takes.
+SMALL = 1 / 15
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
@@ -195,7 +197,9 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> tup
 def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
     one."""
-    part = _part(campaign, _rows_of(campaign, doubted.setups))
+    rows = _rows_of(campaign, doubted.setups)
+    is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
+    part = _part(campaign, rows)
     measured = measured_columns(part)
     # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
     of_units = [*unit_mistakes(measured, 1.0)]
@@ -212,6 +216,8 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         cures = []
         for what, undo in trials:
             undone_in = partial(_undone, setups=doubted.setups, undo=undo)
+            if is_small and _contradicts_itself(_part(undone_in(campaign), rows), problem_of, run):
+                continue
             problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
             fit = None if problem is None else fitted_problem(problem)
             if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
@@ -223,6 +229,16 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         if cures:
             return cures
     return []
+
+
+def _contradicts_itself(alone: Campaign, problem_of: Maker, run: int) -> bool:
+    """Whether the rows of a setup scatter in a run even when they are fitted without all others, who can but add to
+    that: few rows say so sooner than all. False where they have no fit of their own."""
+    fit = fitted(alone, problem_of)
+    ability = campaign_method(alone).instruments
+    if fit is None or not isinstance(ability, Instruments):
+        return False
+    return any(each.times >= SCATTERS for each in ability.scatters(fit.problem, fit.solution, run))
 
 
 def _worth_fitting(undone: Campaign, problem_of: Maker, limit: float) -> ChainProblem | None:

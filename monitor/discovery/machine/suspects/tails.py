@@ -17,8 +17,9 @@ from monitor.records import Array
 
 # From the heaviest tails with a variance that can be worked with to those of Gauss.
 DEGREES_OF_FREEDOM = (2.0, 3.0, 4.0, 6.0, 9.0, 15.0, 30.0, 1e6)
-# Reweighting in turn settles to a part in a thousand within some ten steps.
-STEPS = 30
+# Reweighting in turn settles to a part in a thousand within some ten steps. A step of less than this part of the
+# coefficients does not show in their deviance, which is least there.
+STEPS, SETTLED = 30, 1e-9
 # Part of the most visible of a run's unknowns below which one is seen elsewhere, by the bar say, and not by touches.
 UNSEEN = 1e-6
 
@@ -41,7 +42,9 @@ class Tails:
             weights = self.weights(self._squares(vectors - columns @ coefficients), vectors.shape[1])
             weighted = flat * np.repeat(weights, vectors.shape[1])[:, None]
             inverse = np.linalg.pinv(weighted.T @ flat, rcond=UNSEEN, hermitian=True)
-            coefficients = inverse @ (weighted.T @ vectors.reshape(-1))
+            before, coefficients = coefficients, inverse @ (weighted.T @ vectors.reshape(-1))
+            if np.abs(coefficients - before).max() <= SETTLED * np.abs(coefficients).max():
+                break
         return self._deviance(vectors - columns @ coefficients)
 
     def _deviance(self, vectors: Array) -> float:
