@@ -209,7 +209,7 @@ def solve(
     current = linearise(local, common)
     cost = float(np.sum(current.residual**2))
     space, spanned = eliminate(current.local), current.local
-    before, damping = np.inf, 1.0
+    before, damping, halved = np.inf, 1.0, False
     for iteration in range(1, DAMPED_TIMES * most + 1):
         if damping < STALLED or (iteration > most and damping == 1.0):
             break
@@ -227,9 +227,9 @@ def solve(
         size = float(np.hypot(size, back))
         factor, shrinks = damping, damping == 1.0 and size < min(1.0, before / 2.0)
         limit = None if shrinks or size < SMALLEST_HALVED else cost * (1.0 + ROUNDING_OF_SUM)
-        trial, factor = _halved(
-            linearise, squares, (local, common), (step_local, of_common.step), factor, limit
-        )
+        begin, steps, likely = (local, common), (step_local, of_common.step), halved and limit is not None
+        trial, factor = _halved(linearise, squares, begin, steps, factor, limit, likely)
+        halved = factor < 1.0
         if size < 1.0:
             damping = factor
         local, common = local + factor * step_local, common + factor * of_common.step
@@ -252,10 +252,12 @@ def _halved(
     step: tuple[Array, Array],
     factor: float,
     limit: float | None,
+    is_likely: bool,
 ) -> tuple[Linearisation, float]:
     """What is seen after a step of the unknowns of runs and of the common ones, taken by a ``factor`` that is halved
-    until the sum of squares is within a limit, if any; and the factor."""
-    first = factor
+    until the sum of squares is within a limit, if any; and the factor. Whether halving ``is_likely`` decides only what
+    is computed first."""
+    first = None if is_likely else factor
     for _ in range(MOST_HALVINGS):
         at = begin[0] + factor * step[0], begin[1] + factor * step[1]
         # A step that was halved is halved again as a rule: it is tried without derivatives.

@@ -34,12 +34,14 @@ def refuse_other_size(
     at: npt.NDArray[np.int64],
     rms_of_guess: float,
     columns: str,
+    alone: float | None = None,
 ) -> None:
     """DataError where points are of another size than the chain, or not of these poses.
 
     ``rotation`` (m, 3, 3) and ``origin`` (m, 3) mm carry points of the tool by the nominal chain, ``points`` (m, 3)
     mm were measured, of the targets ``at`` (m,); a guess at the size as measured leaves ``rms_of_guess`` mm.
-    ``columns`` says in words where the points stand.
+    ``columns`` says in words where the points stand. ``alone`` is what ``best_frame`` of these points by themselves,
+    as measured, leaves in mm, where it is known.
     """
     arm = points - points.mean(axis=0)
     size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
@@ -48,7 +50,8 @@ def refuse_other_size(
     kinds = int(at.max()) + 1
     places = np.zeros((kinds, 3))
     # A guess may hold what all runs say of places that each leaves open: its run by itself is asked.
-    alone = left_of(best_frame(rotation, origin, points, at, places, False), rotation, origin, points, at)
+    if alone is None:
+        alone = left_of(best_frame(rotation, origin, points, at, places, False), rotation, origin, points, at)
     if alone <= max(LEFT * size, LEAST_LEFT):
         return
     times = _size(*frame_equations(rotation, origin, arm / size, at, kinds)) / size

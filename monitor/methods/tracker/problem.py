@@ -275,8 +275,6 @@ def _frame(
         return linear
     # Axes that nearly meet, or a geometry that is far off: which guess is better shows in what it leaves.
     guesses = (linear, best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False))
-    rms, best = min(
-        (left_of(guess, rotation, origin, points, at), number) for number, guess in enumerate(guesses)
-    )
-    refuse_other_size(rotation, origin, points, at, rms, "the tracker's columns")
-    return guesses[best]
+    by_equations, alone = (left_of(guess, rotation, origin, points, at) for guess in guesses)
+    refuse_other_size(rotation, origin, points, at, min(by_equations, alone), "the tracker's columns", alone)
+    return guesses[int(alone < by_equations)]
