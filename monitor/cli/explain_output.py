@@ -28,6 +28,7 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
     SearchedValue,
+    StepBetween,
 )
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.plan.test_answer import TestAnswer
@@ -232,9 +233,13 @@ def _size_words(effect: MachineMissing) -> str:
     return size if effect.largest is None else f"up to {size} (the node {effect.largest})"
 
 
+def _unit_of_peak(effect: MachineMissing) -> str:
+    return "µm" if effect.peak_urad is None else "µrad"
+
+
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
     at = "tip" if explanation.target_word == "ball" else f"{explanation.target_word}s"
-    unit = "µm" if effect.peak_urad is None else "µrad"
+    unit = _unit_of_peak(effect)
     p_and_q = f"{output.stated('p', effect.p_value)}, {output.stated('q', effect.q_value)}"
     output.say(f"{effect.rank}. {effect.effect}: {effect.description.meaning}")
     output.say(f"   {_size_words(effect)}, at most {effect.peak_um:.1f} {unit} at the {at}; {p_and_q}")
@@ -258,6 +263,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(f"   {reversal_words(effect.reversal_value)}")
     if effect.searched is not None:
         output.say(f"   {_searched(effect.searched)}")
+    for step in effect.steps or ():
+        output.say(f"   {_step_words(effect, step)}")
     if effect.travelled_periods is not None:
         output.say(
             f"   the axis turned {effect.travelled_periods:.2f} of its period: over less than 1.5 it is a smooth bend, "
@@ -276,6 +283,18 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         if after is not None
     ] or ["too few readings to leave some out"]
     output.say(f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; {', '.join(held_out)}")
+
+
+def _step_words(effect: MachineMissing, step: StepBetween) -> str:
+    """How large a step is and where it lies: ``a step of 4.0 ± 0.3 µm in the scale of X between 110 and 125 mm``."""
+    error = effect.effect.partition(":")[0]
+    axis = error[2:]
+    what = f"the scale of {axis}" if error[:2] == f"E{axis[:1]}" else f"{error} along {axis}"
+    size = f"{output.rounded(step.value, step.u)} ± {output.two_digits(step.u)} {effect.unit}"
+    return (
+        f"a step of {size} in {what} between {step.low_mm:.4g} and {step.high_mm:.4g} mm; where between them these "
+        "positions do not tell"
+    )
 
 
 def _searched(searched: SearchedValue) -> str:

@@ -66,11 +66,11 @@ class DescribedShape(BuiltIn):
         return None
 
 
-def parse_pitch(shape: str, written: str, example: str) -> float:
+def parse_pitch(shape: str, written: str, example: str, word: str = "pitch") -> float:
     """Return the pitch in mm of a shape as it is written. Raises EffectError for one that no axis can have."""
     pitch = float(written)
     if not SHORTEST_PITCH <= pitch < float("inf"):
         raise EffectError(
-            f"the pitch of {shape}{written}mm must be {SHORTEST_PITCH:.4f} mm or more; write for example {example}"
+            f"the {word} of {shape}{written}mm must be {SHORTEST_PITCH:.4f} mm or more; write for example {example}"
         )
     return pitch

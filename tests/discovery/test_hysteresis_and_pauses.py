@@ -13,6 +13,7 @@ from by_path import simulator
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.evidence.held_out import held_out_by_poses, pose_folds
 from monitor.discovery.machine.shapes.free_parts import _best_pair
+from monitor.discovery.search.products import Products
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 
@@ -118,10 +119,13 @@ def test_parts_that_say_something_together_alone_are_found():
     third = apart + 0.25 * noise
     columns = np.column_stack([third, first, second])
     columns /= np.linalg.norm(columns, axis=0)
-    assert _best_pair(columns, apart, np.full(3, 1e-2)) == [1, 2]
-    assert _best_pair(columns[:, :1], apart, np.full(1, 1e-2)) == []
-    # The same column twice is no pair.
-    assert _best_pair(columns[:, [0, 0]], apart, np.full(2, 1e-2)) == []
+    total = float(apart @ apart)
+    products = Products(columns.T @ columns, columns.T @ apart, total, total)
+    assert _best_pair(products, np.full(3, 1e-2)) == [1, 2]
+    # The same column twice is no pair, nor is one alone.
+    for some in ([0], [0, 0]):
+        alike = Products(products.gram[np.ix_(some, some)], products.onto[some], total, total)
+        assert _best_pair(alike, np.full(len(some), 1e-2)) == []
 
 
 @pytest.mark.slow

@@ -109,6 +109,17 @@ class Fit:
         return Nuisance(basis, shared, rank)
 
     @cached_property
+    def nuisance_by_rows(self) -> Array:
+        """The basis of the unknowns of single runs (n, d, p), by which to multiply numbers of rows."""
+        return self.by_rows(self.nuisance.basis)
+
+    def by_rows(self, numbers: Array) -> Array:
+        """What to multiply numbers of rows (n, d) by, (n, d, k), for the products of their whitened ones (R, N, k)."""
+        if self.whitening is not None:
+            numbers = np.moveaxis(self.whitening.transposed(np.moveaxis(numbers, 2, 0)), 0, 2)
+        return self.problem.by_rows(numbers)
+
+    @cached_property
     def white(self) -> Array:
         """The whitened residual (R, N) with what every run's own unknowns can do taken out, independent numbers."""
         residual = self.solution.last.residual

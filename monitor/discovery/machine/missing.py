@@ -16,6 +16,7 @@ from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.discovery.machine.shapes.curves import Curve
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
+from monitor.discovery.machine.shapes.scale_steps import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
 from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn, size_of, spread_or_length
@@ -51,7 +52,8 @@ class ChainMissing(Missing):
     shape. ``within_runs`` says that the runs' own parameters take it up where its driver stays the same through a run:
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
     is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
-    of several. ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre.
+    of several. ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre. ``steps`` says
+    between which readings each step of an error lies.
     """
 
     held_out_days_before: float | None
@@ -69,6 +71,7 @@ class ChainMissing(Missing):
     largest: str | None = None
     error_peak: float | None = None
     turns: bool = False
+    steps: tuple[Between, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -247,7 +250,7 @@ def _likelihood_without(
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
     searched = candidate.family.endswith(
-        (":cyclic", ":sawtooth", ":windup", ":harmonic", ":table", ":free", ":curve")
+        (":cyclic", ":sawtooth", ":step", ":windup", ":harmonic", ":table", ":free", ":curve")
     )
     return candidate.effect.text if searched else candidate.family
 
@@ -312,6 +315,7 @@ def _missing(
         nearest=candidate.variant.nearest,
         curve=size.curve,
         largest=size.largest,
+        steps=steps_between(scene, candidate, except_for(selection.candidates, index)),
     )
 
 

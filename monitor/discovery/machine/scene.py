@@ -30,14 +30,20 @@ from monitor.discovery.search.remainder import Remainders
 from monitor.discovery.search.scene import family_count
 from monitor.effects import Basis, ChainEffect, ParsedEffect
 from monitor.effects.drivers import Always
+from monitor.effects.joint_error import JointError
 from monitor.effects.shapes import Poly
 from monitor.exceptions import EffectError
+from monitor.machine import MOTION
 from monitor.methods.chain.shared_effects import largest_coefficient
 from monitor.records import Array
 
 # An effect is found for certain where its visible part is this many standard deviations long: the 1 % level
 # over some 300 candidates lies at 4.2.
 DETECTABLE = 5.0
+
+# By so much scores differ where effects are one at all poses but for rounding, which is below 1e-5 of a score; nothing
+# else is decided by it.
+BEHIND = 2e-4
 
 MachineEffect: TypeAlias = ParsedEffect
 ChainVariant: TypeAlias = Variant[MachineEffect]
@@ -50,6 +56,11 @@ class ChainCandidate(Candidate[MachineEffect]):
 
     fit: Fit
     basis: Basis
+
+    @property
+    def behind(self) -> float:
+        """By how much its score stands behind that of the drive's error which does the same at these poses."""
+        return BEHIND * _less_common(self.effect)
 
     @property
     def raw(self) -> Array:
@@ -168,6 +179,16 @@ class ChainScene:
         if parts is None:
             return None
         return LeftOutBlocks(self.fit.nuisance.basis.reshape(len(self.residual), -1), parts)
+
+
+def _less_common(effect: MachineEffect) -> int:
+    """How much less common a cause an error motion is than that of the drive of its axis, 0: a displacement across it
+    (1), a tilt (2); 0 for all others."""
+    if not isinstance(effect, ChainEffect) or effect.term.stage != MOTION:
+        return 0
+    if JointError(effect.term, effect.joint).is_of_drive:
+        return 0
+    return 2 if effect.term.is_rotation else 1
 
 
 def _is_power(candidate: ChainCandidate) -> bool:

@@ -26,6 +26,7 @@ from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
 from monitor.discovery.machine.suspects.wander import with_base_instead
 from monitor.discovery.search.scan import by_error_taken_away, scan
+from monitor.effects.artefact.station import Moved
 
 # More orders of gears, drifts, and moves of a station than these are noise that none explains.
 MOST_GEARS, MOST_DRIFTS, MOST_MOVES = 12, 60, 4
@@ -53,13 +54,14 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
     gears: set[str] = set()
     drifts: set[str] = set()
     moves: set[str] = set()
+    first_moments: dict[type[Moved], tuple[ChainCandidate, ...]] = {}
     selected: Sequence[ChainCandidate] = ()
     while True:
         result = standing_out(scene, scanned(scene, selected))
         selected = result.candidates
         new = _not_yet(gear_variants(scene, selected, rate), gears, MOST_GEARS)
         new += _not_yet(drifts_of_runs(scene, selected, rate), drifts, MOST_DRIFTS)
-        moved = _not_yet(station_moves(scene, selected, rate), moves, MOST_MOVES)
+        moved = _not_yet(station_moves(scene, selected, rate, first_moments), moves, MOST_MOVES)
         if moved:
             # Several drifts together are what comes nearest to one move: each has to stand beside it.
             selected = [candidate for candidate in selected if not may_be_a_move(candidate)]

@@ -21,7 +21,7 @@ from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, parse_effect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
-from monitor.effects.shapes import Harmonics, Nodes, Poly
+from monitor.effects.shapes import Harmonics, Nodes, Poly, Step
 from monitor.effects.weight import LinkWeights
 from monitor.machine import MOTION
 from monitor.records import Array
@@ -56,7 +56,8 @@ def size_of(candidate: ChainCandidate, coefficients: Array, covariance: Array) -
             amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
             return Size(amplitude, u, _of_shape(candidate, beyond_base), curve=curve)
     if isinstance(effect, ChainEffect):
-        if isinstance(effect.shape, Nodes) and not isinstance(effect.driver, EachRun):
+        several_steps = isinstance(effect.shape, Step) and len(coefficients) > 1
+        if (several_steps or isinstance(effect.shape, Nodes)) and not isinstance(effect.driver, EachRun):
             # The length of all nodes grows with their number: what the axis errs by is the largest of them.
             node = int(np.abs(coefficients).argmax())
             u = float(np.sqrt(covariance[node, node]))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -58,6 +59,17 @@ class Candidate(Generic[Effect]):
     def effect(self) -> Effect:
         """The effect itself."""
         return self.variant.effect
+
+    @cached_property
+    def gram(self) -> Array:
+        """The products (k, k) of the columns with each other."""
+        return self.columns.T @ self.columns
+
+    @property
+    def behind(self) -> float:
+        """By how much its score stands behind that of a likelier cause which does the same; far less than data
+        decide."""
+        return 0.0
 
     @property
     def visible(self) -> bool:

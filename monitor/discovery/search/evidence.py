@@ -58,7 +58,7 @@ class Evidence(Generic[CandidateT]):
     def likelihood(self) -> float:
         """The score without the odds beforehand: what the data alone say."""
         odds = self.candidate.variant.odds * (ODDS_OF_TOO_LARGE if self.too_large else 1.0)
-        return self.score + 2.0 * float(np.log(odds))
+        return self.score + 2.0 * float(np.log(odds)) + self.candidate.behind
 
 
 @dataclass(frozen=True)
@@ -116,19 +116,17 @@ class Pool(Generic[CandidateT]):
     @cached_property
     def lengths(self) -> Array:
         """Length (K,) of every column; 1 where there is nothing."""
-        length = np.sqrt(np.concatenate([np.einsum("km,km->k", block, block) for block in self.blocks]))
-        return np.where(length == 0, 1.0, length)
+        squares = np.concatenate([np.diagonal(candidate.gram) for candidate in self.candidates])
+        return np.where(squares == 0.0, 1.0, np.sqrt(squares))
 
     @cached_property
     def grams(self) -> dict[int, Array]:
         """By number of coefficients: products (n, k, k) of the columns scaled to unit length."""
         grams = {}
         for size, (members, rows) in self.by_size.items():
-            grams[size] = np.empty((len(rows), size, size))
-            # Candidate by candidate: all columns once more would be fetched from the system page by page.
-            for gram, member, of_member in zip(grams[size], members, rows, strict=True):
-                part = self.candidates[member].columns.T / self.lengths[of_member, None]
-                gram[...] = part @ part.T
+            lengths = self.lengths[rows]
+            unscaled = np.array([self.candidates[member].gram for member in members])
+            grams[size] = unscaled.reshape(-1, size, size) / (lengths[:, :, None] * lengths[:, None, :])
         return grams
 
     @cached_property
@@ -142,17 +140,14 @@ class Pool(Generic[CandidateT]):
         return np.array([candidate.variant.odds for candidate in self.candidates])
 
     @cached_property
-    def least(self) -> Array:
-        """The part (squared) of a direction of each candidate from which on it is determined beside others.
+    def behind(self) -> Array:
+        """By how much the score of each candidate stands behind that of a likelier cause which does the same."""
+        return np.array([candidate.behind for candidate in self.candidates])
 
-        Below it a fit holds the direction: of the whole effect, what is free in every run included, less is left than
-        products of small errors leave.
-        """
-        shares = np.array([candidate.share for candidate in self.candidates])
-        least: Array = np.maximum(
-            (SMALLEST_SHARE / np.maximum(shares, SMALLEST_SHARE)) ** 2, SMALLEST_REMAINDER
-        )
-        return least
+    @cached_property
+    def least(self) -> Array:
+        """The part (squared) of a direction of each candidate from which on it is determined beside others."""
+        return least_remainder(np.array([candidate.share for candidate in self.candidates]))
 
     @cached_property
     def largest(self) -> Array:
@@ -164,6 +159,17 @@ class Pool(Generic[CandidateT]):
         families = {candidate.family for candidate in self.candidates}
         new = [candidate for candidate in more if candidate.family not in families]
         return Pool((*self.candidates, *new)) if new else self
+
+
+def least_remainder(shares: Array) -> Array:
+    """The part (squared) of a direction from which on it is determined beside others, by the ``shares`` that what is
+    free in every run leaves.
+
+    Below it a fit holds the direction: of the whole effect, what is free in every run included, less is left than
+    products of small errors leave.
+    """
+    least: Array = np.maximum((SMALLEST_SHARE / np.maximum(shares, SMALLEST_SHARE)) ** 2, SMALLEST_REMAINDER)
+    return least
 
 
 def pool_of(scene: Scene[CandidateT]) -> Pool[CandidateT]:
@@ -265,10 +271,21 @@ def evidence_of(
     f = np.where(able, (explained / number) / (stays / other), 0.0)
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
-    price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
-    score = np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
+    score = scores_of(explained, rank, residual, odds) - pool.behind
     values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
     return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
+
+
+def scores_of(
+    explained: Array, rank: npt.NDArray[np.int64], residual: tuple[float, int], odds: Array
+) -> Array:
+    """The scores (n,) of what explains sums of squares (n,) with ranks (n,) of a ``residual``, with ``odds`` (n,)
+    against each; minus infinity where nothing can be explained."""
+    total, dof = residual
+    able = (rank > 0) & (dof > rank) & (total > 0)
+    stays = np.maximum(total - explained, 1e-300)
+    price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
+    return np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
 
 
 def best_of_families(weighed: Sequence[Evidence[CandidateT]]) -> list[Evidence[CandidateT]]:

@@ -19,13 +19,13 @@ def orthonormal_by(columns: Array) -> tuple[Array, Array]:
     """That basis, and the combinations (k, rank) of the columns that it consists of."""
     if columns.shape[1] == 0:
         return columns, np.zeros((0, 0))
-    scale = np.linalg.norm(columns, axis=0)
+    gram = columns.T @ columns
+    scale = np.sqrt(np.diagonal(gram))
     scale = np.where(scale == 0, 1.0, scale)
-    scaled = columns / scale
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     keep = values > RELATIVE_RANK * max(float(values.max()), 1.0)
-    combinations = vectors[:, keep] / np.sqrt(values[keep])
-    return scaled @ combinations, combinations / scale[:, None]
+    combinations = vectors[:, keep] / np.sqrt(values[keep]) / scale[:, None]
+    return columns @ combinations, combinations
 
 
 def orthonormal_to_full_precision(columns: Array) -> Array:

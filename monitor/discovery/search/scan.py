@@ -157,8 +157,9 @@ class _Steps(Generic[CandidateT]):
         """The selected candidates with another one, exchanged for better ones and merged."""
         selected = [*selected, best]
         selected[-1] = self.rules.at_best_value(selected, len(selected) - 1)
-        self.pool = self.pool.with_more([other for other in self.rules.alternatives(best) if other.visible])
-        self._weighed = Memory()
+        pool = self.pool.with_more([other for other in self.rules.alternatives(best) if other.visible])
+        if pool is not self.pool:
+            self.pool, self._weighed = pool, Memory()
         return self.merged(self.exchanged(selected))
 
     def ahead(

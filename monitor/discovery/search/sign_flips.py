@@ -92,6 +92,7 @@ def p_value_by_flips(
         price = keep.sum(axis=-1) * np.log(max(dof, 1)) + 2.0 * np.log(
             pool.tries[members] * pool.odds[members]
         )
+        price += pool.behind[members]
         # The sum of squares from which on a candidate is as convincing as the one that was found.
         needed = total * -np.expm1(-(evidence.score + price) / dof)
         scaled = (

@@ -14,6 +14,7 @@ from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
 from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
 from monitor.effects.shapes.sawtooth import Sawtooth
+from monitor.effects.shapes.step import Step
 from monitor.effects.shapes.table import TABLE_NODES, Table
 from monitor.effects.shapes.windup import WindUp
 from monitor.exceptions import EffectError, did_you_mean
@@ -31,6 +32,7 @@ __all__ = [
     "Poly",
     "Reversal",
     "Sawtooth",
+    "Step",
     "Table",
     "WindUp",
     "harmonics_text",
@@ -42,8 +44,8 @@ __all__ = [
 
 #: What a mistyped shape is compared with.
 _EXAMPLES = (
-    "const", "poly1", "poly2", "poly3", "harmonic1", "harmonic2", "cyclic20mm", "sawtooth84mm(12)", "reversal",
-    "windup40mm", "lag", "compliance", "table", "formula(...)",
+    "const", "poly1", "poly2", "poly3", "harmonic1", "harmonic2", "cyclic20mm", "sawtooth84mm(12)", "step(120)",
+    "reversal", "windup40mm", "lag", "compliance", "table", "formula(...)",
 )  # fmt: skip
 
 
@@ -56,8 +58,8 @@ def parse_shape(text: str) -> Shape:
             f"there is no shape '{text}'; {hint}"
             "there are const, poly1 to poly9, harmonic1 to harmonic9999, "
             "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), sawtooth84mm(12) (any pitch, and where it "
-            "falls), reversal, windup40mm or windup40deg (any width), lag, compliance, table (or table9 for nine "
-            "nodes, up to table99; "
+            "falls), step(120) or step8mm(110,300) (a jump at each reading, evenly over a width), reversal, windup40mm "
+            "or windup40deg (any width), lag, compliance, table (or table9 for nine nodes, up to table99; "
             f"table(-100,0,100) for your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

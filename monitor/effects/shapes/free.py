@@ -57,7 +57,7 @@ class Free(DescribedShape):
         return tuple(f".{part}" for part in self.parts)
 
     def columns(self, context: Context, joint: int) -> Array:
-        basis = flexible_basis(context, joint)
+        basis = context.remembered(Free(), joint, lambda: flexible_basis(context, joint))
         if not self.parts:
             return basis
         if max(self.parts) > basis.shape[1]:
@@ -73,6 +73,17 @@ class Free(DescribedShape):
 def parts_of_position(turns: bool) -> int:
     """How many of the first parts follow the position of an axis alone: hats, or cosines and sines if it turns."""
     return 2 * HARMONICS if turns else HATS
+
+
+def parts_of_axis(context: Context, joint: int) -> tuple[int, ...]:
+    """The numbers, from 1, of the parts that follow one axis alone: all but products with other axes."""
+    turns = context.chain.joints[joint].turns
+    simple = 3 if turns else 2
+    before = parts_of_position(turns) + 1 + simple + len(BUILD_UP)
+    others = [index for index in range(context.places.shape[1]) if index != joint]
+    products = simple * sum(len(_of_other(context, index)) for index in others)
+    count = flexible_basis(context, joint).shape[1]
+    return (*range(1, before + 1), *range(before + products + 1, count + 1))
 
 
 def flexible_basis(context: Context, joint: int) -> Array:

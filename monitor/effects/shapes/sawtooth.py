@@ -42,7 +42,7 @@ class Sawtooth(DescribedShape):
 
     def columns(self, context: Context, joint: int) -> Array:
         reading = context.chain.joints[joint].sign * context.places[:, joint]
-        return np.asarray(((reading - self.edge) / self.pitch % 1.0 - 0.5)[:, np.newaxis])
+        return sawtooths(reading, np.array([self.pitch]), np.array([self.edge])).T
 
     def jumps(self, low: float, high: float) -> Array:
         first, last = np.ceil((low - self.edge) / self.pitch), np.floor((high - self.edge) / self.pitch)
@@ -58,6 +58,14 @@ class Sawtooth(DescribedShape):
             f"check rack, pinion and scale of {error.name} where the teeth fall, or enter a cyclic compensation",
             POSITIONING,
         )
+
+
+def sawtooths(reading: Array, pitches: Array, edges: Array) -> Array:
+    """Sawtooths (k, n) of so many pitches (k,) and edges (k,) in mm at readings (n,) in mm."""
+    periods = (reading - edges[:, None]) / pitches[:, None]
+    periods -= np.floor(periods)
+    periods -= 0.5
+    return periods
 
 
 REGISTERED = (Sawtooth,)

@@ -97,6 +97,11 @@ def _places(
     better = places.copy()
     for number in np.unique(at):
         mine = at == number
+        if kinds == 3:
+            # Each row says where the place is; all of them say it equally well.
+            arms = points[mine] @ turn.T + shift - origin[mine]
+            better[number] = np.einsum("nji,nj->i", rotation[mine], arms) / len(arms)
+            continue
         columns = np.einsum("ai,nij->naj", turn.T[:kinds], rotation[mine])
         shown = (np.einsum("nij,j->ni", rotation[mine], places[number]) + origin[mine] - shift) @ turn
         wanted = (points[mine] - shown[:, :kinds]).reshape(-1)

@@ -178,8 +178,10 @@ def solve(
     local: Array,
     common: Array,
     most: int = MOST_ITERATIONS,
+    squares: Callable[[Array, Array], float | None] = lambda *_: None,
 ) -> Solution:
-    """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
+    """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,). ``squares`` gives
+    the sum of squares without derivatives, None where these cost nothing to speak of.
 
     Raises NotConvergedError if it does not converge in ``most`` steps, which means readings that contradict the machine
     file (a wrong sign, a wrong axis or a ball confused with another).
@@ -202,16 +204,14 @@ def solve(
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
         size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
         factor, shrinks = damping, damping == 1.0 and size < min(1.0, before / 2.0)
-        for _ in range(MOST_HALVINGS):
-            trial = linearise(local + factor * step_local, common + factor * of_common.step)
-            trial_cost = float(np.sum(trial.residual**2))
-            if trial_cost <= cost * (1.0 + ROUNDING_OF_SUM) or shrinks or size < SMALLEST_HALVED:
-                break
-            factor /= 2.0
+        limit = None if shrinks or size < SMALLEST_HALVED else cost * (1.0 + ROUNDING_OF_SUM)
+        trial, factor = _halved(
+            linearise, squares, (local, common), (step_local, of_common.step), factor, limit
+        )
         if size < 1.0:
             damping = factor
         local, common = local + factor * step_local, common + factor * of_common.step
-        current, cost = trial, trial_cost
+        current, cost = trial, float(np.sum(trial.residual**2))
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
             return _solution(local, common, current, space, of_common, iteration)
         before = size
@@ -221,6 +221,30 @@ def solve(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
         "check the axis signs, the topology, the order of the targets and the units"
     )
+
+
+def _halved(
+    linearise: Callable[[Array, Array], Linearisation],
+    squares: Callable[[Array, Array], float | None],
+    begin: tuple[Array, Array],
+    step: tuple[Array, Array],
+    factor: float,
+    limit: float | None,
+) -> tuple[Linearisation, float]:
+    """What is seen after a step of the unknowns of runs and of the common ones, taken by a ``factor`` that is halved
+    until the sum of squares is within a limit, if any; and the factor."""
+    first = factor
+    for _ in range(MOST_HALVINGS):
+        at = begin[0] + factor * step[0], begin[1] + factor * step[1]
+        # A step that was halved is halved again as a rule: it is tried without derivatives.
+        remains = None if factor == first else squares(*at)
+        trial = linearise(*at) if remains is None else None
+        if trial is not None:
+            remains = float(np.sum(trial.residual**2))
+        if limit is None or (remains is not None and remains <= limit):
+            break
+        factor /= 2.0
+    return (linearise(*at) if trial is None else trial), factor
 
 
 def _is_settled(size: float, last: Linearisation, rank: int) -> bool:

@@ -183,6 +183,13 @@ class ChainProblem(MeasuredChain):
         padded[self._run, self._row] = rows
         return padded.reshape(len(self.runs), depth * rows.shape[1], *rows.shape[2:])
 
+    def by_rows(self, runs: Array) -> Array:
+        """Rows (n, d, ...) of runs (R, N, ...): what ``padded`` does, undone; what stands behind the rows is left."""
+        numbers = self.sigma.shape[1]
+        depth = int(self._row.max()) + 1
+        of_rows = runs[:, : depth * numbers].reshape(len(runs), depth, numbers, *runs.shape[2:])
+        return np.asarray(of_rows[self._run, self._row])
+
     def state(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Errors (n, J, 2, 6), work ends (n, 3) and tool ends (n, 3) at (R, p) and (c,), in internal units."""
         errors = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
@@ -242,6 +249,10 @@ class ChainProblem(MeasuredChain):
         """Whitened residuals and derivatives at (R, p) and (c,)."""
         of_rows = Linearisation(*map(self.padded, self.of_rows(local, common)))
         return self.with_calibrated(of_rows, local)
+
+    def squares(self, local: Array, common: Array) -> float | None:
+        """The sum of squares of the whitened residuals at (R, p) and (c,); None where a linearisation is as quick."""
+        return None
 
     def of_rows(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Whitened residuals (n, d) at (R, p) and (c,), and derivatives (n, d, p) and (n, d, c), row by row."""
@@ -364,7 +375,7 @@ def _solved(
     """The point of one search; what stays for a session is one number in its runs."""
     stays = problem.stays
     if stays is None:
-        return solve(linearise, begin, common, most)
+        return solve(linearise, begin, common, most, problem.squares)
     return solve_sessions(linearise, stays, len(problem.extra_names), begin, common, most)
 
 

@@ -14,7 +14,7 @@ from monitor.effects import ArtefactEffect, ChainEffect, Effect
 from monitor.effects.catalogue import of_drives, of_head, of_instruments, of_sight, of_zeros
 from monitor.effects.effect import InstrumentBasis
 from monitor.machine import ChainPose, Orientation, evaluate, evaluate_with_sides, orientation
-from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
+from monitor.methods.chain.least_squares import Linearisation, Solution
 from monitor.methods.chain.measured import Displaced, Stopping
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
@@ -24,6 +24,7 @@ from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
+from monitor.methods.instruments.separated import projector_on_separated
 from monitor.methods.instruments.touched_points import brought_to_points
 from monitor.records import Array, Setup
 from monitor.sources import CommonQuantity
@@ -33,10 +34,6 @@ from monitor.sources import CommonQuantity
 LARGEST_OUTSIDE = (5.0, 0.02)
 # A zero that is off by more than 20 degrees is another zero.
 LARGEST_TURN = 0.35
-# An unknown of which less than this part is separated is open by itself.
-ALONE = 1e-6
-# Derivatives below this part of the largest, in mm or rad over what a reading is known to, are rounding.
-ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -283,8 +280,18 @@ class InstrumentProblem(ChainProblem):
         What a machine without errors leaves open stays where the search begins: with errors it leaves singular values
         of second order, 1e-4 for 0.1 mm on 600 mm, that turn with every step.
         """
-        at = super().linearise(local, common)
-        return at if self.is_whole else replace(at, local=at.local @ self._separated)
+        if self.is_whole:
+            return super().linearise(local, common)
+        is_first = "_separated" not in vars(self) and self.separated is None and not self._masks
+        if is_first and np.array_equal(local, self.start) and np.array_equal(common, self.common_start):
+            # What is separated is asked of the same derivatives: they are made once.
+            whole = replace(self, is_whole=True)
+            at = whole.linearise(local, common)
+            self._masks.update(whole._masks)
+            vars(self)["_separated"] = projector_on_separated(at.local)
+        else:
+            at = super().linearise(local, common)
+        return replace(at, local=at.local @ self._separated)
 
     @cached_property
     def _separated(self) -> Array:
@@ -292,16 +299,7 @@ class InstrumentProblem(ChainProblem):
         if self.separated is not None:
             return self.separated
         whole = replace(self, is_whole=True)
-        by_local = whole.linearise(self.start, self.common_start).local
-        scale = np.linalg.norm(by_local, axis=1)
-        # A centre across the plane of a bar's swing leaves 1e-14 by rounding, or nothing, as its plane lies.
-        is_rounding = scale <= ROUNDING * scale.max(axis=1, keepdims=True, initial=0.0)
-        by_local, scale = np.where(is_rounding[:, None, :], 0.0, by_local), np.where(is_rounding, 1.0, scale)
-        null_space = eliminate(by_local).null_space
-        projector = np.eye(by_local.shape[2]) - np.swapaxes(null_space, 1, 2) @ null_space
-        # What is open by itself leaves a column of rounding.
-        projector *= np.linalg.norm(projector, axis=1, keepdims=True) > ALONE
-        return np.asarray(projector * scale[:, None, :] / scale[:, :, None])
+        return projector_on_separated(whole.linearise(self.start, self.common_start).local)
 
     @cached_property
     def _masks(self) -> dict[str, npt.NDArray[np.bool_]]:

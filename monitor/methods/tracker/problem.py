@@ -155,6 +155,13 @@ class TrackingProblem(ChainProblem):
             by_error[self._fixed] = 0.0
         return replace(pose, residual=residual, by_tip=by_tip, by_error=by_error)
 
+    def squares(self, local: Array, common: Array) -> float | None:
+        """The sum of squares of the whitened residuals: derivatives would cost twice as much again."""
+        if self.is_in_parts:
+            return None
+        extra, _ = self.extras(self.own_of(local))
+        return float(np.sum((self.vectors(local, common) / self.sigma) ** 2) + np.sum(extra**2))
+
     def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, q) by frame and reflectors."""
         derivatives = np.zeros((len(self.context), 3, nuisance.shape[1]))

@@ -50,6 +50,17 @@ class CurvePoint:
 
 
 @dataclass(frozen=True)
+class StepBetween:
+    """A step of an error: its ``value`` towards higher readings with its standard uncertainty, and the readings of the
+    axis between which it lies; no data say where between them."""
+
+    value: float
+    u: float
+    low_mm: float
+    high_mm: float
+
+
+@dataclass(frozen=True)
 class MachineMissing:
     """An effect that a machine's model lacks: size in ``unit``, evidence, errors before and after it is added, rivals.
 
@@ -64,9 +75,10 @@ class MachineMissing:
     a part of a turn: an offset, a tilt, flexure or another order looks alike there. ``within_its_shape`` are effects
     that stand out beside it but not beside its error in any shape: they cannot be separated from it. ``refers_to``
     says in words what its coefficients are stated relative to, where it is an error of the chain. ``largest`` is the
-    coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes. ``error_peak_um`` stands in
-    the first of several effects of one error of the chain: the largest displacement of all of them together. Where rows
-    of angles alone show an effect, ``peak_urad`` is its largest turn, and displacements are on a lever of one metre.
+    coefficient of a table whose absolute value is ``amplitude``, the largest of its nodes, or of several ``steps``,
+    each of which lies somewhere between two readings. ``error_peak_um`` stands in the first of several effects of one
+    error of the chain: the largest displacement of all of them together. Where rows of angles alone show an effect,
+    ``peak_urad`` is its largest turn, and displacements are on a lever of one metre.
     """
 
     rank: int
@@ -104,6 +116,7 @@ class MachineMissing:
     largest: str | None = field(default=None, metadata=OMITTED)
     error_peak_um: float | None = field(default=None, metadata=OMITTED)
     peak_urad: float | None = field(default=None, metadata=OMITTED)
+    steps: tuple[StepBetween, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

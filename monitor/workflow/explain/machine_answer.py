@@ -42,6 +42,7 @@ from monitor.workflow.explain.explain_answer import (
     MovedTarget,
     Remaining,
     ScatteringTarget,
+    StepBetween,
     UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -172,6 +173,19 @@ def _machine_missing(effect: ChainMissing, chain: Chain, *, is_planned: bool) ->
         largest=effect.largest,
         error_peak_um=micrometres(effect.error_peak),
         peak_urad=um(effect.peak) if effect.turns else None,
+        steps=_steps_between(effect),
+    )
+
+
+def _steps_between(effect: ChainMissing) -> tuple[StepBetween, ...] | None:
+    """The steps of an effect, each between its readings; None where it has none."""
+    sizes = coefficients(effect).values()
+    return (
+        tuple(
+            StepBetween(size.value, size.u, between.low, between.high)
+            for size, between in zip(sizes, effect.steps, strict=False)
+        )
+        or None
     )
 
 

@@ -81,15 +81,22 @@ class LeftOutBlocks:
         unknowns; residual (M,) and columns are free of these. Directions that the other parts hardly determine are not
         predicted."""
         columns = orthonormal(columns)
-        gram, onto = np.eye(columns.shape[1]), columns.T @ residual
-        total = 0.0
+        onto = columns.T @ residual
+        normals, parts = [], []
         for rows, basis_of_fold, inverse in zip(self._rows, self._own, self._inverse, strict=True):
             part, left_out = columns[rows], residual[rows]
             mixed, alone = -basis_of_fold.T @ part, -basis_of_fold.T @ left_out
             reaction = inverse @ mixed
-            normal = gram - part.T @ part - mixed.T @ reaction
-            sizes = inverse_above(normal, PREDICTED) @ (onto - part.T @ left_out - reaction.T @ alone)
-            error = left_out - part @ sizes - basis_of_fold @ (inverse @ alone - reaction @ sizes)
+            normals.append(np.eye(columns.shape[1]) - part.T @ part - mixed.T @ reaction)
+            wanted = onto - part.T @ left_out - reaction.T @ alone
+            parts.append((part, left_out, wanted, inverse @ alone, reaction))
+        total = 0.0
+        inverses = inverse_above(np.array(normals), PREDICTED)
+        for (part, left_out, wanted, alone, reaction), basis_of_fold, inverse in zip(
+            parts, self._own, inverses, strict=True
+        ):
+            sizes = inverse @ wanted
+            error = left_out - part @ sizes - basis_of_fold @ (alone - reaction @ sizes)
             total += float(error @ error)
         return total
 

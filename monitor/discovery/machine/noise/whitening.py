@@ -43,10 +43,23 @@ class Whitening:
         columns *= np.where(reciprocal > 0.0, 1.0 / np.where(reciprocal > 0.0, reciprocal, 1.0), 0.0)
         columns += _followed(rho[1:], columns, rho[1:] * gain[:-1])
         columns[:, reciprocal == 0.0] = 0.0
+        return self._turned_back(columns, white)
+
+    def transposed(self, white: Array) -> Array:
+        """The transposed filter of numbers (k, R, N): their products with filtered ones are those of what it returns
+        with the ones before the filter."""
+        columns = self._columns(self._readings(white))
+        gain, rho, reciprocal = self._recursion
+        columns *= reciprocal
+        columns -= _leading(rho[1:] * (1.0 - gain[:-1]), columns, rho[1:] * gain[:-1])
+        return self._turned_back(columns, white)
+
+    def _turned_back(self, columns: Array, like: Array) -> Array:
+        """Numbers (..., R, N) of columns (k d, R T), in the directions of the readings."""
         readings = self._of_columns(columns)
         if self.rows.turned is not None:
             readings = (np.swapaxes(self.rows.turned, -1, -2) @ readings[..., None])[..., 0]
-        return self._numbers(readings, white)
+        return self._numbers(readings, like)
 
     @cached_property
     def _recursion(self) -> tuple[Array, Array, Array]:
@@ -91,11 +104,26 @@ def _followed(retained: Array, columns: Array, taken: Array) -> Array:
     of what stands before in columns (k, M)."""
     entered = np.zeros_like(columns)
     np.multiply(columns[:, :-1], taken, out=entered[:, 1:])
+    return _recursed(retained, entered, "N")
+
+
+def _leading(retained: Array, columns: Array, taken: Array) -> Array:
+    """The transposed of ``_followed``, from the last of columns (k, M) to the first."""
+    led = np.zeros_like(columns)
+    np.multiply(_recursed(retained, np.array(columns), "T")[:, 1:], taken, out=led[:, :-1])
+    return led
+
+
+def _recursed(retained: Array, entered: Array, direction: str) -> Array:
+    """What adds up to (k, M) where of each number the part ``retained`` (M - 1,) stays in its neighbour, the one behind
+    it ("N") or before it ("T"); ``entered`` (k, M) is used up."""
     # With no column at all the wrapper of LAPACK writes outside of it.
-    if not columns.size:
+    if not entered.size:
         return entered
-    band = np.ones((2, columns.shape[1]), order="F")
+    band = np.ones((2, entered.shape[1]), order="F")
     band[1, :-1] = -retained
-    states, failed = scipy.linalg.lapack.dtbtrs(band, entered.T, uplo="L", diag="U", overwrite_b=1)
+    states, failed = scipy.linalg.lapack.dtbtrs(
+        band, entered.T, uplo="L", trans=direction, diag="U", overwrite_b=1
+    )
     assert failed == 0
     return np.asarray(states).T

@@ -40,7 +40,7 @@ def _members(fit: Fit, candidate: ChainCandidate) -> tuple[str, ...]:
     # Unknowns of the setups that do it alone leave nothing to the machine.
     of_setups = whole[:, len(problem.base_names) :]
     local = np.hstack([whole[:, : len(problem.base_names)][:, of_machine], of_setups])
-    columns = _whitened(fit, candidate)
+    columns = whitened(fit, candidate)
     members: dict[str, None] = {}
     scale = np.linalg.norm(local, axis=0)
     for column in columns.T:
@@ -60,7 +60,7 @@ def _left(columns: Array, column: Array) -> float:
     return float(np.linalg.norm(column - columns @ solved))
 
 
-def _whitened(fit: Fit, candidate: ChainCandidate) -> Array:
+def whitened(fit: Fit, candidate: ChainCandidate) -> Array:
     """The whitened columns (N, k) of a candidate in the first run, zero for what is known beforehand."""
     problem = fit.problem
     white = problem.padded(candidate.raw / problem.sigma[:, :, None])[0]

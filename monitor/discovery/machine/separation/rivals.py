@@ -14,7 +14,10 @@ from monitor.discovery.machine.scene import (
     MachineEffect,
     scene_of,
 )
+from monitor.discovery.machine.separation.other_axes import free_of_other_axes
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import as_it_appears, bends_of, part_of_bend, with_drivers
 from monitor.discovery.search.candidate import Variant
@@ -24,7 +27,7 @@ from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, InstrumentEffect, with_time_constant
 from monitor.effects.drivers import EachRun, SettlingDriver
-from monitor.effects.shapes import Compliance, Cyclic, Harmonic, Sawtooth
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic, Sawtooth, Step
 from monitor.effects.shapes.free import Free
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
@@ -59,7 +62,24 @@ class RivalSearch:
                 # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
                 if best.likelihood >= least or (of_instrument and same):
                     rivals.append((best.candidate, same))
+        rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
         return sorted(rivals, key=lambda pair: not pair[1])
+
+    def _of_other_axes(
+        self, index: int, least: float, named: set[str], remainder: Array
+    ) -> list[tuple[ChainCandidate, bool]]:
+        """Free shapes of axes that go with that of the effect at an index, of errors that are not ``named`` yet, which
+        are as likely as ``least`` with all parts paid for; ``remainder`` (M,) is what the effect does beside others."""
+        candidate, others = self.selected[index], except_for(self.selected, index)
+        basis = self.scene.remainders.beside(others).basis
+        least -= price_of_parts(candidate)
+        shapes = list(free_of_other_axes(self.scene, candidate, others))
+        return [
+            (evidence.candidate, coincides(basis, evidence.candidate, remainder[:, None]))
+            for evidence in weigh_beside(self.scene, shapes, others)
+            if error_of(evidence.candidate) not in named
+            and evidence.likelihood - price_of_parts(evidence.candidate) >= least
+        ]
 
     def _pool(self, index: int) -> list[ChainCandidate]:
         """The candidates that may be rivals: all that were searched, and the effect with each driver."""
@@ -98,7 +118,7 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
     those of many periods), and with one length of the tool a turn of a head and a shift of it move the tip alike."""
     if (
         not isinstance(effect, ChainEffect)
-        or not isinstance(effect.shape, Free | Harmonic | Sawtooth)
+        or not isinstance(effect.shape, Free | Harmonic | Sawtooth | Step)
         or effect.term.stage != MOTION
     ):
         return []

@@ -18,6 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.distances import Pair, PlanRows, pairs_of, select_poses
+from monitor.discovery.machine.separation.second_ball import second_ball
 from monitor.discovery.machine.separation.setups import Moved, decides, setups_of
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always, EachRun, RunTime
@@ -126,14 +127,13 @@ def separating_poses(
 
     ``strokes`` gives the range of axes in mm or rad where the machine file has one. No poses are offered where
     effects differ by their driver (other times and temperatures separate those), where no pose decides, or where
-    the method is not one of touching balls: of those only shifts that are one at every pose are ``together``. Of
-    effects with the same driver the poses count at its mean value.
+    the method is not one of touching balls: of those shifts that are one at every pose are ``together``, and what a
+    second set-up of an R-test tells apart. Of effects with the same driver the poses count at its mean value.
     """
     problem, context, strokes = fit.problem, fit.problem.context, strokes or {}
     alike = [rival for rival in rivals if _have_same_driver(effect, rival)]
     if not isinstance(problem, TouchProblem):
-        same = (rival.text for rival in alike if moves_alike(context, effect, coefficients, rival, strokes))
-        return replace(NO_POSES, together=tuple((effect.text, name) for name in same))
+        return _of_instruments(fit, effect, coefficients, alike, strokes)
     if not alike:
         return NO_POSES
     group = [member for member in (effect, *alike) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
@@ -156,6 +156,26 @@ def separating_poses(
         {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
     )
     return Separation(poses, selection.before, selection.after, together, setups)
+
+
+def _of_instruments(
+    fit: Fit,
+    effect: MachineEffect,
+    coefficients: Array,
+    alike: Sequence[MachineEffect],
+    strokes: Mapping[str, tuple[float, float]],
+) -> Separation:
+    """Of a method that touches no balls the shifts that are one at every pose, and the pairs that a second set-up of
+    its R-test tells apart."""
+    setups: dict[tuple[str, str], SecondSetup | None] = {}
+    for rival in alike[: MOST_EFFECTS - 1]:
+        pair = effect.text, rival.text
+        if moves_alike(fit.problem.context, effect, coefficients, rival, strokes):
+            setups[pair] = None
+        elif isinstance(effect, ChainEffect) and isinstance(rival, ChainEffect):
+            setup = second_ball(fit, effect, coefficients, rival, strokes)
+            setups |= {} if setup is None else {pair: setup}
+    return replace(NO_POSES, together=tuple(setups), setups=tuple(setups.values()))
 
 
 def _second_setups(

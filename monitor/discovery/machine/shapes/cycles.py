@@ -13,6 +13,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
@@ -32,17 +33,16 @@ Score = Callable[[Sequence[ChainCandidate]], float]
 def cycle_instead(
     scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate], score: Score
 ) -> list[ChainCandidate]:
-    """The cycle of a searched pitch, alone, that says beside others at least as much at its price as a free shape or a
-    table of a linear axis; none where none does, or where it is none of these."""
+    """The cycle of a searched pitch, the teeth or the steps, alone, that say beside others at least as much at their
+    price as a free shape or a table of a linear axis; none where none do, or where it is none of these."""
     effect = free.effect
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free | Nodes):
         return []
     cycle = best_cycle(scene, free, others)
-    if not cycle:
-        return []
-    teeth = TeethOfError(scene, effect).beside(others)
-    best = max([cycle, *([teeth] if teeth else [])], key=score)
-    return best if score(best) >= score([free]) else []
+    teeth = TeethOfError(scene, effect).beside(others) if cycle else []
+    steps = [] if effect.joint.turns else StepsOfError(scene, effect).beside(others)
+    best = max((some for some in (cycle, teeth, steps) if some), key=score, default=[])
+    return best if best and score(best) >= score([free]) else []
 
 
 def best_cycle(

@@ -13,9 +13,10 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import score_beside
-from monitor.discovery.machine.shapes.waves import left_by, worth_keeping
+from monitor.discovery.machine.shapes.waves import worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.products import Products
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
@@ -68,72 +69,103 @@ def of_parts(
     others: Sequence[ChainCandidate],
 ) -> ChainCandidate:
     """The effect of some parts, from 0, of a flexible basis; nearest to it is the best of ``shapes``."""
+    return with_nearest(scene, of_parts_alone(scene, symbol, parts), shapes, others)
+
+
+def of_parts_alone(scene: ChainScene, symbol: str, parts: Sequence[int]) -> ChainCandidate:
+    """The effect of some parts, from 0, of a flexible basis, without what comes nearest to it."""
     name = f"{symbol}:free({','.join(str(part + 1) for part in sorted(parts))})"
-    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
     effect = parse_effect(name, scene.fit.problem.context.chain)
-    variant = Variant(f"{symbol}:free", effect, 1, 1.0, nearest.family)
-    return scene_of(scene.fit, [variant]).candidates[0]
+    return scene_of(scene.fit, [Variant(f"{symbol}:free", effect)]).candidates[0]
+
+
+def with_nearest(
+    scene: ChainScene,
+    free: ChainCandidate,
+    shapes: Sequence[ChainCandidate],
+    others: Sequence[ChainCandidate],
+) -> ChainCandidate:
+    """A free shape and the best of ``shapes`` beside others, which is nearest to it."""
+    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    return replace(free, variant=replace(free.variant, nearest=nearest.family))
+
+
+def most_together(
+    scene: ChainScene,
+    free: ChainCandidate,
+    leading: Sequence[ChainCandidate],
+    may_stay: Sequence[ChainCandidate],
+) -> float:
+    """A bound that the score of leading effects, a free shape and whichever of others stay is not above, whatever these
+    cost: what all of them leave together is the least that some of them leave."""
+    before, beside = (scene.remainders.beside(some) for some in (leading, [*leading, *may_stay]))
+    columns = orthonormal(without(beside.basis, free.columns))
+    remaining = float(beside.residual @ beside.residual - np.sum((columns.T @ beside.residual) ** 2))
+    gain = np.log(float(before.residual @ before.residual) / max(remaining, 1e-300))
+    return priced(scene, leading) + before.degrees_of_freedom * float(gain) - price_of_parts(free)
 
 
 def parts_worth_keeping(
-    scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]
+    scene: ChainScene,
+    whole: ChainCandidate,
+    others: Sequence[ChainCandidate],
+    *,
+    most: int = MOST_PARTS,
+    choice: float = PRICE,
 ) -> list[int]:
-    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other.
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other:
+    so many at ``most``, ``choice`` the price of the choice of each.
 
     The selection begins once with the best part and once with the best pair: a drive that is wound up is the direction
     less what decays after a reversal, and neither of the two says much alone. The pair has to say more beyond doubt.
     """
     beside = scene.remainders.beside(others)
-    columns, residual = without(beside.basis, whole.columns), beside.residual
-    before: Array = np.linalg.norm(whole.columns, axis=0)
-    least = SMALLEST_LENGTH * np.maximum(before, 1e-300)
+    overlap = beside.basis.T @ whole.columns
+    total = float(beside.residual @ beside.residual)
+    products = Products(whole.gram - overlap.T @ overlap, whole.columns.T @ beside.residual, total, total)
+    least = SMALLEST_LENGTH * np.maximum(np.sqrt(np.diagonal(whole.gram)), 1e-300)
     dof = scene.degrees_of_freedom - beside.basis.shape[1]
-    price = float(np.log(dof)) + 2.0 * PRICE
+    price = float(np.log(dof)) + 2.0 * choice
 
     def cost(parts: Sequence[int]) -> float:
-        return float(dof * np.log(left_by(columns[:, list(parts)], residual)) + price * len(parts))
+        return float(dof * np.log(products.left_by(parts)) + price * len(parts))
 
     selections = []
-    for begin in ([], _best_pair(columns, residual, least)):
-        parts = _selected(columns, residual, least, (dof, price), begin)
-        selections.append(worth_keeping(columns, residual, parts, dof, price))
-    one_by_one, from_pair = selections
+    for begin in ([], _best_pair(products, least))[:most]:
+        parts = _selected(products, least, (dof, price), begin, most)
+        selections.append(worth_keeping(products, parts, dof, price))
+    one_by_one, from_pair = selections[0], selections[-1]
     return from_pair if cost(from_pair) < cost(one_by_one) - UNDECIDED else one_by_one
 
 
 def _selected(
-    columns: Array, residual: Array, least: Array, prices: tuple[float, float], begin: Sequence[int]
+    products: Products, least: Array, prices: tuple[float, float], begin: Sequence[int], most: int
 ) -> list[int]:
-    """The parts to ``begin`` with and those that are worth their price beside them, one after the other; ``prices`` are
-    the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part is one of those before."""
+    """The parts to ``begin`` with and those that are worth their price beside them, one after the other, so many at
+    ``most``; ``prices`` are the degrees of freedom and the price of a part, ``least`` (k,) lengths below which a part
+    is one of those before."""
     (dof, price), parts = prices, list(begin)
-    if parts:
-        basis = orthonormal(columns[:, parts])
-        residual, columns = without(basis, residual[:, None])[:, 0], without(basis, columns)
-    while len(parts) < MOST_PARTS:
-        length = np.linalg.norm(columns, axis=0)
-        explained = np.where(
-            length > least, (columns.T @ residual) ** 2 / np.where(length > least, length, 1.0) ** 2, 0.0
-        )
+    for part in parts:
+        products = products.without(part)
+    while len(parts) < most:
+        length, total = products.lengths, products.total
+        explained = np.where(length > least, products.onto / np.where(length > least, length, 1.0), 0.0) ** 2
         best = int(np.argmax(explained))
-        total = float(residual @ residual)
         if dof * np.log(total / max(total - float(explained[best]), 1e-300)) < price:
             break
         parts.append(best)
-        direction = (columns[:, best] / length[best])[:, None]
-        residual = without(direction, residual[:, None])[:, 0]
-        columns = without(direction, columns)
+        products = products.without(best)
     return parts
 
 
-def _best_pair(columns: Array, residual: Array, least: Array) -> list[int]:
+def _best_pair(products: Products, least: Array) -> list[int]:
     """The two parts that explain most of a residual together; none where no two differ."""
-    length = np.linalg.norm(columns, axis=0)
+    length = products.lengths
     able = np.flatnonzero(length > least)
     if len(able) < 2:
         return []
-    unit = columns[:, able] / length[able]
-    along, onto = unit.T @ unit, unit.T @ residual
+    along = products.gram[np.ix_(able, able)] / np.outer(length[able], length[able])
+    onto = products.onto[able] / length[able]
     apart = 1.0 - along**2
     differ = length[able] ** 2 * apart > least[able] ** 2
     squares = onto[:, None] ** 2 + onto**2 - 2.0 * along * np.outer(onto, onto)

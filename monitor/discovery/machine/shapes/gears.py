@@ -67,10 +67,8 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
         way = problem.observe(fit.by_error[:, :, index, MOTION, 3 + joint.main]) / problem.sigma
         turn = np.sum(way * rows, axis=1)
         weight = np.sum(way * way, axis=1)
-        phase = np.outer(orders, positions[:, index])
-        cosine, sine = np.cos(phase), np.sin(phase)
         # The two columns are all but orthogonal and of the same length over many positions.
-        square = (cosine @ turn) ** 2 + (sine @ turn) ** 2
+        square = _squares(turn, positions[:, index], len(orders))
         power = 2.0 * square / max(float(weight.sum()), 1e-300) / variance
         # Too few periods over the travel are a bend, not a gear.
         power = np.where(orders * float(np.ptp(positions[:, index])) < fewest * 2.0 * np.pi, 0.0, power)
@@ -80,3 +78,14 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
             text = f"{term}:harmonic{orders[peak]:.6g}"
             variants.append(Variant(f"{term}:harmonic", parse_effect(text, chain), len(orders)))
     return variants
+
+
+def _squares(numbers: Array, position: Array, count: int) -> Array:
+    """The squares (count,) of the lengths of the Fourier sums of numbers (n,) over positions in rad, order by order."""
+    # From one order to the next every wave turns by as much: a cosine and a sine of each would take ten times as long.
+    wave, turn = numbers * np.exp(1j * LOWEST * position), np.exp(1j * STEP * position)
+    sums = np.empty(count, dtype=np.complex128)
+    for order in range(count):
+        sums[order] = wave.sum()
+        wave *= turn
+    return np.asarray(np.abs(sums) ** 2)

@@ -59,16 +59,18 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> SlightSha
     beside = scene.remainders.beside([])
     parts: list[tuple[str, int]] = []
     columns: list[Array] = []
+    behind: list[float] = []
     for whole in scene_of(scene.fit, wholes).candidates:
         before = whole.raw_lengths / scene.fit.sigma
         remainder = without(beside.basis, whole.columns)
         length = np.linalg.norm(remainder, axis=0)
         able = np.flatnonzero(length > SMALLEST_SHARE * np.maximum(before, 1e-300))
         parts += [(whole.family, int(part)) for part in able]
+        behind += [whole.behind] * len(able)
         columns.append((remainder[:, able] / length[able]).astype(np.float32))
     if not parts:
         return None
-    best = _most_certain(scene, np.concatenate(columns, axis=1)[:, :, None], LEVEL)
+    best = _most_certain(scene, np.concatenate(columns, axis=1)[:, :, None], behind, LEVEL)
     return None if best is None else SlightShape(*parts[best[0]], best[1])
 
 
@@ -87,7 +89,8 @@ def slight_wave(scene: ChainScene, waves: Sequence[ChainCandidate]) -> SlightSha
             columns.append(orthonormal(remainder).astype(np.float32))
     if not able:
         return None
-    best = _most_certain(scene, np.stack(columns, axis=1), LEVEL_OF_WAVES)
+    behind = [waves[number].behind for number in able]
+    best = _most_certain(scene, np.stack(columns, axis=1), behind, LEVEL_OF_WAVES)
     return None if best is None else SlightShape(waves[able[best[0]]].family, able[best[0]], best[1])
 
 
@@ -114,7 +117,8 @@ def slight_error(scene: ChainScene, wholes: Sequence[ChainVariant]) -> str | Non
     if poses_of_rows(scene.fit) is not None or len(scene.fit.problem.runs) >= FEWEST:
         return None
     p_values = {
-        whole.family: _p_value_of_position(scene, whole) for whole in scene_of(scene.fit, wholes).candidates
+        whole.family: _p_value_of_position(scene, whole) * float(np.exp(whole.behind))
+        for whole in scene_of(scene.fit, wholes).candidates
     }
     family = min(p_values, key=lambda name: p_values[name], default=None)
     return None if family is None or p_values[family] * len(p_values) > LEVEL_OF_FEW else family
@@ -140,14 +144,17 @@ def p_value_of_all(scene: ChainScene, columns: Array, others: Sequence[ChainCand
     return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
 
 
-def _most_certain(scene: ChainScene, columns: Array, level: float) -> tuple[int, float] | None:
-    """Index and p-value, times their number, of the most certain of G shapes with orthonormal ``columns`` (M, G, k);
-    None where it does not stand out at a level, beyond any doubt of the noise where that is an estimate."""
+def _most_certain(
+    scene: ChainScene, columns: Array, behind: Sequence[float], level: float
+) -> tuple[int, float] | None:
+    """Index and p-value, times their number, of the most certain of G shapes with orthonormal ``columns`` (M, G, k),
+    of two that explain alike of that which is less far ``behind``; None where it does not stand out at a level,
+    beyond any doubt of the noise where that is an estimate."""
     beside = scene.remainders.beside([])
     count, size = columns.shape[1:]
     runs = len(scene.fit.problem.runs)
     explained = np.sum(np.tensordot(columns, beside.residual, (0, 0)) ** 2, axis=1)
-    best = int(explained.argmax())
+    best = int((explained * (1.0 - np.array(behind))).argmax())
     dof = beside.degrees_of_freedom - size
     rest = float(beside.residual @ beside.residual) - float(explained[best])
     if dof < 1 or rest <= 0.0:

@@ -7,14 +7,15 @@ axes in free shape, mimic what is left. A sawtooth has one coefficient; the sear
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.profiles import ErrorProfiles, Profiles
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.refine import refine
@@ -24,10 +25,11 @@ from monitor.discovery.machine.shapes.variants import (
     frequency_step,
     resolvable,
 )
-from monitor.discovery.search.candidate import Variant
-from monitor.discovery.search.evidence import Pool, weigh_beside
+from monitor.discovery.search.candidate import SMALLEST_SHARE, Variant
+from monitor.discovery.search.evidence import weigh_beside
 from monitor.effects import ChainEffect
 from monitor.effects.shapes import Cyclic, Sawtooth
+from monitor.effects.shapes.sawtooth import sawtooths
 from monitor.records import Array
 
 # Fewer teeth over the travel are a step, which free shapes have; of some fifty positions ten teeth have five each.
@@ -44,17 +46,18 @@ SAME_SCORE = 0.1
 
 @dataclass(frozen=True)
 class _Sawtooths:
-    """Sawtooths as candidates, and the number of teeth and the phase of each, in teeth."""
+    """Sawtooths by pitch and edge in mm (k, 2) and by their teeth and phase (k, 2), as the data see them."""
 
-    pool: Pool[ChainCandidate]
-    grid_points: Mapping[ChainVariant, tuple[float, float]]
+    shapes: Array
+    grid_points: Array
+    profiles: Profiles
 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """A sawtooth with its teeth and phase, and its score beside others."""
+    """A sawtooth by pitch and edge in mm, with its teeth and phase, and its score beside others."""
 
-    candidate: ChainCandidate
+    shape: tuple[float, float]
     grid_point: tuple[float, float]
     score: float
 
@@ -70,23 +73,34 @@ class TeethOfError:
     @cached_property
     def _range(self) -> tuple[float, float]:
         """Lowest reading in mm and travel."""
-        joint = self.effect.joint
-        reading = joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint]
-        return float(reading.min()), float(np.ptp(reading))
+        return float(self._reading.min()), float(np.ptp(self._reading))
 
-    def _variant(self, teeth: float, phase: float) -> ChainVariant:
-        """So many teeth over the travel, one of which falls so many teeth after its middle."""
+    @cached_property
+    def _reading(self) -> Array:
+        """The readings (n,) of the axis in mm."""
+        places = self.scene.fit.problem.context.places
+        return np.asarray(self.effect.joint.sign * places[:, self.effect.term.joint])
+
+    @cached_property
+    def _profiles(self) -> ErrorProfiles:
+        return ErrorProfiles(self.scene, self.effect)
+
+    def _shape(self, teeth: float, phase: float) -> tuple[float, float]:
+        """Pitch and edge of so many teeth over the travel, one of which falls so many teeth after its middle."""
         low, travel = self._range
         pitch = round(travel / teeth, 2)
         # Counted from the middle, the edges of neighbouring pitches lie together.
-        first = low + (travel / 2.0 + phase * pitch) % pitch
-        shape, symbol = Sawtooth(pitch, round(first, 2)), self.effect.term.symbol
-        return Variant(
+        return pitch, round(low + (travel / 2.0 + phase * pitch) % pitch, 2)
+
+    def _candidate(self, pitch: float, edge: float) -> ChainCandidate:
+        shape, symbol = Sawtooth(pitch, edge), self.effect.term.symbol
+        variant = Variant(
             f"{symbol}:sawtooth",
             replace(self.effect, shape=shape, shape_text=shape.text),
             self.tries,
             nearest=f"{symbol}:cyclic{shape.pitch:.3g}mm",
         )
+        return scene_of(self.scene.fit, [variant]).candidates[0]
 
     @cached_property
     def _teeth(self) -> Array:
@@ -104,23 +118,17 @@ class TeethOfError:
         return self._of(self._teeth, np.arange(EDGES) / EDGES)
 
     def _of(self, teeth: Array, phases: Array) -> _Sawtooths:
-        """The sawtooths that the data see, of every number of teeth at every phase."""
-        grid_points = {
-            self._variant(*grid_point): grid_point for grid_point in product(teeth.tolist(), phases.tolist())
-        }
-        candidates = scene_of(
-            self.scene.fit, [each for each in grid_points if self._falls_twice(each)]
-        ).candidates
-        return _Sawtooths(
-            Pool(tuple(candidate for candidate in candidates if candidate.visible)), grid_points
-        )
-
-    def _falls_twice(self, variant: ChainVariant) -> bool:
-        """Whether a second edge of a sawtooth lies within the travel: one alone is a step, which free shapes have."""
+        """The sawtooths of every number of teeth at every phase of which a second edge lies within the travel: one
+        alone is a step, which free shapes have."""
         low, travel = self._range
-        assert isinstance(variant.effect, ChainEffect)
-        assert isinstance(variant.effect.shape, Sawtooth)
-        return variant.effect.shape.edge + variant.effect.shape.pitch < low + WITHIN_TRAVEL * travel
+        grid_points = {
+            self._shape(*grid_point): grid_point for grid_point in product(teeth.tolist(), phases.tolist())
+        }
+        shapes = np.array(list(grid_points)).reshape(-1, 2)
+        falls_twice = shapes.sum(axis=1) < low + WITHIN_TRAVEL * travel
+        shapes = shapes[falls_twice]
+        profiles = self._profiles.of(sawtooths(self._reading, shapes[:, 0], shapes[:, 1]))
+        return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[falls_twice], profiles)
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the sawtooth that says most beside others, or as the plain cycle of so many periods where that
@@ -140,15 +148,12 @@ class TeethOfError:
 
     def _cycle_instead(self, sawtooth: _Weighed, others: Sequence[ChainCandidate]) -> ChainCandidate:
         """The plain cycle that says at least as much as a sawtooth beside others, else that."""
+        teeth = self._candidate(*sawtooth.shape)
         weighed = weigh_beside(self.scene, self._cycles, others)
         if not weighed:
-            return sawtooth.candidate
+            return teeth
         cycle = refine(self.scene, [*others, weighed[0].candidate], len(others)).candidate
-        return (
-            cycle
-            if weigh_beside(self.scene, [cycle], others)[0].score >= sawtooth.score
-            else sawtooth.candidate
-        )
+        return cycle if weigh_beside(self.scene, [cycle], others)[0].score >= sawtooth.score else teeth
 
     @cached_property
     def _cycles(self) -> list[ChainCandidate]:
@@ -183,11 +188,17 @@ class TeethOfError:
 
     def _weighed(self, sawtooths: _Sawtooths, others: Sequence[ChainCandidate]) -> list[_Weighed]:
         """Sawtooths beside others, the most convincing first; none where the data see none."""
-        if not sawtooths.pool.candidates:
-            return []
+        scores = self._profiles.scores(sawtooths.profiles, self.tries, others)
+        ordered = np.argsort(-scores, kind="stable")
+        ordered = ordered[sawtooths.profiles.shares[ordered] > SMALLEST_SHARE]
         return [
-            _Weighed(each.candidate, sawtooths.grid_points[each.candidate.variant], each.score)
-            for each in weigh_beside(self.scene, sawtooths.pool, others)
+            _Weighed(shape, grid_point, score)
+            for shape, grid_point, score in zip(
+                map(tuple, sawtooths.shapes[ordered].tolist()),
+                map(tuple, sawtooths.grid_points[ordered].tolist()),
+                scores[ordered].tolist(),
+                strict=True,
+            )
         ]
 
 

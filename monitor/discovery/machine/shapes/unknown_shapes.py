@@ -7,7 +7,7 @@ Where the flexible competitor of an error says more than its shapes of the catal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from monitor.discovery.machine.compare import lack_of_fit
@@ -20,11 +20,14 @@ from monitor.discovery.machine.shapes.free_parts import (
     PRICE,
     in_any_shape,
     is_free,
+    most_together,
     of_parts,
+    of_parts_alone,
     parts_worth_keeping,
     price_of_parts,
     priced,
     whole_basis,
+    with_nearest,
 )
 from monitor.discovery.machine.shapes.inside_shapes import (
     LEVEL,
@@ -33,6 +36,7 @@ from monitor.discovery.machine.shapes.inside_shapes import (
     with_those_outside,
 )
 from monitor.discovery.machine.shapes.refined_instead import refined_instead
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -41,10 +45,10 @@ from monitor.discovery.machine.shapes.slight_shapes import (
     slight_wave,
 )
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.teeth import teeth_of
+from monitor.discovery.machine.shapes.teeth import TeethOfError, teeth_of
 from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
-from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.evidence import Pool, weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import (
     WORTH_EXCHANGING,
@@ -58,6 +62,8 @@ from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
 
+# An error is asked for steps where it explains in any shape such a part of what the best one does.
+PROMISING = 0.5
 # So many times the stated noise is an error that is missing, not a statement that is wrong.
 FAR = 1.5
 
@@ -329,40 +335,88 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     }
     best: list[ChainCandidate] = []
     worth = max(priced(scene, selected), priced(scene, bending_sight(scene))) + margin
+    wholes = Pool(tuple(whole for _, whole in errors.values()))
+    counts = range(max(len(ordered), 1))
+    promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
-        teeth = teeth_of(scene, shapes[0])
-        for count in range(max(len(ordered), 1)):
+        sharp = _Sharp(teeth_of(scene, shapes[0]), steps_of(scene, shapes[0]))
+        for count in counts:
             leading, gone = ordered[:count], ordered[count:]
-            sawtooth = teeth.beside(leading) if teeth is not None else []
-            for new in [*_of_error(scene, symbol, shapes, whole, leading), *([sawtooth] if sawtooth else [])]:
-                # What rounded teeth leave is no other error.
-                beside = [*leading, *new, *([whole] if new is sawtooth else [])]
+            edged = sharp.beside(leading, with_steps=symbol in promising[count])
+            for new in [*_of_error(scene, whole, leading, gone[:-1], worth), *edged]:
+                has_edges = any(new is some for some in edged)
+                # What rounded edges leave is no other error.
+                beside = [*leading, *new, *([whole] if has_edges else [])]
                 of_others = [each for each in gone if error_of(each) != symbol]
-                # One goes in any case: where teeth take the place of their error's other shapes, these do.
-                may_stay = of_others if new is sawtooth and len(of_others) < len(gone) else gone[:-1]
-                together = [*leading, *new, *standing_beside(scene, beside, may_stay)]
-                score = priced(scene, together)
-                if score > worth:
-                    best, worth = together, score
+                # One goes in any case: where edges take the place of their error's other shapes, these do.
+                may_stay = of_others if has_edges and len(of_others) < len(gone) else gone[:-1]
+                staying = standing_beside(scene, beside, may_stay)
+                score = priced(scene, [*leading, *new, *staying])
+                if score > worth and _foretells_if_free(scene, new, leading):
+                    best, worth = [*leading, *_named(scene, new, shapes, leading), *staying], score
     return best
+
+
+def _foretells_if_free(
+    scene: ChainScene, new: Sequence[ChainCandidate], leading: Sequence[ChainCandidate]
+) -> bool:
+    """Whether a free shape foretells poses; of others it was asked before."""
+    return not is_free(new[0]) or foretells_poses(scene, new, leading)
+
+
+def _named(
+    scene: ChainScene,
+    new: list[ChainCandidate],
+    shapes: Sequence[ChainCandidate],
+    leading: Sequence[ChainCandidate],
+) -> list[ChainCandidate]:
+    """A free shape with what comes nearest to it; others as they are."""
+    return [with_nearest(scene, new[0], shapes, leading)] if is_free(new[0]) else new
+
+
+@dataclass(frozen=True)
+class _Sharp:
+    """What has edges of one error: its teeth and its steps, None where it has none."""
+
+    teeth: TeethOfError | None
+    steps: StepsOfError | None
+
+    def beside(self, leading: Sequence[ChainCandidate], *, with_steps: bool) -> list[list[ChainCandidate]]:
+        """The teeth and, if asked for, the steps that say most beside leading effects, as far as there are any."""
+        asked = (self.teeth, self.steps if with_steps else None)
+        return [some for each in asked if each is not None and (some := each.beside(leading))]
+
+
+def _promising(
+    scene: ChainScene, wholes: Pool[ChainCandidate], leading: Sequence[ChainCandidate]
+) -> set[str]:
+    """The errors that explain in any shape beside leading effects no less than half of what the best one does: a step
+    of another would say less."""
+    weighed = weigh_beside(scene, wholes, leading)
+    most = max((evidence.explained for evidence in weighed), default=0.0)
+    return {error_of(each.candidate) for each in weighed if each.explained >= PROMISING * most}
 
 
 def _of_error(
     scene: ChainScene,
-    symbol: str,
-    shapes: Sequence[ChainCandidate],
     whole: ChainCandidate,
     leading: Sequence[ChainCandidate],
+    may_stay: Sequence[ChainCandidate],
+    worth: float,
 ) -> list[list[ChainCandidate]]:
-    """What an error may be beside leading effects: one free shape, or several powers of the position that say as much;
-    none where it is among them or foretells no poses."""
+    """What an error, of which the ``whole`` basis is given, may be beside leading effects: one free shape, whether or
+    not it foretells poses, or several powers of the position that say as much; none where it is among them, or where
+    with those that may stay it is not worth so much."""
+    symbol = error_of(whole)
     if symbol in map(error_of, leading):
         return []
     parts = parts_worth_keeping(scene, whole, leading)
     if not parts:
         return []
-    free = of_parts(scene, symbol, parts, shapes, leading)
+    free = of_parts_alone(scene, symbol, parts)
+    if not any(error_of(power) == symbol for power in scene.powers):
+        return [[free]] if most_together(scene, free, leading, may_stay) > worth else []
     able = foretells_poses(scene, [free], leading)
     bends = bends_instead(scene, symbol, priced(scene, [free], leading) if able else 0.0, leading)
     return [some for some in ([free] if able else [], bends) if some]

@@ -14,10 +14,9 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.variants import part_of_period
 from monitor.discovery.search.candidate import Variant
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.products import Products
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import HARMONICS, Free
-from monitor.records import Array
 
 #: Waves of fewer periods a turn are in the catalogue, or are the motion itself.
 FEWEST_PERIODS = 4
@@ -81,27 +80,17 @@ def many_periods(scene: ChainScene, shapes: Sequence[ChainCandidate]) -> tuple[C
     return scene_of(scene.fit, variants).candidates
 
 
-def worth_keeping(
-    columns: Array, residual: Array, parts: Sequence[int], freedom: int, price: float
-) -> list[int]:
-    """Those of some parts of a basis (M, k) that are worth their price beside the others, in their order.
+def worth_keeping(products: Products, parts: Sequence[int], freedom: int, price: float) -> list[int]:
+    """Those of some parts of a basis that are worth their price beside the others, in their order.
 
     Parts are selected one after the other: the first may be a mixture of two that were selected later, and says
     nothing beside them.
     """
     worthy = list(parts)
     while len(worthy) > 1:
-        remaining = [
-            left_by(columns[:, [part for part in worthy if part != out]], residual) for out in worthy
-        ]
+        remaining = [products.left_by([part for part in worthy if part != out]) for out in worthy]
         least = int(np.argmin(remaining))
-        if freedom * np.log(remaining[least] / max(left_by(columns[:, worthy], residual), 1e-300)) >= price:
+        if freedom * np.log(remaining[least] / max(products.left_by(worthy), 1e-300)) >= price:
             break
         del worthy[least]
     return worthy
-
-
-def left_by(columns: Array, residual: Array) -> float:
-    """The sum of squares that columns (M, k) leave of a residual (M,)."""
-    remainder = without(orthonormal(columns), residual[:, None])[:, 0]
-    return float(remainder @ remainder)

@@ -37,16 +37,21 @@ NODES = (3, 4, 6, 10)
 SETTLING = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)
 
 
-def station_moves(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> list[ChainVariant]:
+def station_moves(
+    scene: ChainScene,
+    selected: Sequence[ChainCandidate],
+    rate: float,
+    first_moments: dict[type[Moved], tuple[ChainCandidate, ...]] | None = None,
+) -> list[ChainVariant]:
     """The move of the tracker and that of the machine that explain most beside selected effects; none where none stands
-    out at a ``rate``."""
+    out at a ``rate``. ``first_moments`` are the moments of one run that were tried first under this fit, kept here."""
     context = scene.fit.problem.context
     if any(name not in context.columns for name in TRACKER_COLUMNS):
         return []
     steady = [candidate for candidate in selected if not may_be_a_move(candidate)]
-    moves = [
-        best for kind in (TrackerMoved, BaseMoved) if (best := _likeliest(scene, steady, kind)) is not None
-    ]
+    first_moments = {} if first_moments is None else first_moments
+    likeliest = (_likeliest(scene, steady, kind, first_moments) for kind in (TrackerMoved, BaseMoved))
+    moves = [best for best in likeliest if best is not None]
     if not moves:
         return []
     walks = [walk for nodes in NODES for walk in wander(scene, nodes)]
@@ -93,7 +98,10 @@ def _change_of(candidate: ChainCandidate) -> Moved:
 
 
 def _likeliest(
-    scene: ChainScene, steady: Sequence[ChainCandidate], kind: type[Moved]
+    scene: ChainScene,
+    steady: Sequence[ChainCandidate],
+    kind: type[Moved],
+    first_moments: dict[type[Moved], tuple[ChainCandidate, ...]],
 ) -> Evidence[ChainCandidate] | None:
     """The likeliest move of a kind of all runs."""
     context = scene.fit.problem.context
@@ -103,22 +111,29 @@ def _likeliest(
     }
     tries = sum(map(len, moments.values()))
 
-    def best_of(run: int, sequences: Iterable[int]) -> Evidence[ChainCandidate] | None:
-        moves = (ArtefactEffect(kind(run, int(sequence)), Always(), "") for sequence in sequences)
+    def moves(run: int, sequences: Iterable[int]) -> tuple[ChainCandidate, ...]:
+        effects = [ArtefactEffect(kind(run, int(sequence)), Always(), "") for sequence in sequences]
         odds = ODDS_OF_BASE if kind is BaseMoved else 1.0
-        variants = [Variant(move.text, move, tries, odds) for move in moves]
-        weighed = weigh_beside(scene, scene_of(scene.fit, variants).candidates, steady)
+        return scene_of(
+            scene.fit, [Variant(effect.text, effect, tries, odds) for effect in effects]
+        ).candidates
+
+    def best_of(candidates: Sequence[ChainCandidate]) -> Evidence[ChainCandidate] | None:
+        weighed = weigh_beside(scene, candidates, steady)
         return weighed[0] if weighed else None
 
     of_runs = []
     for run, sequences in moments.items():
         step = max(len(sequences) // MOMENTS, 1)
-        best = best_of(run, sequences[::step])
+        coarse = first_moments.get(kind) or moves(run, sequences[::step])
+        if len(moments) == 1:
+            first_moments[kind] = coarse
+        best = best_of(coarse)
         while best is not None and step > 1:
             at = int(np.searchsorted(sequences, _change_of(best.candidate).sequence))
             around = sequences[max(at - step, 0) : at + step + 1]
             step = max(len(around) // MOMENTS, 1)
-            best = best_of(run, around[::step]) or best
+            best = best_of(moves(run, around[::step])) or best
         if best is not None:
             of_runs.append(best)
     return max(of_runs, key=lambda each: each.score, default=None)

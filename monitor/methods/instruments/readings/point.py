@@ -174,12 +174,15 @@ def _are_stated(rows: Rows, setup: Setup) -> bool:
 
 
 def _stated_places(setup: Setup, rows: Rows, targets: Sequence[str] | npt.NDArray[np.str_]) -> Array:
-    """Places (T, 3) of the targets on the tool: as the rows state them, else that of the setup."""
+    """Places (T, 3) of the targets, in their order, on the tool: as the rows state them, else that of the setup."""
     places = np.tile(setup.tool_point, (len(targets), 1)).astype(np.float64)
-    for number, name in enumerate(targets):
-        stated = rows.nominal[rows.target == name]
-        if len(stated) and np.isfinite(stated).all():
-            places[number] = stated.mean(axis=0)
+    at = np.searchsorted(np.array(targets), rows.target)
+    count, total = np.zeros(len(targets)), np.zeros_like(places)
+    np.add.at(count, at, 1.0)
+    np.add.at(total, at, rows.nominal)
+    # A row that states no place leaves the sum of its target without a number.
+    stated = np.isfinite(total).all(axis=1) & (count > 0.0)
+    places[stated] = total[stated] / count[stated, None]
     return places
 
 

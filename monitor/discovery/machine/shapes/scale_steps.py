@@ -1,0 +1,265 @@
+"""Steps of an error of a linear axis at searched places: a joint of a scale, a damaged spot of it, a joint of rails.
+
+Hats a twelfth of the travel apart make a step of a mixture, as do pitches of a cycle or a sawtooth, and errors of other
+axes mimic what such a mixture leaves. A step has one coefficient; the search of its place, and of the width over which
+it goes, is paid for. Between two neighbouring positions every place is the same: their middle is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import comb
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.bends import foretells_poses
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import parts_worth_keeping
+from monitor.discovery.machine.shapes.refine import LIMIT
+from monitor.discovery.machine.shapes.tables import SAME_POSITION
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.projection import without
+from monitor.effects import ChainEffect
+from monitor.effects.shapes import Step
+from monitor.records import Array
+
+# A region between two joints has two; more are a curve, which free shapes and tables have.
+MOST_STEPS = 3
+# One position beyond a step, or between two, would be a step as well as a point by itself.
+POSITIONS_BEYOND = 2
+# Places are looked for among so many, and about the best of them among all; steps that go over a width have places
+# between positions as well: so many about the best.
+PLACES, NEAR_PLACES = 36, 33
+# Widths of the way from one level to the other that are tried, as parts of the travel, and about the best of them; what
+# is wider than a twelfth is a curve, which hats follow.
+WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
+NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
+# Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
+WIDTHS_APART = 4.0
+
+
+@dataclass(frozen=True)
+class Between:
+    """The readings in mm between which a step lies."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StepsOfError:
+    """The steps of an error of a linear axis, between the positions where it stood; ``effect`` is the error in any of
+    its shapes."""
+
+    scene: ChainScene
+    effect: ChainEffect
+
+    @cached_property
+    def _positions(self) -> Array:
+        """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood."""
+        joint = self.effect.joint
+        reading = np.sort(joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint])
+        apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
+        first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
+        return np.column_stack([reading[first], reading[last]])
+
+    @cached_property
+    def _gaps(self) -> Array:
+        """The lower and upper ends (g, 2) in mm of what lies between neighbouring positions, where a step may be."""
+        between = np.column_stack([self._positions[:-1, 1], self._positions[1:, 0]])
+        return np.asarray(between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1])
+
+    @cached_property
+    def _middles(self) -> Array:
+        """The middles (g,) of the gaps, in mm with two digits where these keep them inside."""
+        middles = self._gaps.mean(axis=1)
+        rounded = np.round(middles, 2)
+        inside = (rounded > self._gaps[:, 0]) & (rounded < self._gaps[:, 1])
+        return np.asarray(np.where(inside, rounded, middles))
+
+    @cached_property
+    def _widths(self) -> list[float]:
+        """The widths in mm that are tried; a way between two positions is a step at once."""
+        travel = float(self._positions[-1, 1] - self._positions[0, 0])
+        usual = float(np.median(np.diff(self._positions.mean(axis=1))))
+        return [0.0, *(travel * part for part in WIDTHS if travel * part > usual)]
+
+    def _places(self, width: float) -> Array:
+        """The places among which steps of a width are looked for first."""
+        if width:
+            return np.linspace(self._middles[0], self._middles[-1], PLACES)
+        count = len(self._middles)
+        return np.asarray(
+            self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
+        )
+
+    def _near(self, at_mm: float, width: float) -> Array:
+        """The places between the neighbours of one among the first."""
+        first = self._places(width)
+        if width:
+            return np.asarray(
+                np.round(at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
+            )
+        low, high = first[first < at_mm].max(initial=-np.inf), first[first > at_mm].min(initial=np.inf)
+        return np.asarray(self._middles[(self._middles > low) & (self._middles < high)])
+
+    @cached_property
+    def _wholes(self) -> list[tuple[Array, float, ChainCandidate]]:
+        """All steps of the first search together: places, width and effect."""
+        return [
+            (places, width, self._candidate(places, width))
+            for places, width in ((self._places(width), width) for width in self._widths)
+        ]
+
+    def _candidate(self, places: Array | Sequence[float], width: float) -> ChainCandidate:
+        """The steps at places in rising order as one effect."""
+        shape = Step(tuple(map(float, places)), width)
+        effect = replace(self.effect, shape=shape, shape_text=shape.text)
+        # Between two positions all places are one.
+        tries = comb(len(self._gaps), min(len(places), MOST_STEPS)) * len(self._widths)
+        variant = Variant(f"{self.effect.term.symbol}:step", effect, max(tries, 1))
+        return scene_of(self.scene.fit, [variant]).candidates[0]
+
+    def _are_apart(self, places: Sequence[float], width: float) -> bool:
+        """Whether there are positions enough between neighbouring steps, at which both have come to their levels."""
+        at = self._positions.mean(axis=1)
+        between = np.diff(np.searchsorted(at, sorted(places)))
+        return bool(
+            np.all(between >= POSITIONS_BEYOND) and np.all(np.diff(sorted(places)) >= WIDTHS_APART * width)
+        )
+
+    def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+        """The error as the steps that say most beside others, one effect of up to three; none where it is among them,
+        where none is worth its price, or where they foretell no poses."""
+        if self.effect.term.symbol in map(error_of, others) or not len(self._gaps):
+            return []
+        worth, best = self._price(0, others) + self._cost([], others), None
+        for (places, width, whole), most in product(self._wholes, (1, MOST_STEPS)):
+            selected = self._refined(self._selected(places, whole, most, others), width, others)
+            selected = self._worth_keeping(selected, width, others)
+            if not selected or not self._are_apart(selected, width):
+                continue
+            # The width of a way is one more unknown.
+            price = self._price(len(selected) + bool(width), others)
+            cost = price + self._cost([self._candidate(selected, width)], others)
+            if cost < worth:
+                worth, best = cost, (selected, width)
+        return [] if best is None else self._at_best_width(*best, others)
+
+    def _at_best_width(
+        self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> list[ChainCandidate]:
+        """The steps at the best width about one that was tried; none where they foretell no poses."""
+        widths = [float(f"{width * part:.3g}") for part in NEAR_WIDTHS] if width else []
+        able = [some for some in widths if self._are_apart(places, some)]
+        if able:
+            width = min(able, key=lambda some: self._cost([self._candidate(places, some)], others))
+            places = self._worth_keeping(self._refined(places, width, others), width, others)
+        steps = self._candidate(places, width)
+        return [steps] if steps.visible and foretells_poses(self.scene, [steps], others) else []
+
+    def _choice(self) -> float:
+        """The logarithm of the number of places and widths."""
+        return float(np.log(len(self._gaps) * len(self._widths)))
+
+    def _price(self, count: int, others: Sequence[ChainCandidate]) -> float:
+        """What so many steps and their choice take from the score."""
+        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        return count * (float(np.log(freedom)) + 2.0 * self._choice())
+
+    def _cost(self, steps: Sequence[ChainCandidate], others: Sequence[ChainCandidate]) -> float:
+        """Minus twice the logarithm of the likelihood of steps beside others."""
+        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        residual = self.scene.remainders.beside([*others, *steps]).residual
+        return freedom * float(np.log(residual @ residual))
+
+    def _selected(
+        self, places: Array, whole: ChainCandidate, most: int, others: Sequence[ChainCandidate]
+    ) -> list[float]:
+        """The places of the first search that are worth their price, so many at most."""
+        parts = parts_worth_keeping(self.scene, whole, others, most=most, choice=self._choice())
+        return list(map(float, places[sorted(parts)]))
+
+    def _refined(
+        self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> list[float]:
+        """The places, each at the best between its neighbours of the first search."""
+        best = list(places)
+        for index, at_mm in enumerate(places):
+            rest = best[:index] + best[index + 1 :]
+            near = [some for some in self._near(at_mm, width) if self._are_apart([*rest, some], width)]
+            if len(near) > 1:
+                remaining = self._left_with(near, rest, width, others)
+                # The middle of those that say the same: between two positions the readings are.
+                alike = np.flatnonzero(remaining <= remaining.min() * (1.0 + 1e-9))
+                best[index] = near[int(alike[len(alike) // 2])]
+        return best
+
+    def _worth_keeping(
+        self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> list[float]:
+        """The places of steps that are worth their price beside the rest, now that all are where they say most."""
+        worthy = list(places)
+        while len(worthy) > 1:
+            with_all = self._cost([self._candidate(worthy, width)], others)
+            without_each = [
+                self._cost([self._candidate(worthy[:index] + worthy[index + 1 :], width)], others)
+                for index in range(len(worthy))
+            ]
+            least = int(np.argmin(without_each))
+            if without_each[least] - with_all >= self._price(1, others):
+                break
+            del worthy[least]
+        return worthy
+
+    def _left_with(
+        self, near: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> Array:
+        """What is left (k,) of the residual with a step at each of some places, beside steps at ``rest`` and others."""
+        beside = [*others, *([self._candidate(rest, width)] if rest else [])]
+        remainder = self.scene.remainders.beside(beside)
+        columns = without(remainder.basis, self._candidate(near, width).columns)
+        length = np.linalg.norm(columns, axis=0)
+        onto = columns.T @ remainder.residual / np.where(length > 0.0, length, 1.0)
+        return np.asarray(remainder.residual @ remainder.residual - onto**2)
+
+    def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
+        """The readings between which each step of a shape lies beside others: all gaps in whose middle it would not be
+        3.84 (twice the logarithm of a likelihood ratio) less likely than where it says most."""
+        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        intervals = []
+        for index, at_mm in enumerate(shape.readings):
+            rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
+            remaining = self._left_with(self._middles.tolist(), rest, shape.width, others)
+            best = min(float(remaining.min()), float(self._left_with([at_mm], rest, shape.width, others)[0]))
+            of_place = np.flatnonzero((self._gaps[:, 0] <= at_mm) & (at_mm <= self._gaps[:, 1]))
+            able = np.union1d(of_place, np.flatnonzero(freedom * np.log(remaining / best) < LIMIT))
+            ends = self._gaps[able]
+            intervals.append(
+                Between(
+                    float(ends.min(initial=at_mm - shape.width / 2.0)),
+                    float(ends.max(initial=at_mm + shape.width / 2.0)),
+                )
+            )
+        return tuple(intervals)
+
+
+def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
+    """The steps of the error of which a candidate is a shape; None where it turns or is none of an axis."""
+    effect = shape.effect
+    if not isinstance(effect, ChainEffect) or effect.joint.turns:
+        return None
+    return StepsOfError(scene, effect)
+
+
+def steps_between(
+    scene: ChainScene, candidate: ChainCandidate, others: Sequence[ChainCandidate]
+) -> tuple[Between, ...]:
+    """The readings between which each step of an effect lies beside others; none where it has none."""
+    steps = steps_of(scene, candidate)
+    shape = None if steps is None else steps.effect.shape
+    return steps.between(shape, others) if steps is not None and isinstance(shape, Step) else ()

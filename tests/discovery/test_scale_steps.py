@@ -1,0 +1,61 @@
+"""Steps of an error of a linear axis at searched places; the simulator shares no code."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from by_path import simulator
+
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError
+from monitor.effects import parse_effect
+from monitor.methods.model import Model
+from monitor.methods.samba.method import problem_of
+
+
+def step(q, travel, now):
+    return (q > 20.0) - 0.5
+
+
+def region(q, travel, now):
+    return ((q > -60.0) & (q < 40.0)) - 0.5
+
+
+def steps_beside_nothing(campaign, error):
+    scene = scene_of(fit(problem_of(campaign).for_search()), [])
+    steps = StepsOfError(scene, parse_effect(f"{error}:poly2", scene.fit.problem.context.chain))
+    return steps, steps.beside([])
+
+
+@pytest.mark.parametrize(("curve", "places"), [(step, [20.0]), (region, [-60.0, 40.0])])
+def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curve, places):
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=2)
+    steps, (found,) = steps_beside_nothing(campaign, "EXX")
+    shape = found.effect.shape
+    between = steps.between(shape, [])
+    assert len(between) == len(places)
+    for place, told, interval in zip(places, shape.readings, between, strict=True):
+        assert interval.low < place < interval.high
+        assert interval.low < told < interval.high
+    assert found.variant.tries > 1
+
+
+def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):
+    campaign, _ = virtual_campaigns.virtual(77, days=1, runs_per_day=1)
+    _, found = steps_beside_nothing(campaign, "EXX")
+    assert found == []
+
+
+@pytest.mark.slow
+def test_a_step_is_told_alone_and_a_model_with_it_lacks_nothing(virtual_campaigns, explained):
+    """A table, a cycle and a free shape of another axis were told in its place."""
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=step)
+    campaign, _ = virtual_campaigns.virtual(77, [hidden], days=2)
+    (found,) = explained(campaign).missing
+    assert found.effect.startswith("EXX:step")
+    (interval,) = found.steps
+    assert interval.low < 20.0 < interval.high
+    grown = problem_of(campaign, Model("grown", added=(found.effect,)))
+    assert explain(campaign, grown, "grown", rng=np.random.default_rng(1)).missing == ()
