@@ -246,9 +246,13 @@ def _size_words(effect: MachineMissing) -> str:
     return size if effect.largest is None else f"up to {size} (the node {effect.largest})"
 
 
+def _unit_of_peak(effect: MachineMissing) -> str:
+    return "µm" if effect.peak_urad is None else "µrad"
+
+
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
     at = "tip" if explanation.target_word == "ball" else f"{explanation.target_word}s"
-    unit = "µm" if effect.peak_urad is None else "µrad"
+    unit = _unit_of_peak(effect)
     p_and_q = f"{output.stated('p', effect.p_value)}, {output.stated('q', effect.q_value)}"
     output.say(f"{effect.rank}. {effect.effect}: {effect.description.meaning}")
     output.say(f"   {_size_words(effect)}, at most {effect.peak_um:.1f} {unit} at the {at}; {p_and_q}")
