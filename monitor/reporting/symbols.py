@@ -20,6 +20,8 @@ _DIRECTIONS = {
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
 _TEETH = re.compile(r"sawtooth(?P<pitch>[\d.]+)mm\((?P<edge>-?[\d.]+)\)")
+#: A step, or the one of several that a number is of: ``step8mm(-60,110).110mm``.
+_STEP = re.compile(r"step(?:(?P<width>[\d.]+)mm)?\((?P<places>[-\d.,]+)\)(?:\.(?P<of_several>-?[\d.]+)mm)?")
 #: ``J2`` is a joint of a robot, ``DEC`` an axis of a mount: such names do not say along which direction an axis lies.
 _SYMBOL = re.compile(
     r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+|[A-Z]{2,}\d*)(?::(?P<rest>.+))?"
@@ -59,11 +61,17 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
 
 
 def _in_words(shape: str, say: Texts) -> str:
-    """A shape as written; of teeth what their number is the size of."""
-    if (teeth := _TEETH.fullmatch(shape)) is None:
+    """A shape as written; of teeth and steps what their number is the size of."""
+    if (teeth := _TEETH.fullmatch(shape)) is not None:
+        pitch, edge = (say.number(Decimal(teeth[name])) for name in ("pitch", "edge"))
+        return say("terms.teeth", pitch=pitch, edge=edge)
+    step = _STEP.fullmatch(shape)
+    place = None if step is None else step["of_several"] or step["places"]
+    if step is None or place is None or "," in place:
         return shape
-    pitch, edge = (say.number(Decimal(teeth[name])) for name in ("pitch", "edge"))
-    return say("terms.teeth", pitch=pitch, edge=edge)
+    if step["width"] is None:
+        return say("terms.step", place=say.number(Decimal(place)))
+    return say("terms.step_over", place=say.number(Decimal(place)), width=say.number(Decimal(step["width"])))
 
 
 def _location(direction: str, axis: str, turns: bool) -> str:

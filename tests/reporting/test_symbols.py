@@ -32,6 +32,12 @@ from monitor.reporting.symbols import describe
             "EXX:sawtooth84.34mm(-157.25)",
             "positioning error of axis X (step of teeth of 84.34 mm, one at −157.25 mm)",
         ),
+        ("EXX:step(-12.5)", "positioning error of axis X (step at −12.5 mm towards higher readings)"),
+        (
+            "EYX:step8mm(-60,110).110mm",
+            "straightness error in Y of axis X (step over 8 mm about 110 mm, towards higher readings)",
+        ),
+        ("EXX:step(-60,110)", "positioning error of axis X (step(-60,110))"),
         ("EAX", "roll of axis X"),
         ("EBX", "tilt about Y of axis X"),
         ("EBB:harmonic2", "angular positioning error of axis B (harmonic2)"),
