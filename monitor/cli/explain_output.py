@@ -276,14 +276,7 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(f"   {reversal_words(effect.reversal_value)}")
     if effect.searched is not None:
         output.say(f"   {_searched(effect.searched)}")
-    for step in effect.steps or ():
-        output.say(f"   {_step_words(effect, step)}")
-    if effect.held_at is not None:
-        places = (
-            f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"
-            for held in effect.held_at
-        )
-        output.say(f"   held at {', '.join(places)}")
+    _where(effect)
     if effect.travelled_periods is not None:
         output.say(
             f"   the axis turned {effect.travelled_periods:.2f} of its period: over less than 1.5 it is a smooth bend, "
@@ -302,6 +295,18 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         if after is not None
     ] or ["too few readings to leave some out"]
     output.say(f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; {', '.join(held_out)}")
+
+
+def _where(effect: MachineMissing) -> None:
+    """Where an effect lies, as far as it was looked for: its steps, or the place at which a plate is held."""
+    for step in effect.steps or ():
+        output.say(f"   {_step_words(effect, step)}")
+    if effect.held_at is not None:
+        places = (
+            f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"
+            for held in effect.held_at
+        )
+        output.say(f"   held at {', '.join(places)}")
 
 
 def _step_words(effect: MachineMissing, step: StepBetween) -> str:

@@ -66,12 +66,15 @@ def _in_words(shape: str, say: Texts) -> str:
         pitch, edge = (say.number(Decimal(teeth[name])) for name in ("pitch", "edge"))
         return say("terms.teeth", pitch=pitch, edge=edge)
     step = _STEP.fullmatch(shape)
-    place = None if step is None else step["of_several"] or step["places"]
-    if step is None or place is None or "," in place:
+    if step is None:
         return shape
+    reading = step["of_several"] or step["places"]
+    if "," in reading:
+        return shape
+    at_reading = say.number(Decimal(reading))
     if step["width"] is None:
-        return say("terms.step", place=say.number(Decimal(place)))
-    return say("terms.step_over", place=say.number(Decimal(place)), width=say.number(Decimal(step["width"])))
+        return say("terms.step", place=at_reading)
+    return say("terms.step_over", place=at_reading, width=say.number(Decimal(step["width"])))
 
 
 def _location(direction: str, axis: str, turns: bool) -> str:

@@ -101,5 +101,5 @@ def test_a_longer_tool_tells_a_turn_of_the_head_from_a_shift_of_it_and_from_a_ti
     assert all(isinstance(each, ChainEffect) for each in (turn, shift, tilt))
     large, small = np.array([4e-4, 2e-4]), np.array([1e-6, 0.0])
     for rival in (shift, tilt):
-        assert second_ball(head, turn, large, rival, STROKES) is SecondSetup.LONGER_STYLUS
+        assert second_ball(head, turn, large, rival, STROKES) == (SecondSetup.LONGER_STYLUS, 1)
         assert second_ball(head, turn, small, rival, STROKES) is None

@@ -130,7 +130,7 @@ def test_points_in_metres_are_refused_as_of_a_tracker(tmp_path: Path, reading: s
     _altered(folder, lambda rows, _: rows / 1e3)
     campaign = read_campaign(folder)
     assert any(
-        "point_x_mm, point_y_mm and point_z_mm span" in told
+        "point_x_mm, point_y_mm and point_z_mm of setup probe span" in told
         for told in doubts(campaign, tool_frames(campaign))
     )
     with pytest.raises(DataError, match=r"99\d times as large .* units of point_x_mm, .* of setup probe"):

@@ -23,16 +23,14 @@ from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, colum
 from monitor.methods.chain.condensed import triangles
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import LARGEST_UNTOLD, MeasuredChain
+from monitor.methods.chain.mistaken_unit import mistaken_unit
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
-from monitor.units import UNIT_WORDS, Unit, mistaken_for_mm
+from monitor.units import Unit
 
 #: Up to so many rows the derivatives of all stand side by side: 7 kB a row, 1 GB. Of more, those of ``ROWS_AT_ONCE``.
 MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 10_000
-
-# Units are further apart than a fifth; so far off is a gain that a fit of such readings ends at.
-NEAR_UNIT = 0.2
 
 
 @dataclass(frozen=True)
@@ -408,19 +406,6 @@ def _best_of(
     return min(solutions, key=lambda solution: float(np.sum(solution.last.residual**2)))
 
 
-def _mistaken_unit(problem: ChainProblem, gain: float, gains: Array) -> str:
-    """The unit that positions or the readings of instruments seem to be in under a gain, or a bar's length where all
-    ``gains`` that are told are that one, in words; else empty."""
-    # A tip truly moves by 1 + gain of the positions that were typed.
-    of_positions = mistaken_for_mm(1.0 / (1.0 + gain), NEAR_UNIT)
-    alike = not problem.measured_joints or np.ptp(gains) < NEAR_UNIT * (1.0 + gain)
-    of_lengths = mistaken_for_mm(1.0 + gain, NEAR_UNIT) if alike else ()
-    lengths = "the length of its scale bar was" if problem.measured_joints else "its readings were"
-    mistakes = [f"{lengths} {UNIT_WORDS[unit]}" for unit in of_lengths]
-    mistakes += [f"its positions were {UNIT_WORDS[unit]}" for unit in of_positions]
-    return f"; it looks as if {' or '.join(mistakes)}" if mistakes else ""
-
-
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
     """DataError where a location angle or a gain comes out too large to be an error, or too much is left.
 
@@ -444,7 +429,11 @@ def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
         gains = [isinstance(each, ChainEffect) and each.is_gain for each, _ in limited]
         is_gain = gains[int(which)]
         of_run = errors[run, free[run] & gains]
-        looks = _mistaken_unit(problem, error, of_run) if is_gain and error > -1.0 and of_run.size else ""
+        looks = (
+            mistaken_unit(error, of_run, has_bar=bool(problem.measured_joints))
+            if is_gain and error > -1.0 and of_run.size
+            else ""
+        )
         others = int(too_large.any(axis=1).sum()) - 1
         alike = f" ({others} other run{'s' * (others > 1)} too)" if others else ""
         raise DataError(
