@@ -100,6 +100,8 @@ def _say(answer: VolumetricAnswer) -> None:
         output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
     for effect in answer.between_points or ():
         output.say(f"{effect} (--points sets more)")
+    for step in answer.step_places or ():
+        output.say(str(step))
     for omitted in answer.left_out:
         output.say(f"not in the map: {omitted.parameter}: {omitted.why}")
     output.say(
