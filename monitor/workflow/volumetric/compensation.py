@@ -92,8 +92,8 @@ class _Line:
 def _breaks(mapped: VolumetricMap, axis: int, low: float, high: float) -> tuple[Array, Array]:
     """The readings at which the error of an axis along itself jumps (m,), and those at which it bends (b,); none where
     they are too many for rows of their own."""
-    own = parts_along(mapped.errors, axis)
-    effects = [effect for effect, part in zip(mapped.errors.effects, own, strict=True) if part]
+    parts = parts_along(mapped.errors, axis)
+    effects = [effect for effect, part in zip(mapped.errors.effects, parts, strict=True) if part]
     shapes = [effect.shape for effect in effects if isinstance(effect.shape, DescribedShape)]
     jumps = np.unique(np.concatenate([np.zeros(0), *(shape.jumps(low, high) for shape in shapes)]))
     kinks = np.unique(np.concatenate([np.zeros(0), *(shape.kinks(low, high) for shape in shapes)]))

@@ -77,10 +77,10 @@ def _reversals(mapped: VolumetricMap, axes: list[int]) -> Iterator[AxisValue]:
 
 def _own_steps(mapped: VolumetricMap) -> list[StepPlace]:
     """The steps of the axes along themselves; a positioning table takes off no error at a workpiece's zero."""
-    own = {
+    of_drives = {
         name
         for effect in mapped.errors.effects
         if JointError(effect.term, effect.joint).is_of_drive
         for name in effect.parameters(mapped.errors.context)
     }
-    return [replace(step, zero_between=False) for step in step_places(mapped) if step.parameter in own]
+    return [replace(step, zero_between=False) for step in step_places(mapped) if step.parameter in of_drives]
