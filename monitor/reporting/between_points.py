@@ -41,12 +41,12 @@ class StepPlace:
 
     def __str__(self) -> str:
         all_points = (
-            "because the workpiece's zero lies between"
+            ", because the workpiece's zero lies between"
             if self.zero_between
-            else "where a workpiece's zero is set between"
+            else " where a workpiece's zero is set between"
         )
         return (
             f"{self.parameter}, a step of {self.size:.1f} {self.unit}, lies somewhere between {self.low_mm:.2f} and "
             f"{self.high_mm:.2f} mm of {self.axis}, where nothing was measured: points between may err by it, and all "
-            f"points {all_points}; no U contains that"
+            f"points{all_points}; no U contains that"
         )

@@ -1,4 +1,4 @@
-"""Steps of a scale in a map and its tables: places that no position tells apart make the errors that are said of them."""
+"""Steps of a scale in a map and its tables: places that no position tells apart make the errors said of them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 from by_path import load
 
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
-from monitor.workflow.volumetric.between_points import step_places
+from monitor.workflow.volumetric.between_points import between_points, step_places
 from monitor.workflow.volumetric.compensation import write_tables
+from monitor.workflow.volumetric.over_stroke import _difference
 
 compensation = load("compensation_of_machines", Path(__file__).with_name("test_compensation.py"))
 TOPOLOGIES = ("w b X Y Z t", "w C B X b Z Y (C1) t")
@@ -97,3 +98,18 @@ def test_jumps_of_other_errors_are_no_matter_of_a_positioning_table(other, tmp_p
     assert not any("jumps" in line or other in line for line in header)
     (path,) = write_tables(mapped, "volumetric-csv", tmp_path)
     assert any(other in line for line in compensation._table(path)[0])
+
+
+def test_the_difference_of_two_maps_has_the_change_of_a_step_and_of_what_repeats():
+    both = [
+        _mapped("w b X Y Z t", **{"EXX:step(12)": step, "EXX:cyclic68mm": (wave, 0.0)})
+        for step, wave in ((6e-3, 4e-3), (1e-3, 1e-3))
+    ]
+    first, second = (
+        replace(mapped, evaluated=SimpleNamespace(run=run)) for run, mapped in enumerate(both, 1)
+    )
+    change = _difference(first, second)
+    assert [place.size for place in step_places(change)] == pytest.approx([5.0])
+    assert [wave.size for wave in between_points(change)] == pytest.approx([3.0], rel=0.01)
+    same = _difference(first, replace(first, evaluated=second.evaluated))
+    assert (step_places(same), between_points(same)) == ((), ())

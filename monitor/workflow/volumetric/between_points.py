@@ -32,9 +32,9 @@ def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
             continue
         low, high = mapped.ranges[effect.joint.name]
         spacing = (high - low) / (mapped.points - 1)
-        if spacing * POINTS_A_PERIOD > effect.shape.pitch:
-            unit: Unit = effect.term.unit
-            largest = unit.to_display(float(np.abs(_along(mapped, effect, columns)).max()))
+        unit: Unit = effect.term.unit
+        largest = unit.to_display(float(np.abs(_along(mapped, effect, columns)).max()))
+        if largest and spacing * POINTS_A_PERIOD > effect.shape.pitch:
             unfollowed.append(
                 BetweenPoints(effect.text, effect.joint.name, effect.shape.pitch, spacing, largest, unit.name)
             )
