@@ -11,6 +11,7 @@ from monitor.records import Array
 from monitor.records import FrameOfReference
 from monitor.records import Verdict
 from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import StepPlace
 from monitor.reporting.budget import DayToDay
 from monitor.reporting.budget import HoldsFor
 from monitor.reporting.budget import LengthReference
@@ -642,6 +643,8 @@ class TypedVolumetricAnswer(Answer[VolumetricAnswer]):
     def vectors_refer_to(self) -> str: ...
     @property
     def between_points(self) -> tuple[BetweenPoints, ...] | None: ...
+    @property
+    def step_places(self) -> tuple[StepPlace, ...] | None: ...
     @property
     def figures(self) -> tuple[str, ...] | None: ...
     @property

@@ -57,6 +57,10 @@ class DescribedShape(BuiltIn):
         """Return the readings (m,) from ``low`` to ``high``, mm or rad, at which the shape jumps."""
         return np.zeros(0)
 
+    def kinks(self, low: float, high: float) -> Array:
+        """Return the readings (m,) from ``low`` to ``high``, mm or rad, at which a straight part of the shape ends."""
+        return np.zeros(0)
+
     def phrase(self, error: JointError) -> str:
         """Return the part of the effect's meaning that the shape makes; it begins with a comma."""
         return ""

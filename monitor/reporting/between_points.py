@@ -1,4 +1,4 @@
-"""What a map does not follow between its points, as its answer, its pages and its tables say it."""
+"""What a map does not follow between its points, and what no position tells it, as answers, pages and tables say it."""
 
 from __future__ import annotations
 
@@ -22,4 +22,31 @@ class BetweenPoints:
             f"between the points of the map, {self.spacing_mm:.4g} mm apart along {self.axis}: {self.effect}, up to "
             f"{self.size:.1f} {self.unit}, repeats every {self.pitch_mm:g} mm, so that the largest error may lie "
             "between them"
+        )
+
+
+@dataclass(frozen=True)
+class StepPlace:
+    """A step of the map that lies somewhere from ``low_mm`` to ``high_mm`` of its ``axis``, between which nothing was
+    measured: points between may err by its ``size``, and all points where ``zero_between``, because the workpiece's
+    zero lies there. No U contains that."""
+
+    parameter: str
+    axis: str
+    low_mm: float
+    high_mm: float
+    size: float
+    unit: str
+    zero_between: bool
+
+    def __str__(self) -> str:
+        all_points = (
+            ", because the workpiece's zero lies between"
+            if self.zero_between
+            else " where a workpiece's zero is set between"
+        )
+        return (
+            f"{self.parameter}, a step of {self.size:.1f} {self.unit}, lies somewhere between {self.low_mm:.2f} and "
+            f"{self.high_mm:.2f} mm of {self.axis}, where nothing was measured: points between may err by it, and all "
+            f"points{all_points}; no U contains that"
         )

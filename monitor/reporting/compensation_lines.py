@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 
 _CIRCUMSTANCES = (
@@ -43,11 +43,12 @@ def positioning_lines(
     remaining: Mapping[str, float],
     jumps: Mapping[str, int],
     reversals: Sequence[AxisValue],
+    steps: Sequence[StepPlace] = (),
 ) -> list[str]:
     """Return the lines above the tables of linear axes, or of the rotary ones.
 
     ``remaining`` is what straight lines between the rows leave at most, mm or rad, ``jumps`` at how many
-    readings the error jumps between two rows, by axis.
+    readings the error jumps between two rows, by axis; ``steps`` are steps of whose place the range alone is known.
     """
     unit, small = ("deg", "urad") if turns else ("mm", "um")
     show = (MICRORADIAN if turns else MICROMETRE).to_display
@@ -66,6 +67,7 @@ def positioning_lines(
         f"Between two rows: a straight line, which leaves at most {left_over}.",
         *(line for axis, count in jumps.items() for line in _of_jumps(axis, count)),
         *(line for reversal in reversals for line in _of_reversal(reversal)),
+        *_unknown(steps),
     ]
 
 
@@ -91,12 +93,13 @@ def volumetric_lines(
     turning: Sequence[str],
     tip: tuple[float, float, float],
     zero: Sequence[AxisValue] | None,
-    between: Sequence[BetweenPoints] = (),
+    between: Sequence[BetweenPoints | StepPlace] = (),
 ) -> list[str]:
     """Return the lines above the table of the volumetric error.
 
     ``linear`` and ``turning`` are the axes, ``tip`` (mm) is that of the tool in the frame of the spindle, ``zero``
-    where the workpiece's zero was set; None: where the axes say. ``between`` are errors that its rows do not follow.
+    where the workpiece's zero was set; None: where the axes say. ``between`` are errors that its rows do not follow,
+    and steps of whose place the range alone is known.
     """
     added = ", ".join(f"correction_{name.lower()}_um to the reading {name.lower()}_mm" for name in linear)
     held = f"; {' and '.join(turning)} stay at the commanded reading" if turning else ""
@@ -117,9 +120,15 @@ def volumetric_lines(
         "The positioning errors of the axes are in this table.",
         "Use it or the positioning table of the run, not both.",
         _of_zero(zero),
-        *(f"NOT FOLLOWED {effect}." for effect in between),
+        *(f"NOT FOLLOWED {effect}." for effect in between if isinstance(effect, BetweenPoints)),
+        *_unknown(step for step in between if isinstance(step, StepPlace)),
         *_CIRCUMSTANCES,
     ]
+
+
+def _unknown(steps: Iterable[StepPlace]) -> Iterator[str]:
+    """Lines on steps of whose place the range alone is known."""
+    return (f"PLACE UNKNOWN {step}." for step in steps)
 
 
 def _of_zero(zero: Sequence[AxisValue] | None) -> str:

@@ -30,6 +30,8 @@ _NUMBER_AND_UNIT = re.compile(r"(?<=[0-9]) (?=(?:%|°C|K|mm|[µn]m(?:/m)?|[µm]?
 _SYMBOL_AND_NUMBER = re.compile(r"(?<=\b[A-Za-z]) ([=±<>]) (?=[−+-]?[0-9])")
 #: A sign before a number, which stands by itself: ± 20, > 99.9 (in markup &gt; 99.9).
 _SIGN_AND_NUMBER = re.compile(r"(?<![^ (])([±<>]|&[lg]t;) (?=[0-9])")
+#: Which coefficient of an effect, behind its shape or driver: ``.110mm`` of EXX:step(-60,110).110mm.
+_COEFFICIENT = re.compile(r"(?<=[A-Za-z)])\.[^.].*$")
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
 
 
@@ -63,8 +65,10 @@ class Texts:
 
 
 def breakable(name: str) -> Markup:
-    """The name of an effect for a narrow column, which goes on in the next line behind the name of its error."""
-    return Markup(str(escape(name)).replace(":", ":<wbr>"))
+    """The name of an effect for a narrow column, which goes on in the next line behind the name of its error, or with
+    which of its coefficients it is."""
+    broken = str(escape(name)).replace(":", ":<wbr>")
+    return Markup(_COEFFICIENT.sub(r'<wbr><span class="nowrap">\g<0></span>', broken))
 
 
 def with_subscripts(text: str) -> Markup:

@@ -49,10 +49,10 @@ class ReadingCorrections:
 
 def positions_itself(geometric: GeometricErrors, axis: int) -> bool:
     """Whether an error along (of a rotary axis: about) its own axis is known of the joint at an index."""
-    return bool(np.any(_along(geometric, axis)))
+    return bool(np.any(parts_along(geometric, axis)))
 
 
-def _along(geometric: GeometricErrors, axis: int) -> Array:
+def parts_along(geometric: GeometricErrors, axis: int) -> Array:
     """The part (effects,) of each effect that is along, for a rotary axis about, the axis of the joint at an index."""
     joint = geometric.chain.joints[axis]
     return np.array(
@@ -75,7 +75,7 @@ def positioning_error(geometric: GeometricErrors, axis: int, positions: Array) -
     part of it.
     """
     _, bases = joint_errors(geometric, positions, geometric.estimate)
-    parts = _along(geometric, axis) * geometric.chain.joints[axis].sign
+    parts = parts_along(geometric, axis) * geometric.chain.joints[axis].sign
     slopes = np.concatenate([part * basis.columns for part, basis in zip(parts, bases, strict=True)], axis=-1)
     variance = np.einsum("nk,kl,nl->n", slopes, geometric.covariance, slopes)
     return PositioningError(slopes @ geometric.estimate, np.sqrt(np.maximum(variance, 0.0)))

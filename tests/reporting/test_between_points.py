@@ -10,7 +10,7 @@ import pytest
 from by_path import load
 
 from monitor.documents import from_document, to_document
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.volumetric import printed_map
@@ -27,6 +27,47 @@ SAID = {
     "de": "Zwischen diesen Punkten, die entlang X 100,0 mm auseinander liegen: EXX:sawtooth84mm(12), bis zu 6,3 µm, "
     "wiederholt sich alle 84,0 mm; die größte Abweichung kann zwischen ihnen liegen.",
 }
+STEP = StepPlace("EXX:step(12)", "X", 8.78, 39.58, 6.2, "µm", False)
+PLACED = {
+    (
+        "en",
+        False,
+    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, where nothing was "
+    "measured: points between may err by it, and all points where a workpiece's zero is set between; no U contains "
+    "that.",
+    (
+        "en",
+        True,
+    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, where nothing was "
+    "measured: points between may err by it, and all points, because the workpiece's zero lies between; no U contains "
+    "that.",
+    (
+        "de",
+        False,
+    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, wo nicht "
+    "gemessen wurde: Punkte dazwischen können um ihn abweichen, und alle Punkte, wenn der Nullpunkt eines Werkstücks "
+    "dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
+    (
+        "de",
+        True,
+    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, wo nicht "
+    "gemessen wurde: Punkte dazwischen können um ihn abweichen, und alle Punkte, weil der Nullpunkt des Werkstücks "
+    "dazwischen liegt; keine Messunsicherheit U enthält das.",
+}
+
+
+@pytest.mark.parametrize(("language", "zero_between"), list(PLACED))
+def test_a_certificate_and_its_digital_form_say_where_a_step_may_lie(
+    make_record: Callable[..., CertificateRecord], language: str, zero_between: bool
+) -> None:
+    record = make_record(language=language, maps=1)
+    (plain,) = record.volumetric
+    stepped = replace(plain, step_places=(replace(STEP, zero_between=zero_between),))
+    texts, said = texts_of(language), PLACED[language, zero_between]
+    assert printed_map(stepped, texts).explained == f"{printed_map(plain, texts).explained} {said}"
+    assert said in dcc_xml(replace(record, country="DE", volumetric=(stepped,))).decode()
+    assert from_document(VolumetricResult, to_document(stepped)).step_places == stepped.step_places
+    assert "step_places" not in to_document(plain)
 
 
 @pytest.mark.parametrize("language", ["en", "de"])
@@ -45,5 +86,10 @@ def test_a_certificate_and_its_digital_form_say_it(
 
 def test_a_health_report_says_it() -> None:
     error_map = VolumetricMap(1, "16 points", "A -90°", 5.0, 1.0, 2.0, (), between_points=(TEETH,))
-    (printed,) = machine_pages([replace(page.GOOD, map=error_map)])
+    (printed,) = machine_pages([replace(page.GOOD, map=replace(error_map, step_places=(STEP,)))])
     assert ("not followed", str(TEETH)) in printed.map
+    assert ("place unknown", str(STEP)) in printed.map
+    assert "lies somewhere between 8.78 and 39.58 mm of X" in str(STEP)
+    assert str(replace(STEP, zero_between=True)).endswith(
+        "and all points, because the workpiece's zero lies between; no U contains that"
+    )

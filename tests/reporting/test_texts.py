@@ -20,7 +20,7 @@ from monitor.reporting.refused import (
 )
 from monitor.reporting.resources import report_text
 from monitor.reporting.symbols import describe
-from monitor.reporting.texts import languages, texts_of, with_bound_units, with_subscripts
+from monitor.reporting.texts import breakable, languages, texts_of, with_bound_units, with_subscripts
 
 ENGLISH = texts_of()
 
@@ -190,3 +190,20 @@ def test_no_line_ends_between_a_number_and_its_unit(text: str, bound: str) -> No
 def test_markup_stays_markup_where_units_are_bound() -> None:
     assert with_subscripts(Markup("<b>U</b> is 3 µm")) == "<b>U</b> is 3\N{NO-BREAK SPACE}µm"
     assert with_subscripts("u < 3 µm") == "u\N{NO-BREAK SPACE}&lt;\N{NO-BREAK SPACE}3\N{NO-BREAK SPACE}µm"
+
+
+@pytest.mark.parametrize(
+    ("name", "pieces"),
+    [
+        ("EXX:step8mm(-60,110).-60mm", ["EXX:", "step8mm(-60,110)", ".-60mm"]),
+        ("EXX:step8mm(-60,110).110.5mm", ["EXX:", "step8mm(-60,110)", ".110.5mm"]),
+        ("EXX:cyclic171.317mm.cos", ["EXX:", "cyclic171.317mm", ".cos"]),
+        ("EBX:sawtooth84.34mm(-157.25)", ["EBX:", "sawtooth84.34mm(-157.25)"]),
+        ("EXX", ["EXX"]),
+    ],
+)
+def test_the_name_of_an_effect_goes_on_at_its_parts(name: str, pieces: list[str]) -> None:
+    parts = re.split("<wbr>", breakable(name))
+    assert [re.sub("<[^>]*>", "", part) for part in parts] == pieces
+    assert all("nowrap" in part for part in parts if part.startswith("<span"))
+    assert breakable("a<b:c") == "a&lt;b:<wbr>c"

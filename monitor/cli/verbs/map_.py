@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from monitor.cli import output
@@ -98,16 +98,21 @@ def _say(answer: VolumetricAnswer) -> None:
     )
     if answer.datum is not None:
         output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
-    for effect in answer.between_points or ():
-        output.say(f"{effect} (--points sets more)")
-    for omitted in answer.left_out:
-        output.say(f"not in the map: {omitted.parameter}: {omitted.why}")
+    for line in _in_no_number(answer):
+        output.say(line)
     output.say(
         "error motions of axes that the model does not have are in no number and no U; `monitor explain` looks for "
         "those that the readings show"
     )
     for file in (*(answer.figures or ()), *(answer.tables or ())):
         output.say(file)
+
+
+def _in_no_number(answer: VolumetricAnswer) -> Iterator[str]:
+    """What lies between the points of the map, what may lie elsewhere, and what is not in it."""
+    yield from (f"{effect} (--points sets more)" for effect in answer.between_points or ())
+    yield from map(str, answer.step_places or ())
+    yield from (f"not in the map: {omitted.parameter}: {omitted.why}" for omitted in answer.left_out)
 
 
 def _place(at: Mapping[str, float]) -> str:

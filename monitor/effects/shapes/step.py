@@ -55,6 +55,11 @@ class Step(DescribedShape):
     def jumps(self, low: float, high: float) -> Array:
         return np.array([reading for reading in self.readings if low <= reading <= high and not self.width])
 
+    def kinks(self, low: float, high: float) -> Array:
+        half = self.width / 2.0
+        ends = [end for reading in self.readings for end in (reading - half, reading + half)] if half else []
+        return np.array([end for end in ends if low <= end <= high])
+
     def phrase(self, error: JointError) -> str:
         places = " and ".join(f"{reading:g} mm" for reading in self.readings)
         over = f", each over {self.width:g} mm" if self.width else ""

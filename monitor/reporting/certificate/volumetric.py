@@ -7,7 +7,7 @@ from decimal import Decimal
 
 from markupsafe import Markup
 
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.certificate.tables import Number, aligned
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
 from monitor.reporting.numbers import (
@@ -42,6 +42,7 @@ def printed_map(volumetric: VolumetricResult, texts: Texts) -> PrintedMap:
     k = written_factor(volumetric.k, sign)
     explained = [_region(volumetric, texts, k)]
     explained += [_between(effect, texts) for effect in volumetric.between_points or ()]
+    explained += [_place_of(step, texts) for step in volumetric.step_places or ()]
     return PrintedMap(
         state=volumetric.state,
         expanded=texts.markup("page.map_expanded", k=k),
@@ -85,6 +86,19 @@ def _between(effect: BetweenPoints, texts: Texts) -> str:
         size=_tenths(effect.size, texts),
         unit=effect.unit,
         pitch=_tenths(effect.pitch_mm, texts),
+    )
+
+
+def _place_of(step: StepPlace, texts: Texts) -> str:
+    """Where a step may lie, and what follows."""
+    return texts(
+        "page.map_step_zero_between" if step.zero_between else "page.map_step",
+        parameter=step.parameter,
+        size=_tenths(step.size, texts),
+        unit=step.unit,
+        low=_tenths(step.low_mm, texts),
+        high=_tenths(step.high_mm, texts),
+        axis=step.axis,
     )
 
 

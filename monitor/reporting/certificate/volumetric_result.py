@@ -11,7 +11,7 @@ from itertools import zip_longest
 from monitor.documents import OMITTED
 from monitor.records import Array
 from monitor.refusal import Refusal
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.refused import RefusedParameters
 
 Place = tuple[tuple[str, float, str], ...]
@@ -36,7 +36,8 @@ class VolumetricResult:
     ``poses`` rotary poses, ``points`` in all. ``datum`` is where the workpiece's zero was set, empty where nowhere.
     ``left_out`` are parameters that the map does not contain, and why in an English sentence;
     ``left_out_refusals`` are the refusals that they belong to, in their order, None where the sentence is all there is.
-    ``between_points`` are the errors that the points do not follow; None where there are none, and in older records.
+    ``between_points`` are the errors that the points do not follow, ``step_places`` the steps of whose place the range
+    alone is known; None where there are none, and in older records.
 
     The grid with the rotary axes at zero: ``readings_mm`` (n, 3) of ``axes``, ``vectors_um`` (n, 3) along X, Y and Z
     of the machine, ``expanded_um`` (n,) of their lengths.
@@ -61,6 +62,7 @@ class VolumetricResult:
     expanded_um: Array
     left_out_refusals: tuple[Refusal | None, ...] = ()
     between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
+    step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
 
     @property
     def refused(self) -> tuple[tuple[str, RefusedParameters], ...]:

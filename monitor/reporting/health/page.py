@@ -383,6 +383,7 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
         )
         lines.append(("by pose", f"at most (rms) {poses}"))
     lines += [("not followed", str(effect)) for effect in error_map.between_points or ()]
+    lines += [("place unknown", str(step)) for step in error_map.step_places or ()]
     return tuple(lines)
 
 

@@ -13,7 +13,7 @@ from enum import StrEnum
 
 from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
@@ -207,7 +207,8 @@ class VolumetricMap:
     expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``. ``limit_um`` of the
     machine's file for the worst of them, and the probability to be beyond it. ``by_parameter`` is what each parameter
     adds to the worst error, the largest first; ``between_points`` are
-    the errors that its points do not follow. None in older records.
+    the errors that its points do not follow, ``step_places`` the steps of whose place the range alone is known. None in
+    older records.
     """
 
     run: int
@@ -224,6 +225,7 @@ class VolumetricMap:
     probability_out: float | None = field(default=None, metadata=OMITTED)
     by_parameter: tuple[MapShare, ...] | None = field(default=None, metadata=OMITTED)
     between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
+    step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

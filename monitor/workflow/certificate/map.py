@@ -10,7 +10,7 @@ from monitor.reporting.refused import refusal_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
-from monitor.workflow.volumetric.between_points import between_points
+from monitor.workflow.volumetric.between_points import between_points, step_places
 from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose, map_of
 
 
@@ -43,6 +43,7 @@ def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricRes
         left_out=tuple((name, refused.why) for name, refused in mapped.left_out.items()),
         left_out_refusals=tuple(map(refusal_of, mapped.left_out.values())),
         between_points=between_points(mapped) or None,
+        step_places=step_places(mapped) or None,
         axes=drawn.axes,
         readings_mm=drawn.readings_mm,
         vectors_um=drawn.vectors_um,

@@ -41,6 +41,7 @@ def stated_map(
         probability_out=probability_out,
         by_parameter=_shares(answer),
         between_points=answer.between_points,
+        step_places=answer.step_places,
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED, named
 from monitor.records import Array
-from monitor.reporting.between_points import BetweenPoints
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.svg.map_slices import Slice
 
 
@@ -98,5 +98,6 @@ class VolumetricAnswer:
     refers_to: Mapping[str, str]
     vectors_refer_to: str
     between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
+    step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     tables: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -1,13 +1,18 @@
-"""What a map does not follow between its points: errors that repeat along an axis in less than some of its steps."""
+"""What a map does not follow between its points: errors that repeat along an axis in less than some of its steps; and
+what it cannot know: where between two measured positions a step lies."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from monitor.effects import ChainEffect
+from monitor.effects.shapes import Step
 from monitor.effects.shapes.cyclic import Cyclic
 from monitor.effects.shapes.sawtooth import Sawtooth
-from monitor.reporting.between_points import BetweenPoints
+from monitor.records import Array
+from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.uncertainty.geometric_errors import GeometricErrors, joint_errors
 from monitor.uncertainty.volumetric import middle
 from monitor.units import Unit
@@ -21,30 +26,66 @@ POINTS_OF_LINE = 4001
 
 def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
     """The periodic errors of a map that lie between its points."""
-    errors, first, unfollowed = mapped.errors, 0, []
-    for effect in errors.effects:
-        size = len(effect.parameters(errors.context))
-        columns, first = slice(first, first + size), first + size
+    errors, unfollowed = mapped.errors, []
+    for effect, columns in _with_columns(errors):
         if not isinstance(effect.shape, Cyclic | Sawtooth):
             continue
         low, high = mapped.ranges[effect.joint.name]
         spacing = (high - low) / (mapped.points - 1)
-        if spacing * POINTS_A_PERIOD > effect.shape.pitch:
-            unit: Unit = effect.term.unit
-            largest = unit.to_display(_largest(errors, effect, columns, mapped.ranges))
+        unit: Unit = effect.term.unit
+        largest = unit.to_display(float(np.abs(_along(mapped, effect, columns)).max()))
+        if largest and spacing * POINTS_A_PERIOD > effect.shape.pitch:
             unfollowed.append(
                 BetweenPoints(effect.text, effect.joint.name, effect.shape.pitch, spacing, largest, unit.name)
             )
     return tuple(unfollowed)
 
 
-def _largest(
-    errors: GeometricErrors, effect: ChainEffect, columns: slice, ranges: dict[str, tuple[float, float]]
-) -> float:
-    """The largest size of an effect along its axis, mm or rad."""
+def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
+    """Where the steps of a map may lie: between the nearest positions of the campaign on either side of each, before
+    and after the width over which it goes.
+
+    ``explain`` tells the wider interval that the readings themselves leave, beside all else that it found.
+    """
+    errors, places = mapped.errors, []
+    for effect, columns in _with_columns(errors):
+        if not isinstance(effect.shape, Step):
+            continue
+        axis, sign = effect.term.joint, effect.joint.sign
+        measured = sign * errors.context.places[:, axis]
+        zero = None if mapped.error.datum is None else sign * float(mapped.error.datum[axis])
+        half = effect.shape.width / 2.0
+        # A driver may have several columns for each step.
+        each = (columns.stop - columns.start) // len(effect.shape.readings)
+        for number, reading in enumerate(effect.shape.readings):
+            start = columns.start + number * each
+            size = effect.term.unit.to_display(
+                float(np.ptp(_along(mapped, effect, slice(start, start + each))))
+            )
+            below, above = measured[measured <= reading - half], measured[measured >= reading + half]
+            if size and len(below) and len(above):
+                low, high = float(below.max()), float(above.min())
+                between = zero is not None and low < zero < high
+                name, unit = errors.names[start], effect.term.unit.name
+                places.append(StepPlace(name, effect.joint.name, low, high, size, unit, between))
+    return tuple(places)
+
+
+def _with_columns(errors: GeometricErrors) -> Iterator[tuple[ChainEffect, slice]]:
+    """The effects of a machine, each with its part of the coefficients."""
+    first = 0
+    for effect in errors.effects:
+        last = first + len(effect.parameters(errors.context))
+        yield effect, slice(first, last)
+        first = last
+
+
+def _along(mapped: VolumetricMap, effect: ChainEffect, columns: slice) -> Array:
+    """The errors of all joints along the axis of an effect that some of its coefficients make, mm and rad."""
+    errors, ranges = mapped.errors, mapped.ranges
     chain, values = errors.chain, np.zeros_like(errors.estimate)
     values[columns] = errors.estimate[columns]
     positions = np.tile(middle(chain, ranges), (POINTS_OF_LINE, 1))
     joint = chain.index(effect.joint.name)
     positions[:, joint] = effect.joint.sign * np.linspace(*ranges[effect.joint.name], POINTS_OF_LINE)
-    return float(np.abs(joint_errors(errors, positions, values)[0]).max())
+    return joint_errors(errors, positions, values)[0]

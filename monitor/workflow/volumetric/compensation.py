@@ -24,6 +24,7 @@ from monitor.machine import Joint
 from monitor.records import Array
 from monitor.uncertainty.reading_corrections import (
     PositioningError,
+    parts_along,
     positioning_error,
     positions_itself,
     reading_corrections,
@@ -43,7 +44,8 @@ TABLE_POINTS = 33
 PART_LEFT = 0.005
 LEAST_LEFT = 1e-5
 MOST_POINTS = 4097
-#: An error that jumps has a row so far before and after it (mm, rad): ten last digits of the table.
+#: An error that jumps has a row so far before and after it (mm, rad): ten last digits of the table. Where it bends
+#: there is a row.
 BESIDE = 1e-3
 
 
@@ -87,20 +89,26 @@ class _Line:
     jumps: Array
 
 
-def _jumps(mapped: VolumetricMap, axis: int, low: float, high: float) -> Array:
-    """The readings (m,) at which the error of an axis jumps; none where they are too many for rows of their own."""
-    effects = [effect for effect in mapped.errors.effects if effect.term.joint == axis]
-    jumps = [effect.shape.jumps(low, high) for effect in effects if isinstance(effect.shape, DescribedShape)]
-    places: Array = np.unique(np.concatenate([np.zeros(0), *jumps]))
-    return places if 2 * len(places) <= MOST_POINTS - TABLE_POINTS else np.zeros(0)
+def _breaks(mapped: VolumetricMap, axis: int, low: float, high: float) -> tuple[Array, Array]:
+    """The readings at which the error of an axis along itself jumps (m,), and those at which it bends (b,); none where
+    they are too many for rows of their own."""
+    parts = parts_along(mapped.errors, axis)
+    effects = [effect for effect, part in zip(mapped.errors.effects, parts, strict=True) if part]
+    shapes = [effect.shape for effect in effects if isinstance(effect.shape, DescribedShape)]
+    jumps = np.unique(np.concatenate([np.zeros(0), *(shape.jumps(low, high) for shape in shapes)]))
+    kinks = np.unique(np.concatenate([np.zeros(0), *(shape.kinks(low, high) for shape in shapes)]))
+    if 2 * len(jumps) + len(kinks) > MOST_POINTS - TABLE_POINTS:
+        return np.zeros(0), np.zeros(0)
+    return jumps, kinks
 
 
-def _nodes(low: float, high: float, count: int, jumps: Array) -> Array:
-    """So many readings evenly from ``low`` to ``high``, and two beside every jump."""
+def _nodes(low: float, high: float, count: int, jumps: Array, kinks: Array) -> Array:
+    """So many readings evenly from ``low`` to ``high``, two beside every jump, and every kink."""
     even = np.linspace(low, high, count)
-    apart = np.abs(even[:, None] - jumps).min(axis=1, initial=np.inf) > BESIDE
+    broken = np.concatenate([jumps, kinks])
+    apart = np.abs(even[:, None] - broken).min(axis=1, initial=np.inf) > BESIDE
     beside = np.concatenate([jumps - BESIDE, jumps + BESIDE])
-    return np.unique(np.concatenate([even[apart], np.clip(beside, low, high)]))
+    return np.unique(np.concatenate([even[apart], np.clip(beside, low, high), kinks]))
 
 
 def _along(mapped: VolumetricMap, axis: int) -> _Line:
@@ -109,10 +117,10 @@ def _along(mapped: VolumetricMap, axis: int) -> _Line:
     joint = chain.joints[axis]
     visited = joint.sign * mapped.errors.context.positions[:, axis]
     low, high = (visited.min(), visited.max()) if joint.turns else mapped.ranges[joint.name]
-    jumps = _jumps(mapped, axis, low, high)
+    jumps, kinks = _breaks(mapped, axis, low, high)
     count = TABLE_POINTS
     while True:
-        nodes = _nodes(low, high, count, jumps)
+        nodes = _nodes(low, high, count, jumps, kinks)
         middles = (nodes[:-1] + nodes[1:]) / 2.0
         readings = np.concatenate([nodes, middles])
         positions = np.tile(middle(chain, mapped.ranges), (len(readings), 1))

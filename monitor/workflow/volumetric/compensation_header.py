@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from monitor.effects.joint_error import JointError
 from monitor.effects.shapes import Reversal
+from monitor.reporting.between_points import StepPlace
 from monitor.reporting.compensation_lines import AxisValue, TableOrigin, positioning_lines, volumetric_lines
 from monitor.workflow.models import label
-from monitor.workflow.volumetric.between_points import between_points
+from monitor.workflow.volumetric.between_points import between_points, step_places
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 
@@ -24,7 +26,12 @@ def positioning_header(
     by_name = {joints[axis].name: size for axis, size in remaining.items()}
     jumping = {joints[axis].name: count for axis, count in jumps.items()}
     return positioning_lines(
-        _origin(mapped), turns, by_name, jumping, list(_reversals(mapped, list(remaining)))
+        _origin(mapped),
+        turns,
+        by_name,
+        jumping,
+        list(_reversals(mapped, list(remaining))),
+        _own_steps(mapped),
     )
 
 
@@ -45,7 +52,7 @@ def volumetric_header(mapped: VolumetricMap) -> list[str]:
             for joint, position in zip(joints, map(float, datum), strict=True)
             if joint.kind != "spindle"
         ],
-        between_points(mapped),
+        (*between_points(mapped), *step_places(mapped)),
     )
 
 
@@ -66,3 +73,14 @@ def _reversals(mapped: VolumetricMap, axes: list[int]) -> Iterator[AxisValue]:
         is_of_axis = effect.term.joint in axes and JointError(effect.term, effect.joint).is_of_drive
         if is_of_axis and isinstance(effect.shape, Reversal) and not effect.driver_text:
             yield AxisValue(effect.joint.name, 2.0 * amplitude, effect.joint.turns)
+
+
+def _own_steps(mapped: VolumetricMap) -> list[StepPlace]:
+    """The steps of the axes along themselves; a positioning table takes off no error at a workpiece's zero."""
+    of_drives = {
+        name
+        for effect in mapped.errors.effects
+        if JointError(effect.term, effect.joint).is_of_drive
+        for name in effect.parameters(mapped.errors.context)
+    }
+    return [replace(step, zero_between=False) for step in step_places(mapped) if step.parameter in of_drives]

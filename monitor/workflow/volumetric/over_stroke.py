@@ -108,8 +108,15 @@ def over_stroke(db: Database, request: OverStrokeRequest) -> OverStrokeAnswer:
 def _difference(first: VolumetricMap, second: VolumetricMap) -> VolumetricMap:
     """The first map less the second: parameters of both runs side by side, those of the second with the sign turned."""
     ours, theirs = first.error, second.error
+    before = dict(zip(second.errors.names, second.errors.estimate, strict=True))
+    changes = [
+        value - before.get(name, 0.0)
+        for name, value in zip(first.errors.names, first.errors.estimate, strict=True)
+    ]
     return replace(
         first,
+        # What lies between the points has the size of its change.
+        errors=replace(first.errors, estimate=np.array(changes)),
         error=VolumetricError(
             positions=ours.positions,
             vectors=ours.vectors - theirs.vectors,

@@ -20,7 +20,7 @@ from monitor.workflow.volumetric.answer import (
     PoseError,
     VolumetricAnswer,
 )
-from monitor.workflow.volumetric.between_points import between_points
+from monitor.workflow.volumetric.between_points import between_points, step_places
 from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose
 
 AXES = "xyz"
@@ -63,6 +63,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         refers_to=refers_to((*error.names, *mapped.left_out), chain),
         vectors_refer_to=VECTORS,
         between_points=between_points(mapped) or None,
+        step_places=step_places(mapped) or None,
     )
 
 
