@@ -24,7 +24,7 @@ from monitor.effects.catalogue import (
 from monitor.effects.curve import CurveEffect
 from monitor.effects.curve.words import describe_curve
 from monitor.effects.description import Description
-from monitor.effects.words import describe
+from monitor.effects.words import describe, describe_searched
 from monitor.exceptions import InputError
 from monitor.machine import Chain, parse_topology
 from monitor.methods import campaign_method
@@ -175,17 +175,9 @@ def _described(effects: Iterable[ParsedEffect]) -> tuple[CatalogueEffect, ...]:
 
 
 def _searched(chain: Chain) -> tuple[CatalogueEffect, ...]:
-    """Return steps and teeth at places that stand for those that are searched, and say so."""
-    return tuple(
-        replace(
-            each,
-            description=replace(
-                each.description,
-                meaning=f"{each.description.meaning}; explain searches the places, of every error of the axis",
-            ),
-        )
-        for each in _described(parse_effect(text, chain) for text in at_searched_places(chain))
-    )
+    """Return steps and teeth at places that stand for those that are searched."""
+    effects = [parse_effect(text, chain) for text in at_searched_places(chain)]
+    return tuple(CatalogueEffect(each.text, each.unit.name, describe_searched(each)) for each in effects)
 
 
 def _of_curve(curve: CurveCampaign) -> EffectsAnswer:

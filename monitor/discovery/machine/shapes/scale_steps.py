@@ -49,8 +49,10 @@ WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
-# Powers of the position that are tried together beside steps.
+# Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
+# together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
+POSITIONS_OF_BENDS = 12
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,8 @@ class StepsOfError:
         plays = weigh_beside(self.scene, self._of_shape(Reversal | WindUp), [*others, curve])
         with_play = [[plays[0].candidate]] if plays and plays[0].score > 0.0 else []
         powers = {each.family.partition(":")[2]: each for each in self._of_shape(Poly)}
-        bends = [[powers[name] for name in names] for names in BENDS if powers.keys() >= {*names}]
+        able = BENDS if len(self._positions) >= POSITIONS_OF_BENDS else BENDS[:1]
+        bends = [[powers[name] for name in names] for names in able if powers.keys() >= {*names}]
         return [[*play, *bend] for play, bend in product([[], *with_play], bends)]
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
