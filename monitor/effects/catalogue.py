@@ -70,6 +70,15 @@ def _weight(chain: Chain) -> Iterable[str]:
             yield f"E{component}{joint.name}:const@gravity"
 
 
+def at_searched_places(chain: Chain) -> tuple[str, ...]:
+    """Return examples of what has a place that is searched, not listed: steps and teeth along linear axes."""
+    return tuple(
+        f"E{COMPONENTS[joint.main]}{joint.name}:{shape}"
+        for joint in chain.of_kind("linear")
+        for shape in ("step(120)", "sawtooth84mm(12)")
+    )
+
+
 def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
     """Return the effects of balls on stems, for methods that touch them."""
     return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))

@@ -318,6 +318,7 @@ def parse_effect(text: str, chain: Chain) -> ParsedEffect:
     shape = parse_shape(shape_text)
     if isinstance(shape, DescribedShape):
         shape.refuse(text, error)
+        shape_text = shape.named(shape_text)
     weighed = isinstance(shape, Compliance)
     driver = weight_driver(text, driver_text, error) if weighed else parse_driver(driver_text)
     return ChainEffect(term, error.joint, shape, shape_text, driver, driver_text)

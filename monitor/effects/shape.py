@@ -50,6 +50,10 @@ class DescribedShape(BuiltIn):
     def unit(self, base: Unit, joint: Joint) -> Unit:
         return base
 
+    def named(self, text: str) -> str:
+        """Return the name of the shape that was read from a ``text``; here the text itself."""
+        return text
+
     def refuse(self, text: str, error: JointError) -> None:
         """Raise EffectError where the error of an effect cannot have this shape."""
 

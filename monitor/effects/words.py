@@ -33,6 +33,12 @@ def describe(effect: ParsedEffect) -> Description:
     return described(error.meaning + phrase + _driver_phrase(effect), explanation)
 
 
+def describe_searched(effect: ParsedEffect) -> Description:
+    """Describe an effect that stands for those of its kind, whose places are searched."""
+    plain = describe(effect)
+    return replace(plain, meaning=f"{plain.meaning}; explain searches the places, of every error of the axis")
+
+
 def describe_free(effect: ChainEffect, follows: Collection[Follows]) -> Description:
     """Describe an effect of free shape that ``follows`` more than the position of its axis, or that alone."""
     name = effect.joint.name

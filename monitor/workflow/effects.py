@@ -9,8 +9,9 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from monitor.documents import INLINED, OMITTED
-from monitor.effects import ParsedEffect
+from monitor.effects import ParsedEffect, parse_effect
 from monitor.effects.catalogue import (
+    at_searched_places,
     catalogue,
     drivers_of,
     of_balls,
@@ -23,9 +24,9 @@ from monitor.effects.catalogue import (
 from monitor.effects.curve import CurveEffect
 from monitor.effects.curve.words import describe_curve
 from monitor.effects.description import Description
-from monitor.effects.words import describe
+from monitor.effects.words import describe, describe_searched
 from monitor.exceptions import InputError
-from monitor.machine import parse_topology
+from monitor.machine import Chain, parse_topology
 from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.curve.catalogue import catalogue as curve_catalogue
@@ -110,7 +111,7 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
         *of_ram(chain, base, DRIVERS),
         *of_tracker(chain, DRIVERS),
     )
-    described = _described(catalogue(chain, base, DRIVERS, more=others))
+    described = (*_described(catalogue(chain, base, DRIVERS, more=others)), *_searched(chain))
     return _selected(EffectsAnswer(topology=chain.topology, base=base, effects=described), request.text)
 
 
@@ -162,12 +163,21 @@ def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
         topology=chain.topology,
         drivers=drivers,
         base=base,
-        effects=_described(catalogue(chain, base, drivers, pitches, problem.method_effects(drivers))),
+        effects=(
+            *_described(catalogue(chain, base, drivers, pitches, problem.method_effects(drivers))),
+            *_searched(chain),
+        ),
     )
 
 
 def _described(effects: Iterable[ParsedEffect]) -> tuple[CatalogueEffect, ...]:
     return tuple(CatalogueEffect(effect.text, effect.unit.name, describe(effect)) for effect in effects)
+
+
+def _searched(chain: Chain) -> tuple[CatalogueEffect, ...]:
+    """Return steps and teeth at places that stand for those that are searched."""
+    effects = [parse_effect(text, chain) for text in at_searched_places(chain)]
+    return tuple(CatalogueEffect(each.text, each.unit.name, describe_searched(each)) for each in effects)
 
 
 def _of_curve(curve: CurveCampaign) -> EffectsAnswer:

@@ -270,6 +270,15 @@ def test_effects(typed: Any) -> None:
     assert typed("effects", "no such words", "--json").document["effects"] == []
 
 
+@pytest.mark.parametrize("shape", ["step", "sawtooth"])
+def test_effects_whose_places_are_searched_are_found(typed: Any, shape: str) -> None:
+    found = typed("effects", shape, "--json").document["effects"]
+    assert {one["effect"].partition("(")[0].rstrip("84m") for one in found} == {
+        f"{error}:{shape}" for error in ("EXX", "EYY", "EZZ")
+    }
+    assert all("explain searches the places" in one["meaning"] for one in found)
+
+
 def test_simulate(typed: Any) -> None:
     found = typed(
         "simulate", "virtual", "--effect", "EXX:reversal", "--peak", 4, "--seed", 3, "--json"

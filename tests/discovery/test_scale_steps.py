@@ -49,6 +49,17 @@ def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("size", "companion"), [(3.0, "EXX:reversal"), (8.0, "EXX:poly2")])
+def test_a_step_is_told_beside_another_effect_of_its_error(virtual_campaigns, explained, size, companion):
+    """A free shape, or a table with cycles, was told in place of both."""
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=step)
+    beside = simulator().Effect(companion, peak_um=size)
+    campaign, _ = virtual_campaigns.virtual(78, [hidden, beside], days=2)
+    told = {found.effect.partition("(")[0] for found in explained(campaign).missing}
+    assert told == {"EXX:step", companion}
+
+
+@pytest.mark.slow
 def test_a_step_is_told_alone_and_a_model_with_it_lacks_nothing(virtual_campaigns, explained):
     """A table, a cycle and a free shape of another axis were told in its place."""
     hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=step)

@@ -211,9 +211,19 @@ def test_names_of_the_coefficients(make: Callable[..., Context], text: str, name
         ),
         (
             "EXX:step(300,110)",
-            "the places of step(300,110) must be readings in mm in rising order, for example step(110,300)",
+            "the places of step(300,110) must be readings in mm in rising order, plain decimals 0.001 mm or more "
+            "apart, for example step(110,300)",
         ),
         ("EXX:step()", "the places of step() must be readings in mm in rising order"),
+        ("EXX:step(1_20)", "the places of step(1_20) must be readings in mm in rising order"),
+        ("EXX:step(1e3)", "the places of step(1e3) must be readings in mm in rising order"),
+        ("EXX:step(\uff11\uff12)", "must be readings in mm in rising order, plain decimals"),
+        (
+            "EXX:step(1,1.00094)",
+            "must be readings in mm in rising order, plain decimals 0.001 mm or more apart",
+        ),
+        ("EXX:step(-1000000)", "the places of step(-1000000) must be between -1000000 and 1000000 mm"),
+        ("EXX:step1000000mm(0)", "the width of step1000000mm must be below 1000000 mm"),
         ("EXX:step120mm", "there is no shape 'step120mm'; did you mean 'step(120)'?"),
         ("EBB:step(20)", "a step at a reading in mm belongs to a linear axis; for B write table(...)"),
         (

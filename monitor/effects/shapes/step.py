@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -15,6 +16,11 @@ from monitor.effects.shape import DescribedShape, parse_pitch
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
+#: Places nearer to one another are no two, and nothing travels so far; both in mm.
+LEAST_APART, BEYOND_ANY_TRAVEL = 1e-3, 1e6
+#: Digits after the point of readings and widths in mm: the last of finest displays.
+DECIMALS = 4
+
 
 @dataclass(frozen=True)
 class Step(DescribedShape):
@@ -23,23 +29,28 @@ class Step(DescribedShape):
 
     readings: tuple[float, ...]
     width: float = 0.0
-    pattern: ClassVar[str] = r"step((?P<width>-?\d+(?:\.\d+)?)mm)?\((?P<readings>[^)]*)\)"
+    pattern: ClassVar[str] = r"step((?P<width>-?[0-9]+(?:\.[0-9]+)?)mm)?\((?P<readings>[^)]*)\)"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
         width = parse_pitch("step", groups["width"], "step8mm(120)", "width") if "width" in groups else 0.0
-        return cls(_parse_readings(groups["readings"]), width)
+        if width >= BEYOND_ANY_TRAVEL:
+            raise EffectError(f"the width of step{groups['width']}mm must be below 1000000 mm")
+        return cls(_parse_readings(groups["readings"]), round(width, DECIMALS))
 
     @property
     def text(self) -> str:
-        """The shape as written."""
-        over = f"{self.width:.4g}mm" if self.width else ""
-        return f"step{over}({','.join(f'{reading:.9g}' for reading in self.readings)})"
+        """The shape as written, of whatever it was read from."""
+        over = f"{_mm(self.width)}mm" if self.width else ""
+        return f"step{over}({','.join(map(_mm, self.readings))})"
+
+    def named(self, text: str) -> str:
+        return self.text
 
     @property
     def labels(self) -> tuple[str, ...]:
         several = len(self.readings) > 1
-        return tuple(f".{reading:.9g}mm" for reading in self.readings) if several else ("",)
+        return tuple(f".{_mm(reading)}mm" for reading in self.readings) if several else ("",)
 
     def refuse(self, text: str, error: JointError) -> None:
         if error.joint.turns:
@@ -61,8 +72,8 @@ class Step(DescribedShape):
         return np.array([end for end in ends if low <= end <= high])
 
     def phrase(self, error: JointError) -> str:
-        places = " and ".join(f"{reading:g} mm" for reading in self.readings)
-        over = f", each over {self.width:g} mm" if self.width else ""
+        places = " and ".join(f"{_mm(reading)} mm" for reading in self.readings)
+        over = f", each over {_mm(self.width)} mm" if self.width else ""
         several = len(self.readings) > 1
         return f", which jumps at {'the readings' if several else 'the reading'} {places}{over}"
 
@@ -82,16 +93,24 @@ def steps_at(reading: Array, at: Iterable[float], width: float) -> Array:
     return np.asarray(np.clip(beyond / width, -0.5, 0.5) if width else np.sign(beyond) / 2.0)
 
 
+def _mm(value: float) -> str:
+    """A reading or a width in mm as plain decimals, without zeros at the end."""
+    # Zero has no sign.
+    return f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0").rstrip(".")
+
+
 def _parse_readings(text: str) -> tuple[float, ...]:
-    """Return the readings of ``110,300``. Raises EffectError where they are no numbers in rising order."""
-    try:
-        readings = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        readings = ()
-    if not readings or not np.all(np.isfinite(readings)) or np.any(np.diff(readings) <= 0.0):
+    """Return the readings of ``110,300``. Raises EffectError where they are no plain numbers in rising order."""
+    words = [word.strip(" ") for word in text.split(",")]
+    plain = all(re.fullmatch(r"-?[0-9]+(\.[0-9]+)?", word) for word in words)
+    readings = tuple(round(float(word), DECIMALS) for word in words) if plain else ()
+    if not readings or np.any(np.round(np.diff(readings), DECIMALS) < LEAST_APART):
         raise EffectError(
-            f"the places of step({text}) must be readings in mm in rising order, for example step(110,300)"
+            f"the places of step({text}) must be readings in mm in rising order, plain decimals 0.001 mm or more "
+            "apart, for example step(110,300)"
         )
+    if max(map(abs, readings)) >= BEYOND_ANY_TRAVEL:
+        raise EffectError(f"the places of step({text}) must be between -1000000 and 1000000 mm")
     return readings
 
 

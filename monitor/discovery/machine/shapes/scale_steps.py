@@ -2,7 +2,9 @@
 
 Hats a twelfth of the travel apart make a step of a mixture, as do pitches of a cycle or a sawtooth, and errors of other
 axes mimic what such a mixture leaves. A step has one coefficient; the search of its place, and of the width over which
-it goes, is paid for. Between two neighbouring positions every place is the same: their middle is told.
+it goes, is paid for. What else a scale or its drive does, a play or a bend, is sought with it: beside one without the
+other nothing of the catalogue comes near. Between two neighbouring positions every place is the same: their middle is
+told.
 """
 
 from __future__ import annotations
@@ -12,19 +14,26 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import comb
+from types import UnionType
 
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.free_parts import parts_worth_keeping
+from monitor.discovery.machine.shapes.free_parts import parts_worth_keeping, priced
 from monitor.discovery.machine.shapes.refine import LIMIT
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import without
 from monitor.effects import ChainEffect
+from monitor.effects.drivers import Always
+from monitor.effects.shape import Shape
 from monitor.effects.shapes import Step
+from monitor.effects.shapes.poly import Poly
+from monitor.effects.shapes.reversal import Reversal
+from monitor.effects.shapes.windup import WindUp
 from monitor.records import Array
 
 # A region between two joints has two; more are a curve, which free shapes and tables have.
@@ -40,6 +49,10 @@ WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
+# Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
+# together follow any curve.
+BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
+POSITIONS_OF_BENDS = 12
 
 
 @dataclass(frozen=True)
@@ -75,18 +88,15 @@ class StepsOfError:
 
     @cached_property
     def _middles(self) -> Array:
-        """The middles (g,) of the gaps, in mm with two digits where these keep them inside."""
-        middles = self._gaps.mean(axis=1)
-        rounded = np.round(middles, 2)
-        inside = (rounded > self._gaps[:, 0]) & (rounded < self._gaps[:, 1])
-        return np.asarray(np.where(inside, rounded, middles))
+        """The middles (g,) of the gaps, in mm with two digits: gaps are wider than ``SAME_POSITION``."""
+        return np.asarray(np.round(self._gaps.mean(axis=1), 2))
 
     @cached_property
     def _widths(self) -> list[float]:
         """The widths in mm that are tried; a way between two positions is a step at once."""
         travel = float(self._positions[-1, 1] - self._positions[0, 0])
         usual = float(np.median(np.diff(self._positions.mean(axis=1))))
-        return [0.0, *(travel * part for part in WIDTHS if travel * part > usual)]
+        return [0.0, *(float(f"{travel * part:.3g}") for part in WIDTHS if travel * part > usual)]
 
     def _places(self, width: float) -> Array:
         """The places among which steps of a width are looked for first."""
@@ -132,11 +142,45 @@ class StepsOfError:
             np.all(between >= POSITIONS_BEYOND) and np.all(np.diff(sorted(places)) >= WIDTHS_APART * width)
         )
 
+    def _of_shape(self, kind: type[Shape] | UnionType) -> list[ChainCandidate]:
+        """The candidates of this error of some kinds of shape that follow no driver and are seen."""
+        return [
+            each
+            for each in self.scene.candidates
+            if isinstance(effect := each.effect, ChainEffect)
+            and effect.term == self.effect.term
+            and isinstance(effect.driver, Always)
+            and isinstance(effect.shape, kind)
+            and each.visible
+        ]
+
+    def _companions(self, others: Sequence[ChainCandidate]) -> list[list[ChainCandidate]]:
+        """What may stand beside steps of the error: nothing, a play that says something beside others whatever its
+        curve, at once or over a width, and with each a square, or a square and a cube."""
+        curve = self._wholes[0][2]
+        plays = weigh_beside(self.scene, self._of_shape(Reversal | WindUp), [*others, curve])
+        with_play = [[plays[0].candidate]] if plays and plays[0].score > 0.0 else []
+        powers = {each.family.partition(":")[2]: each for each in self._of_shape(Poly)}
+        able = BENDS if len(self._positions) >= POSITIONS_OF_BENDS else BENDS[:1]
+        bends = [[powers[name] for name in names] for names in able if powers.keys() >= {*names}]
+        return [[*play, *bend] for play, bend in product([[], *with_play], bends)]
+
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
-        """The error as the steps that say most beside others, one effect of up to three; none where it is among them,
-        where none is worth its price, or where they foretell no poses."""
+        """The error as the steps that say most beside others, one effect of up to three, and a play or powers of it
+        beside them where that says more; none where it is among them, where none is worth its price, or where they
+        foretell no poses."""
         if self.effect.term.symbol in map(error_of, others) or not len(self._gaps):
             return []
+        found = [
+            [*steps, *companions]
+            for companions in self._companions(others)
+            if (steps := self._steps([*others, *companions]))
+        ]
+        best = max(found, key=lambda some: priced(self.scene, some, others), default=[])
+        return best if best and foretells_poses(self.scene, best, others) else []
+
+    def _steps(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+        """The steps that say most beside others, as one effect; none where none is worth its price."""
         worth, best = self._price(0, others) + self._cost([], others), None
         for (places, width, whole), most in product(self._wholes, (1, MOST_STEPS)):
             selected = self._refined(self._selected(places, whole, most, others), width, others)
@@ -153,14 +197,14 @@ class StepsOfError:
     def _at_best_width(
         self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
     ) -> list[ChainCandidate]:
-        """The steps at the best width about one that was tried; none where they foretell no poses."""
+        """The steps at the best width about one that was tried; none where the data do not see them."""
         widths = [float(f"{width * part:.3g}") for part in NEAR_WIDTHS] if width else []
         able = [some for some in widths if self._are_apart(places, some)]
         if able:
             width = min(able, key=lambda some: self._cost([self._candidate(places, some)], others))
             places = self._worth_keeping(self._refined(places, width, others), width, others)
         steps = self._candidate(places, width)
-        return [steps] if steps.visible and foretells_poses(self.scene, [steps], others) else []
+        return [steps] if steps.visible else []
 
     def _choice(self) -> float:
         """The logarithm of the number of places and widths."""
