@@ -101,9 +101,9 @@ def _mm(value: float) -> str:
 
 def _parse_readings(text: str) -> tuple[float, ...]:
     """Return the readings of ``110,300``. Raises EffectError where they are no plain numbers in rising order."""
-    words = [word.strip(" ") for word in text.split(",")]
-    plain = all(re.fullmatch(r"-?[0-9]+(\.[0-9]+)?", word) for word in words)
-    readings = tuple(round(float(word), DECIMALS) for word in words) if plain else ()
+    written = [word.strip(" ") for word in text.split(",")]
+    plain = all(re.fullmatch(r"-?[0-9]+(\.[0-9]+)?", word) for word in written)
+    readings = tuple(round(float(word), DECIMALS) for word in written) if plain else ()
     if not readings or np.any(np.round(np.diff(readings), DECIMALS) < LEAST_APART):
         raise EffectError(
             f"the places of step({text}) must be readings in mm in rising order, plain decimals 0.001 mm or more "
