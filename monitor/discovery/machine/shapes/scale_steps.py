@@ -171,12 +171,12 @@ class StepsOfError:
         foretell no poses."""
         if self.effect.term.symbol in map(error_of, others) or not len(self._gaps):
             return []
-        steps = [
+        choices = [
             [*steps, *companions]
             for companions in self._companions(others)
             if (steps := self._steps([*others, *companions]))
         ]
-        best = max(steps, key=lambda some: priced(self.scene, some, others), default=[])
+        best = max(choices, key=lambda some: priced(self.scene, some, others), default=[])
         return best if best and foretells_poses(self.scene, best, others) else []
 
     def _steps(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
