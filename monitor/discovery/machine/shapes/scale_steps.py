@@ -21,7 +21,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.free_parts import parts_worth_keeping, priced
+from monitor.discovery.machine.shapes.free_parts import PRICE, parts_worth_keeping, priced
 from monitor.discovery.machine.shapes.refine import LIMIT
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.discovery.search.candidate import Variant
@@ -176,7 +176,10 @@ class StepsOfError:
             for companions in self._companions(others)
             if (steps := self._steps([*others, *companions]))
         ]
-        best = max(choices, key=lambda some: priced(self.scene, some, others), default=[])
+        # Each of several effects was chosen, as the parts of a free shape are.
+        best = max(
+            choices, key=lambda some: priced(self.scene, some, others) - 2.0 * PRICE * len(some), default=[]
+        )
         return best if best and foretells_poses(self.scene, best, others) else []
 
     def _steps(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
