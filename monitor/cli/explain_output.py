@@ -21,6 +21,7 @@ from monitor.reporting.runs_that_tell import (
     runs_that_tell,
 )
 from monitor.reporting.second_setup import IN_WORDS
+from monitor.reporting.step_words import step_in_words
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
     BadRow,
@@ -31,7 +32,6 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
     SearchedValue,
-    StepBetween,
 )
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.plan.test_answer import TestAnswer
@@ -300,25 +300,14 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
 def _where(effect: MachineMissing) -> None:
     """Where an effect lies, as far as it was looked for: its steps, or the place at which a plate is held."""
     for step in effect.steps or ():
-        output.say(f"   {_step_words(effect, step)}")
+        size = f"{output.rounded(step.value, step.u)} ± {output.two_digits(step.u)} {effect.unit}"
+        output.say(f"   {step_in_words(effect.effect, size, step.low_mm, step.high_mm)}")
     if effect.held_at is not None:
         places = (
             f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"
             for held in effect.held_at
         )
         output.say(f"   held at {', '.join(places)}")
-
-
-def _step_words(effect: MachineMissing, step: StepBetween) -> str:
-    """How large a step is and where it lies: ``a step of 4.0 ± 0.3 µm in the scale of X between 110 and 125 mm``."""
-    error = effect.effect.partition(":")[0]
-    axis = error[2:]
-    what = f"the scale of {axis}" if error[:2] == f"E{axis[:1]}" else f"{error} along {axis}"
-    size = f"{output.rounded(step.value, step.u)} ± {output.two_digits(step.u)} {effect.unit}"
-    return (
-        f"a step of {size} in {what} between {step.low_mm:.4g} and {step.high_mm:.4g} mm; where between them these "
-        "positions do not tell"
-    )
 
 
 def _searched(searched: SearchedValue) -> str:

@@ -17,6 +17,7 @@ from monitor import __version__
 from monitor.reporting.confounding import charted, whether_with_condition, whether_with_cycle
 from monitor.reporting.plain_names import plain_name
 from monitor.reporting.resources import report_text
+from monitor.reporting.step_words import step_in_words
 from monitor.web import words
 from monitor.web.faults import Refusal
 from monitor.web.forms import Typed, own_address
@@ -80,6 +81,7 @@ def _environment() -> Environment:
         "plain_name": plain_name,
         "number": words.number,
         "with_u": words.with_u,
+        "step_in_words": step_in_words,
         "channel": words.channel,
         "probability": words.probability,
         "day": words.day,

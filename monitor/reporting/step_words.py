@@ -1,0 +1,15 @@
+"""Says how large a step of an error is and between which readings it lies."""
+
+from __future__ import annotations
+
+
+def step_in_words(effect: str, size: str, low_mm: float, high_mm: float) -> str:
+    """A step of an ``effect``: ``a step of 4.0 ± 0.3 µm in the scale of X between 110 and 125 mm``; ``size`` has its
+    uncertainty and unit."""
+    error = effect.partition(":")[0]
+    axis = error[2:]
+    what = f"the scale of {axis}" if error[:2] == f"E{axis[:1]}" else f"{error} along {axis}"
+    return (
+        f"a step of {size} in {what} between {low_mm:.4g} and {high_mm:.4g} mm; where between them these positions do "
+        "not tell"
+    )
