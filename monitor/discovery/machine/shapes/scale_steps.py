@@ -40,6 +40,8 @@ from monitor.records import Array
 MOST_STEPS = 3
 # One position beyond a step, or between two, would be a step as well as a point by itself.
 POSITIONS_BEYOND = 2
+# A region narrower than this part of the travel is one place of a part that is laid anew in every run.
+LEAST_REGION = 1 / 96
 # Places are looked for among so many, and about the best of them among all; steps that go over a width have places
 # between positions as well: so many about the best.
 PLACES, NEAR_PLACES = 36, 33
@@ -84,7 +86,10 @@ class StepsOfError:
     def _gaps(self) -> Array:
         """The lower and upper ends (g, 2) in mm of what lies between neighbouring positions, where a step may be."""
         between = np.column_stack([self._positions[:-1, 1], self._positions[1:, 0]])
-        return np.asarray(between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1])
+        between = between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1]
+        first, last = self._positions[0, 0], self._positions[-1, 1]
+        wide = LEAST_REGION * (last - first)
+        return np.asarray(between[(between[:, 1] > first + wide) & (between[:, 0] < last - wide)])
 
     @cached_property
     def _middles(self) -> Array:
@@ -134,12 +139,18 @@ class StepsOfError:
         variant = Variant(f"{self.effect.term.symbol}:step", effect, max(tries, 1))
         return scene_of(self.scene.fit, [variant]).candidates[0]
 
+    def _least_region(self, width: float) -> float:
+        """How far apart in mm steps over a width have to be."""
+        travel = float(self._positions[-1, 1] - self._positions[0, 0])
+        return max(WIDTHS_APART * width, LEAST_REGION * travel)
+
     def _are_apart(self, places: Sequence[float], width: float) -> bool:
         """Whether there are positions enough between neighbouring steps, at which both have come to their levels."""
         at = self._positions.mean(axis=1)
         between = np.diff(np.searchsorted(at, sorted(places)))
         return bool(
-            np.all(between >= POSITIONS_BEYOND) and np.all(np.diff(sorted(places)) >= WIDTHS_APART * width)
+            np.all(between >= POSITIONS_BEYOND)
+            and np.all(np.diff(sorted(places)) >= self._least_region(width))
         )
 
     def _of_shape(self, kind: type[Shape] | UnionType) -> list[ChainCandidate]:
