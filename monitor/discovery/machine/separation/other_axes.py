@@ -2,7 +2,8 @@
 
 Where what is touched or looked at stays in place while a head or a table turns, the linear axes have one place for
 every angle. What one of them does as a function of its place, a turning axis may do as a function of its angle, and the
-other way round: of each the free shape of the other is asked, at the price of its parts.
+other way round: of each the free shape of the other is asked, at the price of its parts. At a dozen poses two turning
+axes go together as well: a table's wave with its play is a free shape of the axis that tilts it.
 """
 
 from __future__ import annotations
@@ -26,18 +27,23 @@ def free_of_other_axes(
     scene: ChainScene, candidate: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> Iterator[ChainCandidate]:
     """The free shapes of errors of turning axes in place of an error motion of a linear one beside others, and of
-    linear ones in place of that of a turning one, where these go with each other."""
+    linear ones in place of that of a turning one, where these go with each other; in place of a free shape of a turning
+    axis those of the other turning ones."""
     effect, context = candidate.effect, scene.fit.problem.context
-    if not _is_motion(candidate) or not _go_together(context):
+    if not _is_motion(candidate):
         return
     assert isinstance(effect, ChainEffect)
+    of_other_kind = _go_together(context)
+    of_same_kind = is_free(candidate) and effect.joint.turns
     taken = {error_of(other) for other in others}
     shapes: dict[str, list[ChainCandidate]] = {}
     for shape in scene.candidates:
         other = shape.effect
         if _is_motion(shape) and not is_free(shape) and isinstance(other, ChainEffect):
             moves = float(np.ptp(context.positions[:, other.term.joint])) > 0.0
-            if moves and other.joint.turns != effect.joint.turns and error_of(shape) not in taken:
+            is_same_kind = other.joint.turns == effect.joint.turns
+            is_asked = (of_same_kind and other.joint != effect.joint) if is_same_kind else of_other_kind
+            if moves and is_asked and error_of(shape) not in taken:
                 shapes.setdefault(error_of(shape), []).append(shape)
     for symbol, of_error in shapes.items():
         parts = parts_worth_keeping(scene, whole_basis(scene, symbol, of_error[0]), others)

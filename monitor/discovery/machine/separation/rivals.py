@@ -19,7 +19,7 @@ from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.free_parts import price_of_parts
+from monitor.discovery.machine.shapes.free_parts import price_of_choices
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.variants import bends_of, part_of_bend, with_drivers
 from monitor.discovery.search.candidate import Variant
@@ -78,13 +78,13 @@ class RivalSearch:
         are as likely as ``least`` with all parts paid for; ``remainder`` (M,) is what the effect does beside others."""
         candidate, others = self.selected[index], except_for(self.selected, index)
         basis = self.scene.remainders.beside(others).basis
-        least -= price_of_parts(candidate)
+        least -= price_of_choices(candidate)
         shapes = list(free_of_other_axes(self.scene, candidate, others))
         return [
             (evidence.candidate, coincides(basis, evidence.candidate, remainder[:, None]))
             for evidence in weigh_beside(self.scene, shapes, others)
             if error_of(evidence.candidate) not in named
-            and evidence.likelihood - price_of_parts(evidence.candidate) >= least
+            and evidence.likelihood - price_of_choices(evidence.candidate) >= least
         ]
 
     def _pool(self, index: int) -> list[ChainCandidate]:

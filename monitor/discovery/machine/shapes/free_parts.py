@@ -20,7 +20,7 @@ from monitor.discovery.search.products import Products
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
-from monitor.effects.shapes.free import Free
+from monitor.effects.shapes.free import HARMONICS, Free
 from monitor.records import Array
 
 # More parts than this of one shape are beyond what a plan can separate.
@@ -40,6 +40,18 @@ def is_free(candidate: ChainCandidate) -> bool:
 def price_of_parts(candidate: ChainCandidate) -> float:
     """What the choice of its parts takes from the score of a free shape; nothing from other effects."""
     return 2.0 * candidate.columns.shape[1] * PRICE if is_free(candidate) else 0.0
+
+
+def price_of_choices(candidate: ChainCandidate) -> float:
+    """What the choice of its parts takes at least: a wave, cosine and sine, is one entry of the catalogue."""
+    if not is_free(candidate):
+        return 0.0
+    effect = candidate.effect
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Free)
+    parts = set(effect.shape.parts)
+    pairs = sum({part, part + 1} <= parts for part in range(1, 2 * HARMONICS, 2)) if effect.joint.turns else 0
+    return price_of_parts(candidate) - 2.0 * PRICE * pairs
 
 
 def priced(

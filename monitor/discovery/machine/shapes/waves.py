@@ -41,8 +41,13 @@ def waves_instead(
     parts = effect.shape.parts
     orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
     rest = [part - 1 for part in parts if part > 2 * HARMONICS]
+    whole = [order for order in orders if {2 * order - 1, 2 * order} <= set(parts)]
     if orders and set(orders) <= set(waves) and len(orders) + bool(rest) <= MOST_NAMES:
         instead.append([*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])])
+    elif len(whole) == 1 and whole[0] in waves:
+        # One wave has its cosine and its sine: single parts of others belong to what it leaves.
+        left = [part - 1 for part in parts if (part + 1) // 2 != whole[0]]
+        instead.append([waves[whole[0]], of_parts(left)])
     best = max(instead, key=score, default=[])
     return best if best and score(best) >= score([free]) else []
 
