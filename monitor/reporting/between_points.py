@@ -27,9 +27,9 @@ class BetweenPoints:
 
 @dataclass(frozen=True)
 class StepPlace:
-    """A step of the map that lies somewhere from ``low_mm`` to ``high_mm`` of its ``axis``, between which nothing was
-    measured: points between may err by its ``size``, and all points where ``zero_between``, because the workpiece's
-    zero lies there. No U contains that."""
+    """A step of the map that lies somewhere from ``low_mm`` to ``high_mm`` of its ``axis``, as far as readings tell:
+    points between may err by its ``size``, and all points where ``zero_between``, because the workpiece's zero lies
+    there. No U contains that."""
 
     parameter: str
     axis: str
@@ -47,6 +47,6 @@ class StepPlace:
         )
         return (
             f"{self.parameter}, a step of {self.size:.1f} {self.unit}, lies somewhere between {self.low_mm:.2f} and "
-            f"{self.high_mm:.2f} mm of {self.axis}, where nothing was measured: points between may err by it, and all "
-            f"points{all_points}; no U contains that"
+            f"{self.high_mm:.2f} mm of {self.axis}, as far as the readings tell: points between may err by it, and "
+            f"all points{all_points}; no U contains that"
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import explain, fit
+from monitor.discovery import explain, fit, steps_of_model
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.effects import parse_effect
@@ -40,6 +40,11 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
         assert interval.low < place < interval.high
         assert interval.low < told < interval.high
     assert found.variant.tries > 1
+    grown = problem_of(campaign, Model("grown", added=(found.effect.text,)))
+    (of_model,) = steps_of_model(fit(grown)).values()
+    # Maps and certificates say the same.
+    for interval, same in zip(between, of_model, strict=True):
+        assert (same.low, same.high) == pytest.approx((interval.low, interval.high))
 
 
 def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):
@@ -69,4 +74,6 @@ def test_a_step_is_told_alone_and_a_model_with_it_lacks_nothing(virtual_campaign
     (interval,) = found.steps
     assert interval.low < 20.0 < interval.high
     grown = problem_of(campaign, Model("grown", added=(found.effect,)))
+    (of_model,) = steps_of_model(fit(grown))[found.effect]
+    assert (of_model.low, of_model.high) == pytest.approx((interval.low, interval.high))
     assert explain(campaign, grown, "grown", rng=np.random.default_rng(1)).missing == ()

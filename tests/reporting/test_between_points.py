@@ -32,27 +32,27 @@ PLACED = {
     (
         "en",
         False,
-    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, where nothing was "
-    "measured: points between may err by it, and all points where a workpiece's zero is set between; no U contains "
+    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, as far as the readings "
+    "tell: points between may err by it, and all points where a workpiece's zero is set between; no U contains "
     "that.",
     (
         "en",
         True,
-    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, where nothing was "
-    "measured: points between may err by it, and all points, because the workpiece's zero lies between; no U contains "
+    ): "EXX:step(12), a step of 6.2 µm, lies somewhere between 8.8 mm and 39.6 mm of X, as far as the readings "
+    "tell: points between may err by it, and all points, because the workpiece's zero lies between; no U contains "
     "that.",
     (
         "de",
         False,
-    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, wo nicht "
-    "gemessen wurde: Punkte dazwischen können um ihn abweichen, und alle Punkte, wenn der Nullpunkt eines Werkstücks "
-    "dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
+    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
+    "Messwerte es zeigen: Punkte dazwischen können um ihn abweichen, und alle Punkte, wenn der Nullpunkt eines "
+    "Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
     (
         "de",
         True,
-    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, wo nicht "
-    "gemessen wurde: Punkte dazwischen können um ihn abweichen, und alle Punkte, weil der Nullpunkt des Werkstücks "
-    "dazwischen liegt; keine Messunsicherheit U enthält das.",
+    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
+    "Messwerte es zeigen: Punkte dazwischen können um ihn abweichen, und alle Punkte, weil der Nullpunkt des "
+    "Werkstücks dazwischen liegt; keine Messunsicherheit U enthält das.",
 }
 
 

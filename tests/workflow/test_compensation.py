@@ -13,7 +13,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from monitor.discovery import nearest_readings
 from monitor.effects import Context, parse_effect
+from monitor.effects.shapes import Step
 from monitor.exceptions import InputError
 from monitor.machine import parse_topology
 from monitor.store import Database
@@ -141,7 +143,15 @@ def _mapped(truth, topology, signs, points=3):
         campaign=SimpleNamespace(name="c", machine=SimpleNamespace(id="M-1")), run=1,
         model=SimpleNamespace(name="m", version=1),
     )  # fmt: skip
-    return VolumetricMap(evaluated, errors, ranges, True, poses, points, error, {})
+    steps = {
+        effect.text: [
+            nearest_readings(effect.joint.sign * positions[:, effect.term.joint], reading, effect.shape.width)
+            for reading in effect.shape.readings
+        ]
+        for effect in effects
+        if isinstance(effect.shape, Step)
+    }
+    return VolumetricMap(evaluated, errors, ranges, True, poses, points, error, {}, steps)
 
 
 def _table(path):

@@ -1,5 +1,5 @@
 """What a map does not follow between its points: errors that repeat along an axis in less than some of its steps; and
-what it cannot know: where between two measured positions a step lies."""
+what it cannot know: where a step lies between readings that tell no better."""
 
 from __future__ import annotations
 
@@ -42,32 +42,24 @@ def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
 
 
 def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
-    """Where the steps of a map may lie: between the nearest positions of the campaign on either side of each, before
-    and after the width over which it goes.
-
-    ``explain`` tells the wider interval that the readings themselves leave, beside all else that it found.
-    """
+    """Where the steps of a map may lie, as the readings of the campaign leave it open."""
     errors, places = mapped.errors, []
     for effect, columns in _with_columns(errors):
         if not isinstance(effect.shape, Step):
             continue
         axis, sign = effect.term.joint, effect.joint.sign
-        measured = sign * errors.context.places[:, axis]
         zero = None if mapped.error.datum is None else sign * float(mapped.error.datum[axis])
-        half = effect.shape.width / 2.0
         # A driver may have several columns for each step.
         each = (columns.stop - columns.start) // len(effect.shape.readings)
-        for number, reading in enumerate(effect.shape.readings):
+        for number, between in enumerate(mapped.steps[effect.text]):
             start = columns.start + number * each
-            size = effect.term.unit.to_display(
-                float(np.ptp(_along(mapped, effect, slice(start, start + each))))
-            )
-            below, above = measured[measured <= reading - half], measured[measured >= reading + half]
-            if size and len(below) and len(above):
-                low, high = float(below.max()), float(above.min())
-                between = zero is not None and low < zero < high
-                name, unit = errors.names[start], effect.term.unit.name
-                places.append(StepPlace(name, effect.joint.name, low, high, size, unit, between))
+            unit: Unit = effect.term.unit
+            size = unit.to_display(float(np.ptp(_along(mapped, effect, slice(start, start + each)))))
+            if size:
+                low, high = between.low, between.high
+                has_zero = zero is not None and low < zero < high
+                name = errors.names[start]
+                places.append(StepPlace(name, effect.joint.name, low, high, size, unit.name, has_zero))
     return tuple(places)
 
 

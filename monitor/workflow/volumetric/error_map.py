@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.discovery import Fit
+from monitor.discovery import Between, Fit, steps_of_model
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
@@ -26,7 +26,8 @@ class VolumetricMap:
     """A map: the errors of the machine, and what they do at every point of a grid over the strokes.
 
     ``ranges`` are the readings from and to of every linear axis, mm; ``poses`` (P, J) the rotary poses, at each of
-    which the grid was laid; ``left_out`` says which parameters the map does not know, and why.
+    which the grid was laid; ``left_out`` says which parameters the map does not know, and why. ``steps`` are, by
+    effect, the readings between which each of its steps lies.
     """
 
     evaluated: StatedUncertainty
@@ -37,6 +38,7 @@ class VolumetricMap:
     points: int
     error: VolumetricError
     left_out: dict[str, RefusedParameters]
+    steps: Mapping[str, Sequence[Between]]
 
 
 def ranges_of(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
@@ -86,7 +88,8 @@ def map_of(
     corners = grid(errors.chain, ranges, 2, poses)
     outside = outside_errors(fit.problem, errors, corners, datum, left_out)
     left_out |= {each.symbol: refused_parameters(each.refusal) for each in outside}
-    return VolumetricMap(evaluated, errors, ranges, from_strokes, poses, points, error, left_out)
+    steps = steps_of_model(fit)
+    return VolumetricMap(evaluated, errors, ranges, from_strokes, poses, points, error, left_out, steps)
 
 
 @dataclass(frozen=True)

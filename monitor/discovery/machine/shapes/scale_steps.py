@@ -286,24 +286,31 @@ class StepsOfError:
         return np.asarray(remainder.residual @ remainder.residual - onto**2)
 
     def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
-        """The readings between which each step of a shape lies beside others: all gaps in whose middle it would not be
-        3.84 (twice the logarithm of a likelihood ratio) less likely than where it says most."""
+        """The readings between which each step of a shape lies beside others: from the nearest ones around it to all
+        gaps in whose middle it would not be 3.84 (twice the logarithm of a likelihood ratio) less likely than where it
+        says most."""
         freedom = self.scene.remainders.beside(others).degrees_of_freedom
         intervals = []
         for index, at_mm in enumerate(shape.readings):
+            around = nearest_readings(self._positions, at_mm, shape.width)
             rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-            remaining = self._left_with(self._middles.tolist(), rest, shape.width, others)
-            best = min(float(remaining.min()), float(self._left_with([at_mm], rest, shape.width, others)[0]))
-            of_place = np.flatnonzero((self._gaps[:, 0] <= at_mm) & (at_mm <= self._gaps[:, 1]))
-            able = np.union1d(of_place, np.flatnonzero(freedom * np.log(remaining / best) < LIMIT))
-            ends = self._gaps[able]
+            places = [*map(float, self._middles), at_mm]
+            remaining = self._left_with(places, rest, shape.width, others)
+            ends = self._gaps[freedom * np.log(remaining[:-1] / remaining.min()) < LIMIT]
             intervals.append(
-                Between(
-                    float(ends.min(initial=at_mm - shape.width / 2.0)),
-                    float(ends.max(initial=at_mm + shape.width / 2.0)),
-                )
+                Between(float(ends.min(initial=around.low)), float(ends.max(initial=around.high)))
             )
         return tuple(intervals)
+
+
+def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
+    """The nearest readings in mm before and after the width over which a step at a place goes; the end of the width
+    where none was ``measured``."""
+    begin, end = at_mm - width / 2.0, at_mm + width / 2.0
+    below, above = measured[measured <= begin], measured[measured >= end]
+    low = float(below.max()) if below.size else begin
+    high = float(above.min()) if above.size else end
+    return Between(low, high)
 
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
