@@ -272,6 +272,21 @@ class InstrumentAlias:
 
 
 @dataclass(frozen=True)
+class RunLeftOut:
+    """A run that was left out: its ``readings`` determine as many unknowns of the model, and none is left over to judge
+    it by. It may have been broken off."""
+
+    run: int
+    readings: int
+
+    def __str__(self) -> str:
+        return (
+            f"Run {self.run} is left out: its {self.readings} readings determine as many unknowns of the model, and "
+            "nothing is left over to judge it by."
+        )
+
+
+@dataclass(frozen=True)
 class Remaining:
     """What the model with all that was found leaves.
 
@@ -304,7 +319,7 @@ class MachineExplanation:
     other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
     instrument contradicts all others with all of this in the model too: that comes first. ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
-    of its own.
+    of its own. ``runs_left_out`` are those that were broken off, say.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -331,6 +346,7 @@ class MachineExplanation:
     added_together: tuple[str, ...] = ()
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
     rate: float | None = field(default=None, metadata=OMITTED)
+    runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
