@@ -106,7 +106,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._credible: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
         self._pool: Pool[ChainCandidate] | None = None
-        self._flipped: Memory[float | None] = Memory()
+        self._flipped: Memory[bool] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
@@ -279,25 +279,26 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         follows no F distribution. True where too few show it."""
         if pool is not self._pool:
             self._pool, self._flipped = pool, Memory()
-        p_value = self._flipped.answer(
-            others,
-            evidence.candidate,
-            lambda: self._p_value_by_flips(pool, others, evidence),
+        return self._flipped.answer(
+            others, evidence.candidate, lambda: self._stands_under_flips(pool, others, evidence)
         )
-        return p_value is None or p_value <= self.rate
 
-    def _p_value_by_flips(
+    def _stands_under_flips(
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
-    ) -> float | None:
-        """The p-value under sign flips; of an effect that stands out, where tails are heavy, that of scores."""
+    ) -> bool:
+        """Whether an effect stands under flips of what others leave and, where that has heavy tails, in its scores: by
+        F, which holds for bounded numbers, or under their flips."""
         p_value = p_value_by_flips(self.scene.remainders.beside(others), pool, evidence, self._units)
         if p_value is None or p_value > self.rate:
-            return p_value
+            return p_value is None
         scores = without_wild_readings(self.scene, others, evidence.candidate)
         if scores is None:
-            return p_value
+            return True
         (bounded,) = weigh_in(scores, [evidence.candidate])
-        return p_value_by_flips(scores, pool, bounded, self._units)
+        if bounded.p_value * self._families <= self.rate:
+            return True
+        p_value = p_value_by_flips(scores, pool, bounded, self._units)
+        return p_value is not None and p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
         """The effect with each driver, or without its own, at the price of a pitch that was sought; none that the scan
