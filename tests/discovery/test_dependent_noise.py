@@ -116,7 +116,7 @@ def test_sign_flips_agree_with_fits_of_flipped_residuals(virtual_campaigns):
     scene = scene_of(fit(problem), variants)
     pool = Pool(scene.candidates)
     best = weigh_beside(scene, pool, [])[0]
-    p_value = p_value_by_flips(scene, pool, [], best, [scene.run])
+    p_value = p_value_by_flips(scene.remainders.beside([]), pool, best, [scene.run])
     total, dof = float(scene.residual @ scene.residual), scene.degrees_of_freedom
     beaten = 0
     for flips in signs(8).T:
@@ -183,4 +183,4 @@ def test_seven_runs_have_too_few_flips_whatever_their_rounding(virtual_campaigns
     scene = scene_of(fit(problem), variants)
     pool = Pool(scene.candidates)
     for evidence in weigh_beside(scene, pool, []):
-        assert p_value_by_flips(scene, pool, [], evidence, [scene.run]) is None
+        assert p_value_by_flips(scene.remainders.beside([]), pool, evidence, [scene.run]) is None

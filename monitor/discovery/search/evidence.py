@@ -224,7 +224,13 @@ def weigh_beside(
     selected: Sequence[Candidate[object]],
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate beside the selected ones, the most convincing first."""
-    beside = scene.remainders.beside(selected)
+    return weigh_in(scene.remainders.beside(selected), candidates)
+
+
+def weigh_in(
+    beside: Remainder, candidates: Sequence[CandidateT] | Pool[CandidateT]
+) -> list[Evidence[CandidateT]]:
+    """Weigh every candidate in what selected effects leave, the most convincing first."""
     squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
     if isinstance(candidates, Pool):
         overlap = candidates.overlap(beside)

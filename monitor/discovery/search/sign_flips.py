@@ -17,10 +17,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.search.candidate import Candidate
 from monitor.discovery.search.evidence import Evidence, Pool
 from monitor.discovery.search.projection import orthonormal, without
-from monitor.discovery.search.scene import CandidateT, Scene
+from monitor.discovery.search.remainder import Remainder
+from monitor.discovery.search.scene import CandidateT
 from monitor.records import Array
 
 # With 999 flips a p-value of 0.01 is known to 0.003.
@@ -54,18 +54,17 @@ def effective_number(columns: Array, unit: npt.NDArray[np.int64]) -> float:
 
 
 def p_value_by_flips(
-    scene: Scene[CandidateT],
+    beside: Remainder,
     pool: Pool[CandidateT],
-    others: Sequence[Candidate[object]],
     evidence: Evidence[CandidateT],
     units: Sequence[npt.NDArray[np.int64]],
 ) -> float | None:
-    """Return the share of flips under which some candidate of a pool beside others is as convincing as ``evidence``.
+    """Return the share of flips under which some candidate of a pool is as convincing as ``evidence`` in what other
+    effects leave.
 
     ``units`` (M,) each are the indices, in order, of what every row is flipped with: runs, then blocks of them. The
     first by which enough of the effect is shown independently is taken; None where there is none.
     """
-    beside = scene.remainders.beside(others)
     basis, residual, dof = beside.basis, beside.residual, beside.degrees_of_freedom
     columns = orthonormal(without(basis, evidence.candidate.columns))
     run = next((unit for unit in units if effective_number(columns, unit) > FEWEST + ROUNDING), None)

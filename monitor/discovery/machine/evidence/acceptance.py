@@ -14,6 +14,7 @@ import scipy
 from monitor.discovery.machine.evidence.noise_doubt import NoiseDoubt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
+from monitor.discovery.machine.evidence.wild_readings import without_wild_readings
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import FlexibleErrors, error_of
 from monitor.discovery.machine.shapes.free_parts import is_free
@@ -32,6 +33,7 @@ from monitor.discovery.search.evidence import (
     best_of_families,
     pool_of,
     weigh_beside,
+    weigh_in,
 )
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.plausible import nearly_cancelled
@@ -104,7 +106,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._credible: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
         self._pool: Pool[ChainCandidate] | None = None
-        self._flipped: Memory[float | None] = Memory()
+        self._flipped: Memory[bool] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
@@ -273,15 +275,30 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
     ) -> bool:
         """Whether an effect stands out under sign flips of whole runs, of blocks of them or, in one run of independent
-        readings, of these: noise with heavy tails follows no F distribution. True where too few show it."""
+        readings, of these, and so again where no wild reading counts for more than its score: noise with heavy tails
+        follows no F distribution. True where too few show it."""
         if pool is not self._pool:
             self._pool, self._flipped = pool, Memory()
-        p_value = self._flipped.answer(
-            others,
-            evidence.candidate,
-            lambda: p_value_by_flips(self.scene, pool, others, evidence, self._units),
+        return self._flipped.answer(
+            others, evidence.candidate, lambda: self._stands_under_flips(pool, others, evidence)
         )
-        return p_value is None or p_value <= self.rate
+
+    def _stands_under_flips(
+        self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
+    ) -> bool:
+        """Whether an effect stands under flips of what others leave and, where that has heavy tails, in its scores: by
+        F, which holds for bounded numbers, or under their flips."""
+        p_value = p_value_by_flips(self.scene.remainders.beside(others), pool, evidence, self._units)
+        if p_value is None or p_value > self.rate:
+            return p_value is None
+        scores = without_wild_readings(self.scene, others, evidence.candidate)
+        if scores is None:
+            return True
+        (bounded,) = weigh_in(scores, [evidence.candidate])
+        if bounded.p_value * self._families <= self.rate:
+            return True
+        p_value = p_value_by_flips(scores, pool, bounded, self._units)
+        return p_value is not None and p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
         """The effect with each driver, or without its own, at the price of a pitch that was sought; none that the scan
