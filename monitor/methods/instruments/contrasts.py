@@ -30,6 +30,8 @@ from monitor.records import Array
 
 #: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
 ASKED = 0.1
+#: Below this p others contradict each other, however doubtful something has to be for whoever asks.
+CERTAIN = 1e-6
 
 
 def contrasts(
@@ -44,7 +46,14 @@ def contrasts(
 def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
     """What every setup and every instrument of several setups says against all others."""
     sides = Sides(at, _blocks(at))
-    return tuple(_judged(sides, _units(at, sides.blocks), frozenset(sides.blocks)))
+    units, among = _units(at, sides.blocks), frozenset(sides.blocks)
+    every = [*_against_others(sides, units, among)]
+    # Whoever contradicts all most surely does so without most of them as well.
+    in_order = {each.name: units[each.name] for each in sorted(every, key=lambda each: (each.p, -each.size))}
+    return tuple(
+        _with_others(sides, in_order | units, each, among - each.members) if each.p < ASKED else each
+        for each in every
+    )
 
 
 def contrast(problem: ChainProblem, solution: Solution, run: int, name: str) -> Contrast | None:
@@ -113,21 +122,31 @@ def _units(at: RunRows, blocks: Mapping[str, Block]) -> dict[str, frozenset[str]
     return units
 
 
-def _judged(sides: Sides, units: dict[str, frozenset[str]], among: frozenset[str]) -> Iterator[Contrast]:
+def _against_others(
+    sides: Sides, units: Mapping[str, frozenset[str]], among: frozenset[str]
+) -> Iterator[Contrast]:
     """Every unit against the others ``among`` setups, where they share something."""
     for name, mine in units.items():
-        if not mine < among:
-            continue
-        contrast = _apart(sides, name, mine, among - mine)
-        if contrast is None:
-            continue
-        if contrast.p < ASKED and among == frozenset(sides.blocks):
-            within = tuple(_judged(sides, units, among - mine))
-            count = comparisons_of(within)
-            # Others that share nothing cannot contradict each other.
-            least = min((count * other.p for other in within), default=1.0)
-            contrast = replace(contrast, others_left=count, others_p=min(1.0, least))
-        yield contrast
+        contrast = _apart(sides, name, mine, among - mine) if mine < among else None
+        if contrast is not None:
+            yield contrast
+
+
+def _with_others(
+    sides: Sides, units: Mapping[str, frozenset[str]], contrast: Contrast, others: frozenset[str]
+) -> Contrast:
+    """A contrast with how many comparisons the ``others`` have left without it, and what these say; as it is where they
+    contradict each other for certain."""
+    most = sum(mine < others for mine in units.values())
+    within = []
+    for each in _against_others(sides, units, others):
+        if most * each.p < CERTAIN:
+            return contrast
+        within.append(each)
+    count = comparisons_of(within)
+    # Others that share nothing cannot contradict each other.
+    least = min((count * each.p for each in within), default=1.0)
+    return replace(contrast, others_left=count, others_p=min(1.0, least))
 
 
 def comparisons_of(every: Sequence[Contrast]) -> int:
