@@ -28,7 +28,8 @@ from monitor.methods.instruments.sides import Block, Sides, basis_of
 from monitor.methods.method import Contrast, ContrastKind, SetupScatter
 from monitor.records import Array
 
-#: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
+#: Below this p, of all comparisons and of its own, something is doubtful enough to ask who is wrong: a tenth of the
+#: campaigns without fault are asked.
 ASKED = 0.1
 #: Below this p others contradict each other, however doubtful something has to be for whoever asks.
 CERTAIN = 1e-6
@@ -48,6 +49,8 @@ def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
     sides = Sides(at, _blocks(at))
     units, among = _units(at, sides.blocks), frozenset(sides.blocks)
     every = [*_against_others(sides, units, among)]
+    if comparisons_of(every) * min((each.p for each in every), default=1.0) > ASKED:
+        return tuple(every)
     # Whoever contradicts all most surely does so without most of them as well.
     in_order = {each.name: units[each.name] for each in sorted(every, key=lambda each: (each.p, -each.size))}
     return tuple(
