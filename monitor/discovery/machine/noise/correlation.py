@@ -33,8 +33,8 @@ FAR = 8
 # Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
 LIKELIER = 4.6
-# Numbers that are filtered in one piece (128 MB).
-PIECE = 16_000_000
+# Numbers that are filtered in one piece (32 MB).
+PIECE = 4_000_000
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
 
