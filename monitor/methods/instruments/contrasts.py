@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
+from monitor.methods.chain.least_squares import Solution, inverse_of_full_rank, space_of_run
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.run_rows import RunRows, instruments_of, run_rows
 from monitor.methods.instruments.shares import scatter_of
@@ -99,7 +99,7 @@ def _blocks(at: RunRows) -> dict[str, Block]:
             continue
         prior = at.known_of((part.id,))
         rows = np.concatenate([read, prior[~np.isin(prior, apart)]])
-        basis = basis_of(at.jacobian[rows], *at.separated(rows)[::2])
+        basis = basis_of(at.jacobian[rows], at.separated(rows))
         remaining = at.residual[rows] - basis @ (basis.T @ at.residual[rows])
         numbers = len(read) - float(np.sum(basis[: len(read)] ** 2))
         square, freedom = scatter_of(remaining[: len(read)], numbers)
@@ -161,18 +161,15 @@ def comparisons_of(every: Sequence[Contrast]) -> int:
 def _apart(sides: Sides, name: str, mine: frozenset[str], others: frozenset[str]) -> Contrast | None:
     """What the unit ``name`` says against others; None where they share nothing."""
     # What the whole run separates these rows may show by products of errors alone: no direction of a common fit.
-    projector, _ = sides.separated(mine | others)
+    unknowns = sides.separated(mine | others).unknowns
     bases = [sides.basis(side) for side in (mine, others)]
     within = np.vstack(
         [
-            basis.T @ (sides.jacobian(side) @ projector)
+            basis.T @ (sides.jacobian(side) @ unknowns)
             for side, basis in zip((mine, others), bases, strict=True)
         ]
     )
-    length = np.linalg.norm(within, axis=0)
-    vectors, strength, _ = np.linalg.svd(within / np.where(length > 0.0, length, 1.0))
-    rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
-    differ = vectors[:, rank:]
+    differ = _unreached(within)
     directions = differ.shape[1]
     if directions == 0:
         return None
@@ -190,6 +187,17 @@ def _apart(sides: Sides, name: str, mine: frozenset[str], others: frozenset[str]
     if len(mine) > 1:
         kind = ContrastKind.INSTRUMENT
     return Contrast(name, kind, tuple(dict.fromkeys(setups)), mine, directions, size, freedom, p)
+
+
+def _unreached(columns: Array) -> Array:
+    """Orthonormal directions (m, d) that nothing in the span of columns (m, r) reaches."""
+    length, rank = np.linalg.norm(columns, axis=0), columns.shape[1]
+    whole, triangle = np.linalg.qr(columns / np.where(length > 0.0, length, 1.0), mode="complete")
+    if inverse_of_full_rank(triangle[:rank]) is None:
+        space = space_of_run(columns)
+        rank = space.rank
+        whole, _ = np.linalg.qr(space.basis[:, :rank], mode="complete")
+    return np.asarray(whole[:, rank:])
 
 
 def _freedom(ordered: Sequence[tuple[int, float]], moved: Array) -> float:
