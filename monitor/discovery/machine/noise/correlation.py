@@ -333,8 +333,10 @@ class NoiseDesign:
         criteria = {}
         whites = self._whites(correlations)
         for number, (correlation, white) in enumerate(zip(correlations, whites, strict=True)):
-            left = max(float(squares[number]) - white.fitted(onto[number]), 1e-300)
-            criteria[correlation] = float(self._share * white.logarithm + self._number(white) * np.log(left))
+            sum_of_squares = max(float(squares[number]) - white.fitted(onto[number]), 1e-300)
+            criteria[correlation] = float(
+                self._share * white.logarithm + self._number(white) * np.log(sum_of_squares)
+            )
         return criteria
 
     def _number(self, white: _White) -> float:

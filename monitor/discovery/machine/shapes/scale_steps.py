@@ -94,11 +94,15 @@ class StepsOfError:
         """The columns (M, k) of a step at each of some places."""
         if (len(self._made) + len(places)) * len(self.scene.residual) > MOST_NUMBERS:
             self._made.clear()
-        new = [place for place in dict.fromkeys(places) if (place, width) not in self._made]
+        new = [at_mm for at_mm in dict.fromkeys(places) if (at_mm, width) not in self._made]
         steps = steps_at(self._reading, new, width)
-        made = columns_of(self.scene.fit, [ChainBasis(self.effect.term, step[:, None]) for step in steps.T])
-        self._made.update({(place, width): of.columns[0] for place, of in zip(new, made, strict=True)})
-        return np.array([self._made[place, width] for place in places]).T
+        columns_of_steps = columns_of(
+            self.scene.fit, [ChainBasis(self.effect.term, step[:, None]) for step in steps.T]
+        )
+        self._made.update(
+            {(at_mm, width): step.columns[0] for at_mm, step in zip(new, columns_of_steps, strict=True)}
+        )
+        return np.array([self._made[at_mm, width] for at_mm in places]).T
 
     @cached_property
     def _positions(self) -> Array:
