@@ -201,7 +201,8 @@ class Contrast:
     They can differ in so many ``directions``, do by ``size`` (root of the mean square in standard uncertainties), and
     chance alone makes ``p`` as much; ``freedom`` are the degrees of freedom of the scatter, infinite where it is as
     stated. Without it the others have so many comparisons left, ``others_left``, and contradict each other as chance
-    makes them in at most ``others_p``; both are None where ``p`` is too large to ask.
+    makes them in at most ``others_p``; both are None where ``p`` is too large to ask, and where the others contradict
+    each other for certain.
     """
 
     name: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -154,6 +155,16 @@ def test_what_few_runs_are_explained_by_costs_its_likelihood_and_every_choice(wa
         price = (rank + 2 * (correlation is not None)) * np.log(count)
         price += sum(2.0 * np.log(4 * each.variant.tries * each.variant.odds) for each in chosen)
         assert search._cost(first, latest) == pytest.approx(deviance + price, abs=0.01)
+
+
+def test_likelihoods_are_the_same_whatever_was_asked_before(walked):
+    """Of the grid a correlation asks for a part, in several lots."""
+    under = fit(walked(2))
+    residual = under.solution.last.residual
+    asked, fresh = under.noise_design, replace(under.noise_design)
+    assert asked.correlation(residual) is not None
+    after, first = (dict(design.likelihoods(residual)) for design in (asked, fresh))
+    assert after == pytest.approx(first, rel=1e-9)
 
 
 def test_noise_doubt_is_the_mean_of_generalised_least_squares_over_the_correlations(walked):

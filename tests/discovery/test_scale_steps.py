@@ -47,6 +47,14 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
         assert (same.low, same.high) == pytest.approx((interval.low, interval.high))
 
 
+def test_a_step_is_weighed_as_the_data_see_its_effect(virtual_campaigns):
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=step)
+    campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=1)
+    steps, (found,) = steps_beside_nothing(campaign, "EXX")
+    shape = found.effect.shape
+    np.testing.assert_allclose(steps._columns(shape.readings, shape.width), found.columns, rtol=1e-9)
+
+
 def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):
     campaign, _ = virtual_campaigns.virtual(77, days=1, runs_per_day=1)
     _, found = steps_beside_nothing(campaign, "EXX")

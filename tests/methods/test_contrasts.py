@@ -13,6 +13,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.instruments.contrasts import contrast, contrasts, contrasts_of, scatters
 from monitor.methods.instruments.run_rows import RunRows, run_rows
+from monitor.methods.instruments.suspects import who_contradicts
 from monitor.methods.method import Contrast, ContrastKind
 from monitor.readers import read_campaign
 from monitor.workflow.instruments.against_others import against_others
@@ -136,6 +137,26 @@ def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
         assert beside.size > beside.limit
         suspects.append(_names(beside))
     assert set(suspects) == {("r-test-B",), ("bar-zx", "r-test-B")}
+
+
+def test_others_that_contradict_each_other_for_certain_are_compared_no_further(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    misread = _rows(tmp_path, 62, ("r-test-B", -1.0))
+    told = contrasts_of(misread)
+    monkeypatch.setattr("monitor.methods.instruments.contrasts.CERTAIN", 0.0)
+    whole = contrasts_of(misread)
+    assert who_contradicts(told).suspects == who_contradicts(whole).suspects
+    certain = [
+        every.others_p for each, every in zip(told, whole, strict=True) if each.others_p != every.others_p
+    ]
+    assert certain
+    assert max(certain) < 1e-6
+
+
+def test_nobody_is_asked_who_is_wrong_where_nothing_contradicts(rows: RunRows) -> None:
+    calm = replace(rows, residual=0.3 * rows.residual)
+    assert all(each.others_p is None for each in contrasts_of(calm))
 
 
 def test_a_wrong_length_of_a_bar_is_named_and_no_plane_of_it(tmp_path: Path) -> None:

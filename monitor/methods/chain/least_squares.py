@@ -141,20 +141,28 @@ class RunSpace:
 
 
 def space_of_run(columns: Array) -> RunSpace:
-    """The span of the columns (N, p) of one run, as ``eliminate`` for decisions that no digit depends on.
+    """The span of the columns (N, p) of one run, as ``eliminate`` for decisions that no digit depends on."""
+    scale = np.linalg.norm(columns, axis=0)
+    if len(columns) >= columns.shape[1]:
+        q, triangle = np.linalg.qr(columns / np.where(scale == 0.0, 1.0, scale))
+        inverse = inverse_of_full_rank(triangle)
+        if inverse is not None:
+            return RunSpace(q, inverse / scale[:, None], columns.shape[1])
+    space = eliminate(columns[None])
+    return RunSpace(space.basis[0], space.inverse[0], int(space.rank[0]))
+
+
+def inverse_of_full_rank(triangle: Array) -> Array | None:
+    """The inverse of a triangle (p, p) whose columns have about unit length, None where it may lack rank.
 
     The norms of a triangle and its inverse bound its smallest singular value: ten times above the limit of the rank
     the decomposition into singular values, which takes ten times as long, could say nothing else.
     """
-    scale = np.linalg.norm(columns, axis=0)
-    if len(columns) >= columns.shape[1]:
-        q, triangle = np.linalg.qr(columns / np.where(scale == 0.0, 1.0, scale))
-        with suppress(np.linalg.LinAlgError):
-            inverse = np.linalg.inv(triangle)
-            if np.linalg.norm(triangle) * np.linalg.norm(inverse) < 0.1 / RANK_TOLERANCE:
-                return RunSpace(q, inverse / scale[:, None], columns.shape[1])
-    space = eliminate(columns[None])
-    return RunSpace(space.basis[0], space.inverse[0], int(space.rank[0]))
+    with suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(triangle)
+        if np.linalg.norm(triangle) * np.linalg.norm(inverse) < 0.1 / RANK_TOLERANCE:
+            return np.asarray(inverse)
+    return None
 
 
 def project_out(basis: Array, columns: Array) -> Array:

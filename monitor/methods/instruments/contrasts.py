@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
+from monitor.methods.chain.least_squares import Solution, inverse_of_full_rank, space_of_run
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.run_rows import RunRows, instruments_of, run_rows
 from monitor.methods.instruments.shares import scatter_of
@@ -28,8 +28,11 @@ from monitor.methods.instruments.sides import Block, Sides, basis_of
 from monitor.methods.method import Contrast, ContrastKind, SetupScatter
 from monitor.records import Array
 
-#: Beyond this p something is doubtful enough to ask who is wrong: a tenth of the campaigns without fault are asked.
+#: Below this p, of all comparisons and of its own, something is doubtful enough to ask who is wrong: a tenth of the
+#: campaigns without fault are asked.
 ASKED = 0.1
+#: Below this p others contradict each other, however doubtful something has to be for whoever asks.
+CERTAIN = 1e-6
 
 
 def contrasts(
@@ -44,7 +47,16 @@ def contrasts(
 def contrasts_of(at: RunRows) -> tuple[Contrast, ...]:
     """What every setup and every instrument of several setups says against all others."""
     sides = Sides(at, _blocks(at))
-    return tuple(_judged(sides, _units(at, sides.blocks), frozenset(sides.blocks)))
+    units, among = _units(at, sides.blocks), frozenset(sides.blocks)
+    every = [*_against_others(sides, units, among)]
+    if comparisons_of(every) * min((each.p for each in every), default=1.0) > ASKED:
+        return tuple(every)
+    # Whoever contradicts all most surely does so without most of them as well.
+    in_order = {each.name: units[each.name] for each in sorted(every, key=lambda each: (each.p, -each.size))}
+    return tuple(
+        _with_others(sides, in_order | units, each, among - each.members) if each.p < ASKED else each
+        for each in every
+    )
 
 
 def contrast(problem: ChainProblem, solution: Solution, run: int, name: str) -> Contrast | None:
@@ -87,7 +99,7 @@ def _blocks(at: RunRows) -> dict[str, Block]:
             continue
         prior = at.known_of((part.id,))
         rows = np.concatenate([read, prior[~np.isin(prior, apart)]])
-        basis = basis_of(at.jacobian[rows], *at.separated(rows)[::2])
+        basis = basis_of(at.jacobian[rows], at.separated(rows))
         remaining = at.residual[rows] - basis @ (basis.T @ at.residual[rows])
         numbers = len(read) - float(np.sum(basis[: len(read)] ** 2))
         square, freedom = scatter_of(remaining[: len(read)], numbers)
@@ -113,21 +125,31 @@ def _units(at: RunRows, blocks: Mapping[str, Block]) -> dict[str, frozenset[str]
     return units
 
 
-def _judged(sides: Sides, units: dict[str, frozenset[str]], among: frozenset[str]) -> Iterator[Contrast]:
+def _against_others(
+    sides: Sides, units: Mapping[str, frozenset[str]], among: frozenset[str]
+) -> Iterator[Contrast]:
     """Every unit against the others ``among`` setups, where they share something."""
     for name, mine in units.items():
-        if not mine < among:
-            continue
-        contrast = _apart(sides, name, mine, among - mine)
-        if contrast is None:
-            continue
-        if contrast.p < ASKED and among == frozenset(sides.blocks):
-            within = tuple(_judged(sides, units, among - mine))
-            count = comparisons_of(within)
-            # Others that share nothing cannot contradict each other.
-            least = min((count * other.p for other in within), default=1.0)
-            contrast = replace(contrast, others_left=count, others_p=min(1.0, least))
-        yield contrast
+        contrast = _apart(sides, name, mine, among - mine) if mine < among else None
+        if contrast is not None:
+            yield contrast
+
+
+def _with_others(
+    sides: Sides, units: Mapping[str, frozenset[str]], contrast: Contrast, others: frozenset[str]
+) -> Contrast:
+    """A contrast with how many comparisons the ``others`` have left without it, and what these say; as it is where they
+    contradict each other for certain."""
+    most = sum(mine < others for mine in units.values())
+    within = []
+    for each in _against_others(sides, units, others):
+        if most * each.p < CERTAIN:
+            return contrast
+        within.append(each)
+    count = comparisons_of(within)
+    # Others that share nothing cannot contradict each other.
+    least = min((count * each.p for each in within), default=1.0)
+    return replace(contrast, others_left=count, others_p=min(1.0, least))
 
 
 def comparisons_of(every: Sequence[Contrast]) -> int:
@@ -139,18 +161,15 @@ def comparisons_of(every: Sequence[Contrast]) -> int:
 def _apart(sides: Sides, name: str, mine: frozenset[str], others: frozenset[str]) -> Contrast | None:
     """What the unit ``name`` says against others; None where they share nothing."""
     # What the whole run separates these rows may show by products of errors alone: no direction of a common fit.
-    projector, _ = sides.separated(mine | others)
+    unknowns = sides.separated(mine | others).unknowns
     bases = [sides.basis(side) for side in (mine, others)]
     within = np.vstack(
         [
-            basis.T @ (sides.jacobian(side) @ projector)
+            basis.T @ (sides.jacobian(side) @ unknowns)
             for side, basis in zip((mine, others), bases, strict=True)
         ]
     )
-    length = np.linalg.norm(within, axis=0)
-    vectors, strength, _ = np.linalg.svd(within / np.where(length > 0.0, length, 1.0))
-    rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
-    differ = vectors[:, rank:]
+    differ = _unreached(within)
     directions = differ.shape[1]
     if directions == 0:
         return None
@@ -168,6 +187,17 @@ def _apart(sides: Sides, name: str, mine: frozenset[str], others: frozenset[str]
     if len(mine) > 1:
         kind = ContrastKind.INSTRUMENT
     return Contrast(name, kind, tuple(dict.fromkeys(setups)), mine, directions, size, freedom, p)
+
+
+def _unreached(columns: Array) -> Array:
+    """Orthonormal directions (m, d) that nothing in the span of columns (m, r) reaches."""
+    length, rank = np.linalg.norm(columns, axis=0), columns.shape[1]
+    whole, triangle = np.linalg.qr(columns / np.where(length > 0.0, length, 1.0), mode="complete")
+    if inverse_of_full_rank(triangle[:rank]) is None:
+        space = space_of_run(columns)
+        rank = space.rank
+        whole, _ = np.linalg.qr(space.basis[:, :rank], mode="complete")
+    return np.asarray(whole[:, rank:])
 
 
 def _freedom(ordered: Sequence[tuple[int, float]], moved: Array) -> float:

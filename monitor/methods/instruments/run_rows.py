@@ -10,13 +10,28 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE, Solution
+from monitor.methods.chain.least_squares import (
+    MEMBER_SHARE,
+    RANK_TOLERANCE,
+    Solution,
+    inverse_of_full_rank,
+)
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.records import Array
 
 #: Of an unknown that an instrument does not show, its rows have this part of the derivatives, or less, by rounding.
 ROUNDING = 1e-7
+
+
+@dataclass(frozen=True)
+class Separated:
+    """What rows separate of the unknowns (p,): the ``projector`` (p, p) on it, as many combinations of them as its rank
+    says, ``unknowns`` (p, r), and which of them are ``determined`` (p,)."""
+
+    projector: Array
+    unknowns: Array
+    determined: npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -97,26 +112,32 @@ class RunRows:
         """The lengths (p,) of the derivatives by all rows on a machine without errors."""
         return np.asarray(np.linalg.norm(self.nominal, axis=0))
 
-    def separated(self, rows: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        """The projector (p, p) on the unknowns that rows (m,) separate, which unknowns (p,) these are, and the rank."""
+    def separated(self, rows: npt.NDArray[np.int64]) -> Separated:
+        """What rows (m,) separate."""
         return separated_by(self.nominal[rows], self.sizes)
 
 
-def separated_by(nominal: Array, sizes: Array) -> tuple[Array, npt.NDArray[np.bool_], int]:
-    """The projector (p, p) on the unknowns that derivatives (m, p) separate, which (p,) these are, and the rank.
+def separated_by(nominal: Array, sizes: Array) -> Separated:
+    """What derivatives (m, p) separate.
 
     What is small beside the ``sizes`` (p,) of the derivatives by all rows is rounding.
     """
-    matrix = np.where(np.linalg.norm(nominal, axis=0) < ROUNDING * sizes, 0.0, nominal)
-    scale = np.linalg.norm(matrix, axis=0)
-    scale[scale == 0.0] = 1.0
-    _, strength, vectors = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"))
+    length = np.linalg.norm(nominal, axis=0)
+    is_shown = (length >= ROUNDING * sizes) & (length > 0.0)
+    scale = np.where(is_shown, length, 1.0)
+    matrix = np.where(is_shown, nominal, 0.0) / scale
+    triangle = np.linalg.qr(matrix[:, is_shown], mode="r")
+    if len(triangle) == triangle.shape[1] and inverse_of_full_rank(triangle) is not None:
+        # Nothing is open but what these rows do not show.
+        unknowns = np.eye(len(scale))[:, is_shown] / scale[:, None]
+        return Separated(np.diag(is_shown.astype(np.float64)), unknowns, is_shown)
+    _, strength, vectors = np.linalg.svd(np.linalg.qr(matrix, mode="r"))
     rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
-    left_open = vectors[rank:]
+    unknowns, left_open = vectors[:rank].T, vectors[rank:]
     projector = np.eye(len(scale)) - left_open.T @ left_open
     projector *= np.linalg.norm(projector, axis=0) > ROUNDING
     determined = np.abs(left_open).max(axis=0, initial=0.0) < MEMBER_SHARE
-    return projector * scale[None, :] / scale[:, None], determined, rank
+    return Separated(projector * scale[None, :] / scale[:, None], unknowns / scale[:, None], determined)
 
 
 def run_rows(problem: ChainProblem, solution: Solution, run: int, *, knows_others: bool = False) -> RunRows:

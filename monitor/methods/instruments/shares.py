@@ -34,9 +34,10 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
     for name, setups in instruments_of(at.problem).items():
         rows = at.of_setups(setups)
         mine = np.concatenate([rows, at.known_of(setups)])
-        separated, determined, _ = at.separated(mine)
+        separated_by_mine = at.separated(mine)
+        separated = separated_by_mine.projector
         by_mine = inverse_of(jacobian[mine] @ separated, RANK_TOLERANCE)
-        determined = determined[:count] & free
+        determined = separated_by_mine.determined[:count] & free
         remaining = residual[mine] - jacobian[mine] @ (separated @ (by_mine @ residual[mine]))
         leverage = np.einsum("mp,pm->m", jacobian[mine] @ separated, by_mine)
         numbers = int(np.count_nonzero(at.is_read[rows]))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.chain.least_squares import RANK_TOLERANCE
-from monitor.methods.instruments.run_rows import RunRows, separated_by
+from monitor.methods.chain.least_squares import space_of_run
+from monitor.methods.instruments.run_rows import RunRows, Separated, separated_by
 from monitor.records import Array
 
 
@@ -35,21 +35,20 @@ class Sides:
     def __init__(self, at: RunRows, blocks: Mapping[str, Block]) -> None:
         self.at, self.blocks = at, blocks
         self._turned = {name: _turned(at, block) for name, block in blocks.items()}
-        self._separated: dict[frozenset[str], tuple[Array, int]] = {}
+        self._separated: dict[frozenset[str], Separated] = {}
         self._bases: dict[frozenset[str], Array] = {}
 
-    def separated(self, side: frozenset[str]) -> tuple[Array, int]:
-        """The projector (p, p) on the unknowns that the rows of a side separate, and their rank."""
+    def separated(self, side: frozenset[str]) -> Separated:
+        """What the rows of a side separate of the unknowns."""
         if side not in self._separated:
             nominal = self._of(side)[:, : len(self.at.sizes)]
-            projector, _, rank = separated_by(nominal, self.at.sizes)
-            self._separated[side] = projector, rank
+            self._separated[side] = separated_by(nominal, self.at.sizes)
         return self._separated[side]
 
     def basis(self, side: frozenset[str]) -> Array:
         """An orthonormal basis (m, r) of what the unknowns that a side separates do to its rows."""
         if side not in self._bases:
-            self._bases[side] = basis_of(self.jacobian(side), *self.separated(side))
+            self._bases[side] = basis_of(self.jacobian(side), self.separated(side))
         return self._bases[side]
 
     def jacobian(self, side: frozenset[str]) -> Array:
@@ -89,9 +88,7 @@ def _turned(at: RunRows, block: Block) -> Array:
     return turned
 
 
-def basis_of(jacobian: Array, projector: Array, rank: int) -> Array:
-    """An orthonormal basis (m, r) of what so many unknowns (p,), those of a projector (p, p), do to rows (m, p)."""
-    columns = jacobian @ projector
-    length = np.linalg.norm(columns, axis=0)
-    vectors, strength, _ = np.linalg.svd(columns / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    return np.asarray(vectors[:, :rank][:, strength[:rank] > RANK_TOLERANCE * strength.max(initial=0.0)])
+def basis_of(jacobian: Array, separated: Separated) -> Array:
+    """An orthonormal basis (m, r) of what the unknowns (p,) do that rows (m, p) separate."""
+    space = space_of_run(jacobian @ separated.unknowns)
+    return space.basis[:, : space.rank]

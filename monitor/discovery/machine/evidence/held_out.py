@@ -120,16 +120,27 @@ def of_numbers(fit: Fit, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class PoseFold:
-    """Numbers of some poses in every run that are left out together: rows (R, m) of each run, and what a residual of
-    the whole fit (R, m) becomes (R, m, m) when every run's own unknowns are determined without them."""
+    """Numbers of some poses in every run that are left out together: ``rows`` (R, m) of each run, those ``present``
+    (R, m), and the orthonormal ``directions`` (R, m, k) in which the own unknowns of a run move them. A residual of the
+    whole fit grows along each by so many times itself, ``growth`` (R, k), when they are determined without these rows.
+    """
 
     rows: npt.NDArray[np.int64]
-    predicted: Array
+    present: npt.NDArray[np.bool_]
+    directions: Array
+    growth: Array
+
+    def predicted(self, residual: Array) -> Array:
+        """What residuals (R, m, k) of the whole fit become without these rows."""
+        along = np.swapaxes(self.directions, 1, 2) @ residual
+        return np.asarray(
+            self.present[..., None] * residual + self.directions @ (self.growth[..., None] * along)
+        )
 
     @cached_property
     def count(self) -> int:
         """The count of numbers that are predicted."""
-        return int(np.sum(np.any(self.predicted != 0.0, axis=2)))
+        return int(np.count_nonzero(self.present))
 
 
 @lru_cache(maxsize=2)
@@ -158,11 +169,12 @@ def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
         for run, members in enumerate(inside):
             taken[run, : len(members)], present[run, : len(members)] = members, True
         basis_rows = np.where(present[..., None], np.take_along_axis(basis, taken[..., None], axis=1), 0.0)
-        remaining = np.eye(most) * present[:, None, :] - basis_rows @ np.swapaxes(basis_rows, 1, 2)
-        values, vectors = np.linalg.eigh(remaining)
+        # Of hundreds of rows the few unknowns of a run move few directions.
+        directions, taken_along, _ = np.linalg.svd(basis_rows, full_matrices=False)
+        values = 1.0 - taken_along**2
         # What only the rows left out determine (a ball touched once) nothing predicts.
         inverse = np.where(values > PREDICTED, 1.0 / np.where(values > PREDICTED, values, 1.0), 0.0)
-        folds.append(PoseFold(taken, (vectors * inverse[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
+        folds.append(PoseFold(taken, present, directions, inverse - 1.0))
     return tuple(folds)
 
 
@@ -183,10 +195,10 @@ def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]
     runs = np.arange(len(residual))[:, None]
     for fold in folds:
         left_out, shared_rows = remainder[runs, fold.rows], shared[runs, fold.rows]
-        reaction = (fold.predicted @ shared_rows).reshape(left_out.size, -1)
+        reaction = fold.predicted(shared_rows).reshape(left_out.size, -1)
         grams.append(np.eye(shared_rows.shape[2]) - shared_rows.reshape(left_out.size, -1).T @ reaction)
         ontos.append(reaction.T @ left_out.reshape(-1))
-        parts.append(((fold.predicted @ left_out[..., None]).reshape(-1), reaction))
+        parts.append((fold.predicted(left_out[..., None]).reshape(-1), reaction))
     inverses = inverse_above(np.array(grams), PREDICTED)
     shares = (inverses @ np.array(ontos)[..., None])[..., 0]
     errors = [alone + reaction @ share for (alone, reaction), share in zip(parts, shares, strict=True)]

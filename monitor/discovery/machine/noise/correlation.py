@@ -8,6 +8,7 @@ independent.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -32,8 +33,8 @@ FAR = 8
 # Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
 LIKELIER = 4.6
-# Numbers that are filtered in one piece (128 MB).
-PIECE = 16_000_000
+# Numbers that are filtered in one piece (32 MB).
+PIECE = 4_000_000
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
 
@@ -152,19 +153,24 @@ GRID = (Correlation(0.0, 0.0), *(Correlation(rho, share) for share in SHARES for
 
 
 @dataclass(frozen=True)
-class _Whites:
-    """What the ``filters`` of the grid make of a plan: the decomposition (C, R, p), (C, R, p, p) of the filtered span
-    of what is unknown, and the part (C,) of the criterion that no residual changes."""
+class _White:
+    """What the filter of a correlation makes of a plan: the decomposition ``values`` (R, p), ``vectors`` (R, p, p) of
+    the filtered span of what is unknown, and the part of the criterion that no residual changes."""
 
-    filters: Filters
     values: Array
     vectors: Array
-    logarithm: Array
+    logarithm: float
 
     @property
     def able(self) -> npt.NDArray[np.bool_]:
-        """Which directions of the span a filter leaves to be estimated (C, R, p)."""
+        """Which directions (R, p) of the span the filter leaves to be estimated."""
         return np.asarray(self.values > SMALLEST_EIGENVALUE)
+
+    def fitted(self, onto: Array) -> float:
+        """The sum of squares that the span takes of filtered readings, of which ``onto`` (R, p) are the products with
+        it."""
+        along = (np.swapaxes(self.vectors, 1, 2) @ onto[..., None])[..., 0]
+        return float(np.sum(along[self.able] ** 2 / self.values[self.able]))
 
 
 @dataclass(frozen=True)
@@ -187,13 +193,15 @@ class NoiseDesign:
         readings, rest = self._parts_of(residual)
         if self._resemblance(readings) < NOTICED:
             return None
-        criterion = dict(zip(GRID, self._criteria(readings, rest).tolist(), strict=True))
+        # Of the grid no more than what is asked: the span of hundreds of unknowns takes long under each of them.
+        criterion = self._criteria(readings, rest, (GRID[0], *GRID[1 : 1 + len(CORRELATIONS)]))
         best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=criterion.__getitem__)
         # The more independent noise, the more alike has the rest to be.
         start = CORRELATIONS.index(best.rho)
         trials = [
             Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]
         ]
+        criterion |= self._criteria(readings, rest, [trial for trial in trials if trial not in criterion])
         best = min((best, *trials), key=criterion.__getitem__)
         least = criterion[best]
         if criterion[GRID[0]] - least <= LIKELIER:
@@ -201,17 +209,19 @@ class NoiseDesign:
         # A slow drift under much independent noise: far readings resemble each other as much as neighbours, hardly.
         # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
         # makes an effect.
-        slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
-        return replace(max((best, *slow), key=slowness), frame=self.frame)
+        slow = [trial for trial in GRID[1:] if trial.rho >= best.rho]
+        criterion |= self._criteria(readings, rest, [trial for trial in slow if trial not in criterion])
+        likelier = (trial for trial in slow if criterion[trial] < least)
+        return replace(max((best, *likelier), key=slowness), frame=self.frame)
 
     def least_criterion(self, residual: Array) -> float:
         """Minus twice the logarithm, but for a constant, of the restricted likelihood of residuals (R, N) under the
         likeliest correlation."""
-        return float(self._criteria(*self._parts_of(residual)).min())
+        return min(self._criteria(*self._parts_of(residual)).values())
 
     def likelihoods(self, residual: Array) -> list[tuple[Correlation | None, float]]:
         """Every correlation that is tried with the restricted likelihood of residuals (R, N), the largest of them 1."""
-        criteria = self._criteria(*self._parts_of(residual))
+        criteria = np.array([*self._criteria(*self._parts_of(residual)).values()])
         relative = np.exp(-0.5 * (criteria - criteria.min()))
         correlations = (replace(correlation, frame=self.frame) for correlation in GRID[1:])
         return list(zip((None, *correlations), relative.tolist(), strict=True))
@@ -225,14 +235,14 @@ class NoiseDesign:
         alone. Restricted by all that each model has, the likelihoods would be of different numbers, in other units
         (Harville, J. Am. Stat. Assoc. 72 (1977) 320, section 4.2; Gurka, Am. Stat. 60 (2006) 19).
         """
-        index = GRID.index(GRID[0] if correlation is None else replace(correlation, frame=0))
-        number = float(self._number[index])
-        return float(self._share * self._whites.logarithm[index] + number * np.log(squares / number))
+        (white,) = self._whites([GRID[0] if correlation is None else replace(correlation, frame=0)])
+        number = self._number(white)
+        return float(self._share * white.logarithm + number * np.log(squares / number))
 
     @property
     def contrasts(self) -> float:
         """How many independent numbers the unknowns leave of the readings."""
-        return float(self._number[0])
+        return self._number(*self._whites(GRID[:1]))
 
     def _parts_of(self, residual: Array) -> tuple[Array, Array]:
         """What of residuals (R, N) says how neighbours resemble each other."""
@@ -308,45 +318,59 @@ class NoiseDesign:
         series = np.cumsum(begins[self._runs], axis=1)
         return np.asarray(series[:, lag:] == series[:, :-lag], dtype=np.float64)
 
-    def _criteria(self, readings: Array, rest: Array) -> Array:
-        """Minus twice the logarithm of the restricted likelihood (C,) of the grid, but for a constant."""
-        whites = self._whites
-        residual = whites.filters.apply(readings)
+    def _criteria(
+        self, readings: Array, rest: Array, correlations: Sequence[Correlation] = GRID
+    ) -> dict[Correlation, float]:
+        """Minus twice the logarithm of the restricted likelihood under each of some correlations of the grid, but for a
+        constant."""
+        filters = self._filters(correlations)
+        residual = filters.apply(readings)
         unknowns, unknown_rest = self._own
         spans = unknowns.reshape(*readings.shape, -1)
-        onto = np.einsum("rtdp,crtd->crp", spans, whites.filters.apply_transposed(residual), optimize=True)
+        onto = np.einsum("rtdp,crtd->crp", spans, filters.apply_transposed(residual), optimize=True)
         onto += np.einsum("rep,re->rp", unknown_rest, rest[..., 0])
-        onto = (np.swapaxes(whites.vectors, 2, 3) @ onto[..., None])[..., 0]
-        able = whites.able
-        fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
-        squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
-        return np.asarray(self._share * whites.logarithm + self._number * np.log(np.maximum(squares, 1e-300)))
+        squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2))
+        criteria = {}
+        whites = self._whites(correlations)
+        for number, (correlation, white) in enumerate(zip(correlations, whites, strict=True)):
+            sum_of_squares = max(float(squares[number]) - white.fitted(onto[number]), 1e-300)
+            criteria[correlation] = float(
+                self._share * white.logarithm + self._number(white) * np.log(sum_of_squares)
+            )
+        return criteria
 
-    @cached_property
-    def _number(self) -> Array:
-        """The degrees of freedom (C,) under every correlation: of readings, and of what setups state."""
+    def _number(self, white: _White) -> float:
+        """The degrees of freedom under a correlation: of readings, and of what setups state."""
         rest = self._own[1]
         numbers = self._numbers + rest.shape[0] * rest.shape[1]
-        return np.asarray(self._share * (numbers - self._whites.able.sum(axis=(1, 2))))
+        return self._share * (numbers - float(np.count_nonzero(white.able)))
 
     @cached_property
-    def _whites(self) -> _Whites:
-        at_once = max(1, PIECE // max(self._own[0].size, 1))
-        filters = self._filters
-        pieces = (slice(first, first + at_once) for first in range(0, len(GRID), at_once))
-        products = [self._products(filters, piece) for piece in pieces]
-        values, vectors = np.linalg.eigh(np.concatenate(products))
-        able = values > SMALLEST_EIGENVALUE
-        read = None if self.rows.read is None else self.rows.by_neighbours(self.rows.read)[self._runs]
-        logarithm = filters.logarithm(self.rows.numbers, read).sum(axis=1)
-        logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
-        return _Whites(filters, values, vectors, logarithm)
+    def _known(self) -> dict[Correlation, _White]:
+        return {}
 
-    @property
-    def _filters(self) -> Filters:
+    def _whites(self, correlations: Sequence[Correlation]) -> list[_White]:
+        """What the filters of some correlations make of the plan, each made once."""
+        new = [correlation for correlation in correlations if correlation not in self._known]
+        filters = self._filters(new)
+        read = None if self.rows.read is None else self.rows.by_neighbours(self.rows.read)[self._runs]
+        logarithms = filters.logarithm(self.rows.numbers, read).sum(axis=1)
+        at_once = max(1, PIECE // max(self._own[0].size, 1))
+        for first in range(0, len(new), at_once):
+            some = slice(first, first + at_once)
+            decomposed = zip(*np.linalg.eigh(self._products(filters, some)), strict=True)
+            for correlation, logarithm, (values, vectors) in zip(
+                new[some], logarithms[some].tolist(), decomposed, strict=True
+            ):
+                able = values > SMALLEST_EIGENVALUE
+                whole = logarithm + float(np.sum(np.log(values[able])))
+                self._known[correlation] = _White(values, vectors, whole)
+        return [self._known[correlation] for correlation in correlations]
+
+    def _filters(self, correlations: Sequence[Correlation]) -> Filters:
         begins = None if self.rows.begins is None else self.rows.begins[self._runs]
         steps = None if self.rows.steps is None else self.rows.steps[self._runs]
-        return Filters(GRID, self._weighted, begins, steps)
+        return Filters(tuple(correlations), self._weighted, begins, steps)
 
     def _products(self, filters: Filters, some: slice) -> Array:
         """The products (C, R, p, p) of the span of what is unknown, filtered under some correlations, with itself."""

@@ -17,8 +17,10 @@ from math import comb
 from types import UnionType
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene_columns import columns_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import PRICE, parts_worth_keeping, priced
@@ -26,13 +28,15 @@ from monitor.discovery.machine.shapes.refine import LIMIT
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
-from monitor.discovery.search.projection import without
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
+from monitor.effects.effect import ChainBasis
 from monitor.effects.shape import Shape
 from monitor.effects.shapes import Step
 from monitor.effects.shapes.poly import Poly
 from monitor.effects.shapes.reversal import Reversal
+from monitor.effects.shapes.step import steps_at
 from monitor.effects.shapes.windup import WindUp
 from monitor.records import Array
 
@@ -55,6 +59,8 @@ WIDTHS_APART = 4.0
 # together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
 POSITIONS_OF_BENDS = 12
+# So many numbers of columns are remembered of an error, 32 MB.
+MOST_NUMBERS = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -74,10 +80,34 @@ class StepsOfError:
     effect: ChainEffect
 
     @cached_property
+    def _reading(self) -> Array:
+        """The readings (n,) of the axis in mm."""
+        places = self.scene.fit.problem.context.places
+        return np.asarray(self.effect.joint.sign * places[:, self.effect.term.joint])
+
+    @cached_property
+    def _made(self) -> dict[tuple[float, float], Array]:
+        """The columns (M,) of steps by place and width, as the data see them, each made once."""
+        return {}
+
+    def _columns(self, places: Sequence[float], width: float) -> Array:
+        """The columns (M, k) of a step at each of some places."""
+        if (len(self._made) + len(places)) * len(self.scene.residual) > MOST_NUMBERS:
+            self._made.clear()
+        new = [at_mm for at_mm in dict.fromkeys(places) if (at_mm, width) not in self._made]
+        steps = steps_at(self._reading, new, width)
+        columns_of_steps = columns_of(
+            self.scene.fit, [ChainBasis(self.effect.term, step[:, None]) for step in steps.T]
+        )
+        self._made.update(
+            {(at_mm, width): step.columns[0] for at_mm, step in zip(new, columns_of_steps, strict=True)}
+        )
+        return np.array([self._made[at_mm, width] for at_mm in places]).T
+
+    @cached_property
     def _positions(self) -> Array:
         """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood."""
-        joint = self.effect.joint
-        reading = np.sort(joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint])
+        reading = np.sort(self._reading)
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
@@ -144,14 +174,17 @@ class StepsOfError:
         travel = float(self._positions[-1, 1] - self._positions[0, 0])
         return max(WIDTHS_APART * width, LEAST_REGION * travel)
 
-    def _are_apart(self, places: Sequence[float], width: float) -> bool:
-        """Whether there are positions enough between neighbouring steps, at which both have come to their levels."""
-        at = self._positions.mean(axis=1)
-        between = np.diff(np.searchsorted(at, sorted(places)))
-        return bool(
-            np.all(between >= POSITIONS_BEYOND)
-            and np.all(np.diff(sorted(places)) >= self._least_region(width))
-        )
+    @cached_property
+    def _middles_of_positions(self) -> Array:
+        return np.asarray(self._positions.mean(axis=1))
+
+    def _are_apart(self, places: Array | Sequence[float], width: float) -> npt.NDArray[np.bool_]:
+        """Whether there are positions enough between neighbouring steps at places (..., k), at which both have come to
+        their levels."""
+        ordered = np.sort(places, axis=-1)
+        between = np.diff(np.searchsorted(self._middles_of_positions, ordered), axis=-1)
+        apart = (between >= POSITIONS_BEYOND) & (np.diff(ordered, axis=-1) >= self._least_region(width))
+        return np.asarray(np.all(apart, axis=-1))
 
     def _of_shape(self, kind: type[Shape] | UnionType) -> list[ChainCandidate]:
         """The candidates of this error of some kinds of shape that follow no driver and are seen."""
@@ -195,7 +228,7 @@ class StepsOfError:
 
     def _steps(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The steps that say most beside others, as one effect; none where none is worth its price."""
-        worth, best = self._price(0, others) + self._cost([], others), None
+        worth, best = self._price(0, others) + self._cost([], 0.0, others), None
         for (places, width, whole), most in product(self._wholes, (1, MOST_STEPS)):
             selected = self._refined(self._selected(places, whole, most, others), width, others)
             selected = self._worth_keeping(selected, width, others)
@@ -203,7 +236,7 @@ class StepsOfError:
                 continue
             # The width of a way is one more unknown.
             price = self._price(len(selected) + bool(width), others)
-            cost = price + self._cost([self._candidate(selected, width)], others)
+            cost = price + self._cost(selected, width, others)
             if cost < worth:
                 worth, best = cost, (selected, width)
         return [] if best is None else self._at_best_width(*best, others)
@@ -215,7 +248,7 @@ class StepsOfError:
         widths = [float(f"{width * part:.3g}") for part in NEAR_WIDTHS] if width else []
         able = [some for some in widths if self._are_apart(places, some)]
         if able:
-            width = min(able, key=lambda some: self._cost([self._candidate(places, some)], others))
+            width = min(able, key=lambda some: self._cost(places, some, others))
             places = self._worth_keeping(self._refined(places, width, others), width, others)
         steps = self._candidate(places, width)
         return [steps] if steps.visible else []
@@ -229,11 +262,22 @@ class StepsOfError:
         freedom = self.scene.remainders.beside(others).degrees_of_freedom
         return count * (float(np.log(freedom)) + 2.0 * self._choice())
 
-    def _cost(self, steps: Sequence[ChainCandidate], others: Sequence[ChainCandidate]) -> float:
-        """Minus twice the logarithm of the likelihood of steps beside others."""
+    def _cost(self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]) -> float:
+        """Minus twice the logarithm of the likelihood of steps at places beside others."""
         freedom = self.scene.remainders.beside(others).degrees_of_freedom
-        residual = self.scene.remainders.beside([*others, *steps]).residual
+        _, residual = self._beside(places, width, others)
         return freedom * float(np.log(residual @ residual))
+
+    def _beside(
+        self, places: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> tuple[Array, Array]:
+        """An orthonormal basis (M, r) of what steps at places add to others, and what both leave (M,) of the
+        residual."""
+        remainder = self.scene.remainders.beside(others)
+        if not len(places):
+            return remainder.basis[:, :0], remainder.residual
+        basis = orthonormal(without(remainder.basis, self._columns(places, width)))
+        return basis, without(basis, remainder.residual[:, None])[:, 0]
 
     def _selected(
         self, places: Array, whole: ChainCandidate, most: int, others: Sequence[ChainCandidate]
@@ -249,7 +293,10 @@ class StepsOfError:
         best = list(places)
         for index, at_mm in enumerate(places):
             rest = best[:index] + best[index + 1 :]
-            near = [some for some in self._near(at_mm, width) if self._are_apart([*rest, some], width)]
+            near = self._near(at_mm, width)
+            near = near[
+                self._are_apart(np.column_stack([np.tile(rest, (len(near), 1)), near]), width)
+            ].tolist()
             if len(near) > 1:
                 remaining = self._left_with(near, rest, width, others)
                 # The middle of those that say the same: between two positions the readings are.
@@ -263,9 +310,9 @@ class StepsOfError:
         """The places of steps that are worth their price beside the rest, now that all are where they say most."""
         worthy = list(places)
         while len(worthy) > 1:
-            with_all = self._cost([self._candidate(worthy, width)], others)
+            with_all = self._cost(worthy, width, others)
             without_each = [
-                self._cost([self._candidate(worthy[:index] + worthy[index + 1 :], width)], others)
+                self._cost(worthy[:index] + worthy[index + 1 :], width, others)
                 for index in range(len(worthy))
             ]
             least = int(np.argmin(without_each))
@@ -278,12 +325,12 @@ class StepsOfError:
         self, near: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
     ) -> Array:
         """What is left (k,) of the residual with a step at each of some places, beside steps at ``rest`` and others."""
-        beside = [*others, *([self._candidate(rest, width)] if rest else [])]
-        remainder = self.scene.remainders.beside(beside)
-        columns = without(remainder.basis, self._candidate(near, width).columns)
+        basis, residual = self._beside(rest, width, others)
+        columns = without(self.scene.remainders.beside(others).basis, self._columns(near, width))
+        columns = without(basis, columns)
         length = np.linalg.norm(columns, axis=0)
-        onto = columns.T @ remainder.residual / np.where(length > 0.0, length, 1.0)
-        return np.asarray(remainder.residual @ remainder.residual - onto**2)
+        onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)
+        return np.asarray(residual @ residual - onto**2)
 
     def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
         """The readings between which each step of a shape lies beside others: from the nearest ones around it to all
