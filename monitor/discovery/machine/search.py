@@ -15,6 +15,7 @@ from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.shapes.long_waves import without_longest
 from monitor.discovery.machine.shapes.one_instead import one_instead
 from monitor.discovery.machine.shapes.plate_instead import plate_instead
 from monitor.discovery.machine.shapes.several_instead import several_instead
@@ -79,7 +80,8 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
                 partial(_in_their_own_shapes, plain, catalogued, drivers, rate),
             )
             accepts = ChainAcceptance(scene, drivers, rate).accepts
-            scene, result = drift_instead(*one_instead(scene, result, accepts), drivers, accepts)
+            scene, result = without_longest(*one_instead(scene, result, accepts))
+            scene, result = drift_instead(scene, result, drivers, accepts)
             return axes_of_plate(*plate_instead(scene, result, accepts), accepts)
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
 

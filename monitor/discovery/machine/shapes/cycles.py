@@ -12,7 +12,8 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.shapes.flexible import error_of
-from monitor.discovery.machine.shapes.refine import AT_END, refine
+from monitor.discovery.machine.shapes.long_waves import is_at_longest, long_wave
+from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
@@ -25,7 +26,6 @@ from monitor.discovery.machine.shapes.variants import (
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.effects import ChainEffect, parse_effect
-from monitor.effects.shapes import Cyclic
 from monitor.effects.shapes.free import Free
 from monitor.effects.shapes.nodes import Nodes
 
@@ -51,7 +51,8 @@ def best_cycle(
     scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> list[ChainCandidate]:
     """The cycle of a searched pitch, alone, that says most beside others of the error of which a candidate is a shape;
-    none where that turns, or travels too little for any. Of pitches up to half of the travel."""
+    none where that turns, or travels too little for any. Of pitches up to half of the travel, and of longer ones where
+    the wave is the whole of its error."""
     effect = shape.effect
     if not isinstance(effect, ChainEffect) or effect.joint.turns:
         return []
@@ -69,12 +70,6 @@ def best_cycle(
     if not weighed:
         return []
     best = refine(scene, [*others, weighed[0].candidate], len(others)).candidate
-    return [] if _is_at_longest(best, travel / FEWEST_PERIODS) else [best]
-
-
-def _is_at_longest(cycle: ChainCandidate, longest: float) -> bool:
-    """Whether a cycle has the longest pitch, in mm, that is sought: longer ones would say more, and are bends."""
-    effect = cycle.effect
-    assert isinstance(effect, ChainEffect)
-    assert isinstance(effect.shape, Cyclic)
-    return effect.shape.pitch > (1.0 - AT_END) * longest
+    short = [] if is_at_longest(best, longest_pitch(travel)) else [best]
+    both = [*short, *long_wave(scene, shape, others)]
+    return [evidence.candidate for evidence in weigh_beside(scene, both, others)][:1]

@@ -17,6 +17,7 @@ from monitor.discovery.machine.shapes.alias_pitches import as_it_appears
 from monitor.discovery.machine.shapes.cycles import best_cycle
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import is_free, priced
+from monitor.discovery.machine.shapes.long_waves import is_clipped, is_long, price_of_several
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.waves import many_periods
@@ -61,23 +62,27 @@ def _instead(
         mine = [shape for shape in shapes if error_of(shape) == symbol]
         for size in range(len(mine), 0, -1):
             for several in combinations(mine, size):
-                if size == 1 and not _may_be_another(scene, several[0]):
-                    continue
                 others = [each for each in selected if all(each is not other for other in several)]
+                if size == 1 and not _may_be_another(scene, several[0], others):
+                    continue
                 worth = priced(scene, several, others)
                 for evidence in _shapes_of_error(scene, several[0], others):
                     single = evidence.candidate
-                    outdoes = evidence.score >= worth + (WORTH_EXCHANGING if size == 1 else 0.0)
+                    less = price_of_several(scene, several, others) if is_long(single) else 0.0
+                    outdoes = evidence.score >= worth - less + (WORTH_EXCHANGING if size == 1 else 0.0)
                     if outdoes and accepts(others, single):
                         yield [*others, single]
 
 
-def _may_be_another(scene: ChainScene, shape: ChainCandidate) -> bool:
-    """Whether one shape is asked against others of its error: a lead that looks longer, and the free shape of a turning
-    axis, of which one part may follow at a few angles what takes a cosine and a sine."""
+def _may_be_another(scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether one shape is asked against others of its error: a lead that looks longer, a cycle of the longest pitch
+    that was sought, and the free shape of a turning axis, of which one part may follow at a few angles what takes a
+    cosine and a sine."""
     effect = shape.effect
     turns = isinstance(effect, ChainEffect) and effect.joint.turns
-    return (is_free(shape) and turns) or bool(as_it_appears(effect, scene.fit.problem.context))
+    if (is_free(shape) and turns) or as_it_appears(effect, scene.fit.problem.context):
+        return True
+    return is_clipped(scene, shape, others)
 
 
 def _shapes_of_error(

@@ -46,6 +46,8 @@ LIMIT_FACTOR = 2.0**0.25
 MOST_BELOW_GRID, AT_END = 8, 0.02
 # Widths that are tried between the neighbours on the grid.
 WIDTHS_TRIED = 9
+# Names of pitches have six digits.
+NAMED_TO = 1e-5
 # A warm-up has settled after so few readings that no data show how.
 SETTLED_READINGS = 1.0
 
@@ -102,7 +104,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
-            (min(shortest, pitch), max(pitch, longest_pitch(travel))),
+            (min(shortest, pitch), _longest_from(pitch, travel)),
         )
     if isinstance(effect.shape, WindUp):
         return _Range(
@@ -126,6 +128,12 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
             lambda order: float(round(order)),
         )
     return None
+
+
+def _longest_from(pitch: float, travel: float) -> float:
+    """The longest pitch in mm that is sought from one: half of the travel, or the whole from beyond."""
+    half = longest_pitch(travel)
+    return max(pitch, half if pitch <= (1.0 + NAMED_TO) * half else travel)
 
 
 def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
