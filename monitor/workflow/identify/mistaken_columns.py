@@ -43,9 +43,9 @@ def with_mistake(
 
     Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
     it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
-    that would let the readings fit, which takes up to half a minute; where none does, what else the import noticed of
-    the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows
-    a part is tried.
+    that would let the readings fit, which takes up to half a minute, and as long again without rows of zeros, which are
+    named too where that is enough; where no change is, what else the import noticed of the columns is said. Where the
+    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
     if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
         return refusal
@@ -64,9 +64,12 @@ def with_mistake(
     misread = only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes = find_mistakes(part, problem_of, None)
+    mistakes, named = find_mistakes(part, problem_of, None), ()
+    if blank and not mistakes:
+        # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
+        mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
     said = (
-        (mistake_sentence(mistakes_found(mistakes)),)
+        (*named, mistake_sentence(mistakes_found(mistakes)))
         if mistakes
         else column_doubts(campaign, tool_frames(campaign))
     )
@@ -77,15 +80,20 @@ def _fits_without(
     campaign: Campaign, rows: Collection[tuple[int, int]], problem_of: Callable[[Campaign], ChainProblem]
 ) -> bool:
     """Whether a machine of the file fits a campaign without some rows, each a run and a sequence number."""
-    probings = campaign.probings
-    pairs = zip(probings.run.tolist(), probings.sequence.tolist(), strict=True)
-    others = np.array([pair not in rows for pair in pairs])
     try:
         with np.errstate(all="ignore"):
-            solve_problem(problem_of(replace(campaign, probings=probings.rows(others))))
+            solve_problem(problem_of(_without(campaign, rows)))
     except (MonitorError, np.linalg.LinAlgError):
         return False
     return True
+
+
+def _without(campaign: Campaign, rows: Collection[tuple[int, int]]) -> Campaign:
+    """A campaign without some rows, each a run and a sequence number."""
+    probings = campaign.probings
+    pairs = zip(probings.run.tolist(), probings.sequence.tolist(), strict=True)
+    others = np.array([pair not in rows for pair in pairs])
+    return replace(campaign, probings=probings.rows(others))
 
 
 def _with_sentences(refusal: DataError, said: Sequence[str]) -> DataError:
