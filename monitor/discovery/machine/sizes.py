@@ -27,8 +27,8 @@ from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.units import Unit
 
-#: Lengths of which an effect moves none by this part of its standard uncertainty (0.1 µm of a laser, where it is said to
-#: 0.1 µm), and all together by less than this part of what it moves angles, in squares: what it does is a turn.
+#: Lengths of which an effect moves none by this part of its standard uncertainty (0.1 µm of a laser, of which so many
+#: digits are said), and all together by less than this part of what it moves angles, in squares: it is told as a turn.
 SEEN, OF_ANGLES = 0.5, 0.01
 
 
@@ -127,8 +127,8 @@ def peaks_of_errors(
 
 
 def seen_as_turn(scene: ChainScene, displacement: Array) -> bool:
-    """Whether displacements (n, d) in mm show in rows of angles and next to nothing in lengths: those of an angle are on
-    a lever of a metre. Every laser has an Abbe arm of some mm."""
+    """Whether displacements (n, d) in mm show in rows of angles and hardly in lengths: every laser has an Abbe arm of
+    some mm. Those of an angle are on a lever of a metre."""
     problem = scene.fit.problem
     lengths = problem.is_length
     moved = np.where(np.isfinite(problem.sigma), np.abs(displacement) / problem.sigma, 0.0)
