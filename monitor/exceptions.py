@@ -60,7 +60,14 @@ class TooManyRowsError(DataError):
 
 
 class TooFewReadingsError(DataError):
-    """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for."""
+    """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for.
+
+    ``without`` are the runs beside which the others would be answered; none where no others would.
+    """
+
+    def __init__(self, message: str, without: Sequence[int] = ()) -> None:
+        super().__init__(message)
+        self.without = tuple(without)
 
 
 class NotConvergedError(DataError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,9 @@ import pytest
 
 import monitor
 from monitor.exceptions import TooFewReadingsError
+from monitor.methods.instruments.method import problem_of
+from monitor.readers import read_campaign
+from monitor.workflow.identify.mistaken_columns import with_mistake
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUESTIONS = ("identify", "compare", "explain", "uncertainty", "predict", "map", "contributions")
@@ -86,9 +90,22 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
         db.add(tmp_path / "broken-off")
         for question in QUESTIONS:
             with pytest.raises(
-                TooFewReadingsError, match=r"9 readings of run 5 .* or leave run 5 out: remove its rows"
+                TooFewReadingsError,
+                match=r"9 readings of run 5 .* or leave run 5 out: remove its rows from runs.csv and probings.csv, ",
             ):
                 db.ask(question, campaign="r-test")
     with monitor.open(tmp_path / "n.duckdb", new=True) as db:
         db.add(tmp_path / "whole")
         assert len(db.ask("identify", campaign="r-test").runs) == 4
+
+
+def test_rows_are_removed_from_the_files_that_there_are(tmp_path: Path) -> None:
+    """Was: from runs.csv and probings.csv, whatever the rows came from."""
+    campaign = read_campaign(_few(tmp_path / "r-test", (1, 6, 11)))
+    files = tuple(replace(campaign.files[0], name=name) for name in ("cmm.toml", "1.csv", "2.csv"))
+    few = TooFewReadingsError("few; measure more poses; or leave runs 2, 3 out", (2, 3))
+    said = str(with_mistake(few, replace(campaign, files=files), problem_of))
+    assert said.endswith(
+        "or leave runs 2, 3 out: remove their rows from [[runs]] of cmm.toml and 1.csv, 2.csv, "
+        "withdraw the campaign and import it again"
+    )

@@ -20,6 +20,7 @@ from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
+from monitor.row_files import rows_in, runs_in
 from monitor.workflow.tool_frames import tool_frames
 
 
@@ -28,7 +29,7 @@ def refusal_of(
 ) -> DataError:
     """The refusal of a fit in the words of ``identify``: what is suspected, and the mistake of the file behind it."""
     if isinstance(refusal, TooFewReadingsError | TooManyRowsError):
-        return refusal
+        return with_mistake(refusal, campaign, problem_of)
     try:
         problem = problem_of(campaign)
     except DataError:
@@ -47,7 +48,9 @@ def with_mistake(
     named too where that is enough; where no change is, what else the import noticed of the columns is said. Where the
     refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
-    if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
+    if isinstance(refusal, TooFewReadingsError):
+        return _with_files(refusal, campaign)
+    if isinstance(refusal, MistakenUnitError | TooManyRowsError):
         return refusal
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
@@ -74,6 +77,17 @@ def with_mistake(
         else column_doubts(campaign, tool_frames(campaign))
     )
     return _with_sentences(refusal, said) if said else refusal
+
+
+def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:
+    """The refusal of too few readings with the files from which rows of runs are to be removed, where that helps."""
+    if not refusal.without:
+        return refusal
+    its = "its" if len(refusal.without) == 1 else "their"
+    files = dict.fromkeys((runs_in(campaign), rows_in(campaign)))
+    return TooFewReadingsError(
+        f"{refusal}: remove {its} rows from {' and '.join(files)}, withdraw the campaign and import it again"
+    )
 
 
 def _fits_without(
