@@ -42,6 +42,8 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     for note in (run.note for run in runs if run.note):
         output.say(note)
     likely_mistakes(answer.likely_mistakes)
+    for doubt in answer.file_doubts or ():
+        output.say(f"look at the file first: {doubt}")
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     _not_seen(answer)

@@ -74,9 +74,10 @@ def test_a_tilt_moves_the_tip_by_its_lever_whatever_measures_angles(scene: Chain
     assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * TOOL, rel=1e-6)
 
 
-def test_a_tilt_that_a_laser_does_not_see_is_as_large_as_it_turns(tmp_path: Path) -> None:
+@pytest.mark.parametrize("arm", [0.0, 1.0, 3.0])
+def test_a_tilt_that_a_laser_does_not_see_is_as_large_as_it_turns(tmp_path: Path, arm: float) -> None:
     """Was: 0.0 µm at most, and in a rehearsal a straight line that the model takes up."""
-    scene = _scene(tmp_path / "in-line", 0.0)
+    scene = _scene(tmp_path / "in-line", arm)
     (tilt,) = (each for each in scene.candidates if each.effect.text == "EBX:reversal")
     assert _peak_of(scene, "EBX:reversal", 20e-6) == pytest.approx(20e-6 * 1000.0, rel=1e-6)
     assert seen_as_turn(scene, tilt.raw @ np.array([20e-6]))

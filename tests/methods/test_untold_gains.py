@@ -15,7 +15,11 @@ from monitor.exceptions import DataError
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.samba.method import METHOD, problem_of
 from monitor.readers import read_campaign
+from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
+from monitor.store import StoredModel
+from monitor.workflow.explain.explain import explained, explanation_of, first_fit
+from monitor.workflow.identify.identify import compute
 from monitor.workflow.identify.mistaken_columns import refusal_of
 
 BALLS = {
@@ -23,6 +27,7 @@ BALLS = {
     "S1": (-180.0, 40.0, 150.0), "S2": (-20.0, 280.0, 60.0),
 }  # fmt: skip
 ALONG = {**BALLS, "S2": (-180.0, 340.0, 150.0)}
+ACROSS = {**BALLS, "S2": (-20.0, 40.0, 60.0)}
 ANGLES = (0, 30, 75, 120, 165, -150, -100, -60, -20, 0, 90)
 GAINS = np.array([8e-6, -6e-6, 5e-6])
 TILT = 30e-6
@@ -68,6 +73,17 @@ def campaign(
     return read_campaign(folder)
 
 
+def mirrored(folder: Path, column: int) -> Campaign:
+    """The campaign with the other sign of a column of its readings."""
+    campaign(folder, runs=1)
+    table = folder / "probings.csv"
+    head, *rows = (line.split(",") for line in table.read_text().splitlines())
+    for row in rows:
+        row[column] = repr(-float(row[column]))
+    table.write_text("\n".join(map(",".join, [head, *rows])) + "\n")
+    return read_campaign(folder)
+
+
 def gains(problem, solution):
     return solution.local[:, [problem.base_names.index(name) for name in ("EXX", "EYY", "EZZ")]]
 
@@ -84,9 +100,6 @@ def test_gains_that_no_reading_tells_apart_stay_small(tmp_path: Path, balls) -> 
         solution.local_covariance[:, problem.base_names.index("EA0B"), problem.base_names.index("EA0B")]
     )
     assert np.all(np.abs(np.abs(angle) - TILT) < 4.0 * u)
-
-
-ACROSS = {**BALLS, "S2": (-20.0, 40.0, 60.0)}
 
 
 @pytest.mark.parametrize(
@@ -120,6 +133,14 @@ WRONG = [
         {"bar": 28.0, "balls": ALONG},
         "the scale bar were of another length than 28 mm (`length_mm`; its balls S1 ",
     ),
+    # A gain that the bar tells; it was taken up to a tenth.
+    ({"bar": 304.5, "balls": ALONG}, "the scale bar were of another length than 304.5 mm (`length_mm`; its "),
+    (
+        {"bar": 201.471, "balls": ACROSS},
+        "the scale bar were of another length than 201.471 mm (`length_mm`; ",
+    ),
+    # A hundredth and a half; declared and stated lengths were compared from two hundredths on.
+    ({"bar": 306.69}, "the scale bar were of another length than 306.69 mm (`length_mm`; its balls S1 "),
 ]
 
 
@@ -145,3 +166,15 @@ def test_the_mistake_is_named(tmp_path: Path, wrong, said) -> None:
     by_steps = "only with x_mm and z_mm exchanged" in message
     assert by_steps == (wrong.get("columns") == "zyx")
     assert by_steps or ("It looks as if" in message and said in message)
+
+
+def test_what_the_readings_cannot_tell_is_said_at_the_result(tmp_path: Path) -> None:
+    """Y mirrored along B fits, with EA0B of -30 in place of 30 µrad; only the import said so."""
+    found = mirrored(tmp_path / "c", 5)
+    model = StoredModel("samba", 1, None, (), (), (), "", None)
+    answer = compute(found, model).answer
+    (doubt,) = answer.file_doubts
+    assert "are the declared ones only with the other sign of y_mm" in doubt
+    said = explained(explanation_of(found, model, first_fit(found, model)), found, model).answer
+    assert f"Look at the file first: {doubt}." in said
+    assert compute(campaign(tmp_path / "right", runs=1), model).answer.file_doubts is None

@@ -12,6 +12,9 @@ import pytest
 
 import monitor
 from monitor.exceptions import TooFewReadingsError
+from monitor.methods.instruments.method import problem_of
+from monitor.readers import read_campaign
+from monitor.workflow.identify.mistaken_columns import with_mistake
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUESTIONS = ("identify", "compare", "explain", "uncertainty", "predict", "map", "contributions")
@@ -90,7 +93,8 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
         told = db.ask("explain", campaign="r-test").explanation
         for question in [each for each in QUESTIONS if each != "explain"]:
             with pytest.raises(
-                TooFewReadingsError, match=r"9 readings of run 5 .* or leave run 5 out: remove its rows"
+                TooFewReadingsError,
+                match=r"9 readings of run 5 .* or leave run 5 out: remove its rows from runs.csv and probings.csv, ",
             ):
                 db.ask(question, campaign="r-test")
     with monitor.open(tmp_path / "n.duckdb", new=True) as db:
@@ -101,3 +105,15 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
     assert (left_out.run, left_out.readings) == (5, 9)
     assert told.answer == f"{whole.answer} {left_out}"
     assert replace(told, answer=whole.answer, runs_left_out=None) == whole
+
+
+def test_rows_are_removed_from_the_files_that_there_are(tmp_path: Path) -> None:
+    """Was: from runs.csv and probings.csv, whatever the rows came from."""
+    campaign = read_campaign(_few(tmp_path / "r-test", (1, 6, 11)))
+    files = tuple(replace(campaign.files[0], name=name) for name in ("cmm.toml", "1.csv", "2.csv"))
+    few = TooFewReadingsError("few; measure more poses; or leave runs 2, 3 out", {2: 3, 3: 3})
+    said = str(with_mistake(few, replace(campaign, files=files), problem_of))
+    assert said.endswith(
+        "or leave runs 2, 3 out: remove their rows from [[runs]] of cmm.toml and 1.csv, 2.csv, "
+        "withdraw the campaign and import it again"
+    )

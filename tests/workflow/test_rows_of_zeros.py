@@ -104,3 +104,19 @@ def test_the_origin_of_a_plate_stays_where_a_column_is_mistaken(tmp_path: Path) 
         with pytest.raises(DataError, match="It looks as if x_mm was in inches") as refusal:
             identify(db, IdentifyRequest("cmm"))
     assert "leave these rows out" not in str(refusal.value)
+
+
+@pytest.mark.slow
+def test_rows_of_zeros_and_a_mistaken_column_are_both_named(tmp_path: Path) -> None:
+    """Was: "did not converge" alone, since the readings fit neither without the zeros nor with x in mm."""
+    table = grid(tmp_path / "grid", (4, 5, 6)) / "probings.csv"
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines]
+    for cells in rows:
+        cells[4] = f"{float(cells[4]) / 25.4:.6f}"
+    table.write_text("\n".join([head, *map(",".join, rows)]) + "\n", encoding="utf-8")
+    with Database(tmp_path / "grid.duckdb") as db:
+        import_folders(db, ImportRequest([table.parent]))
+        with pytest.raises(DataError, match="sequence 5, 6, 7: all that was read is 0") as refusal:
+            identify(db, IdentifyRequest("grid"))
+    assert "It looks as if x_mm was in inches" in str(refusal.value)

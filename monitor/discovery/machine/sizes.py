@@ -27,8 +27,9 @@ from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.units import Unit
 
-#: Rows that an effect moves by less than this part of their standard uncertainty show nothing of it.
-SEEN = 0.01
+#: Lengths of which an effect moves none by this part of its standard uncertainty (0.1 µm of a laser, of which so many
+#: digits are said), and all together by less than this part of what it moves angles, in squares: it is told as a turn.
+SEEN, OF_ANGLES = 0.5, 0.01
 
 
 @dataclass(frozen=True)
@@ -126,11 +127,13 @@ def peaks_of_errors(
 
 
 def seen_as_turn(scene: ChainScene, displacement: Array) -> bool:
-    """Whether displacements (n, d) in mm show in rows of angles alone: those of an angle are on a lever of a metre."""
+    """Whether displacements (n, d) in mm show in rows of angles and hardly in lengths: every laser has an Abbe arm of
+    some mm. Those of an angle are on a lever of a metre."""
     problem = scene.fit.problem
     lengths = problem.is_length
     moved = np.where(np.isfinite(problem.sigma), np.abs(displacement) / problem.sigma, 0.0)
-    return not (moved[lengths] > SEEN).any() and bool((moved[~lengths] > SEEN).any())
+    of_lengths, of_angles = (float(np.sum(moved[rows] ** 2)) for rows in (lengths, ~lengths))
+    return not (moved[lengths] > SEEN).any() and of_lengths < OF_ANGLES * of_angles
 
 
 def _largest(scene: ChainScene, displacement: Array) -> float:

@@ -33,9 +33,9 @@ from monitor.sources import CommonQuantity
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
 # a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
 LARGEST_ERROR = 0.1
-# A gain that no reading tells apart stays where the readings allow nearest to zero: further away they are those of
-# another machine, or of a bar of another length.
-LARGEST_UNTOLD = 0.01
+# Of balls, whose places are unknown too, a gain is told by a bar alone, or by no reading and stays where the readings
+# allow nearest to zero: further away they are those of another machine, or of a bar of another length.
+LARGEST_GAIN = 0.01
 # The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
 # tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
 # leaves an uncertainty as large as that says nothing of the effect.
@@ -286,6 +286,11 @@ class MeasuredChain(ABC):
     def largest_error(self) -> float:
         """The location angle (rad) or gain from which on the readings contradict the machine file."""
         return LARGEST_ERROR
+
+    @property
+    def largest_gain(self) -> float:
+        """The gain from which on the readings contradict the machine file, where they tell it for certain."""
+        return self.largest_error
 
     @property
     def stays_small(self) -> npt.NDArray[np.bool_] | None:

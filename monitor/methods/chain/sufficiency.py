@@ -47,13 +47,9 @@ def refuse_exact_fits(problem: ChainProblem, solution: Solution) -> None:
 
 def _refuse(whose: str, numbers: int, without: Mapping[int, int]) -> NoReturn:
     """Raise that nothing is left over, and which runs the campaign is answered ``without``; none where no other is."""
-    listed = f"run{'s' * (len(without) > 1)} {', '.join(map(str, without))}"
-    advice = (
-        f"; or leave {listed} out: remove {'its' if len(without) == 1 else 'their'} rows from runs.csv and "
-        "probings.csv, withdraw the campaign and import it again"
-    )
+    listed = f"; or leave run{'s' * (len(without) > 1)} {', '.join(map(str, without))} out"
     raise TooFewReadingsError(
         f"the {numbers} readings of {whose} determine as many unknowns of the model: nothing is left over to judge it "
-        f"by; measure more poses{advice if without else ''}",
+        f"by; measure more poses{listed if without else ''}",
         without,
     )

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from monitor.effects import ChainEffect
 from monitor.machine import ChainPose
+from monitor.methods.chain.measured import LARGEST_GAIN
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
 from monitor.sources import CommonQuantity
@@ -97,6 +98,11 @@ class TouchProblem(ChainProblem):
         gains = [isinstance(effect, ChainEffect) and effect.is_gain for effect in self.base]
         sizes = [columns.stop - columns.start for columns in self.base_columns]
         return np.concatenate([np.repeat(gains, sizes), np.zeros(len(self.own_names), dtype=bool)])
+
+    @property
+    def largest_gain(self) -> float:
+        """No scale is off by a hundredth; a bar of another length is soon."""
+        return LARGEST_GAIN
 
     @property
     def measured_joints(self) -> tuple[int, ...]:

@@ -67,6 +67,8 @@ def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
     ids = None if len(table.faults) > before else list(balls)
     reflectors = _reflectors(table)
     bar = _scale_bar(table, ids)
+    if bar is not None and ids is not None:
+        _refuse_one_place(table, *(balls[name] for name in bar.balls))
     piece = read_l_shape(table)
     calibration = read_self_calibration(table)
     table.finish()
@@ -131,6 +133,16 @@ def _scale_bar(artefact: Table, balls: list[str] | None) -> ScaleBar | None:
     if ends is None or length is None or uncertainty is None or certificate is None:
         return None
     return ScaleBar(ends, length, uncertainty, certificate, expansion, reference)
+
+
+def _refuse_one_place(artefact: Table, first: Ball, second: Ball) -> None:
+    """Make a fault of two ends of the bar at one place: the bar would have no direction to begin with."""
+    if first.nominal == second.nominal:
+        artefact.fault(
+            "scale_bar",
+            f"its balls {quoted(first.id)} and {quoted(second.id)} have the same nominal_mm, "
+            f"{list(first.nominal)}; correct one of the two places",
+        )
 
 
 def _ends(table: Table, balls: list[str] | None) -> tuple[str, str] | None:

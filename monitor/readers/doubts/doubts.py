@@ -73,7 +73,14 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
 
 
 def column_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, ...]:
-    """The sentences on columns exchanged, of other sign or unit, or of zeros, each of which refutes a fit."""
+    """The sentences on columns exchanged, of other sign or unit, or of zeros, and on the length of a bar, each of which
+    refutes a fit."""
+    return (*result_doubts(campaign, frames), *zero_rows(campaign, frames))
+
+
+def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, ...]:
+    """The sentences that a result has to repeat: a mirrored or shrunken world fits as well as the true one, where the
+    places of the targets are unknown too, and only what was declared of them tells it."""
     return tuple(
         chain(
             _travel(campaign, frames),
@@ -81,7 +88,7 @@ def column_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             _places(campaign),
             exchanged_columns(campaign),
             _units_of_runs(campaign),
-            zero_rows(campaign, frames),
+            _length_of_bar(campaign),
         )
     )
 
@@ -235,8 +242,13 @@ def _statements(campaign: Campaign) -> Iterator[str]:
             f"the scale bar's standard uncertainty is {bar.standard_uncertainty:g} mm, more than a thousandth of its "
             f"length of {bar.length:g} mm: are both in mm?"
         )
-    difference = bar_difference(campaign)
-    if difference is not None and abs(difference) > LARGEST_BAR_DIFFERENCE:
+    yield from _length_of_bar(campaign)
+
+
+def _length_of_bar(campaign: Campaign) -> Iterator[str]:
+    """A bar whose balls are declared further apart or nearer than it is long."""
+    bar, difference = campaign.artefact.scale_bar, bar_difference(campaign)
+    if bar is not None and difference is not None and abs(difference) > LARGEST_BAR_DIFFERENCE:
         yield (
             f"the scale bar is {bar.length:g} mm long, but its balls {' and '.join(bar.balls)} are declared "
             f"{bar.length - difference:.7g} mm apart: check length_mm and nominal_mm"

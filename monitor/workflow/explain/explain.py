@@ -35,6 +35,7 @@ from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_m
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
+from monitor.readers.doubts.doubts import result_doubts
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
@@ -55,6 +56,7 @@ from monitor.workflow.identify.fitting import curve_problem, explained_refusals,
 from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
+from monitor.workflow.tool_frames import tool_frames
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
@@ -133,6 +135,11 @@ def explained(
     answer = replace(machine_explanation(explanation), rate=rate)
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
+    if not explanation.mistakes:
+        doubted = (
+            f"Look at the file first: {doubt}." for doubt in result_doubts(campaign, tool_frames(campaign))
+        )
+        answer = replace(answer, answer=" ".join((answer.answer, *doubted)))
     # Where several may be the wrong one, or none alone, the effects come first.
     if beside is not None and (is_explained or len(beside.suspects) == 1):
         answer = replace(answer, against_others=beside)

@@ -124,7 +124,8 @@ class IdentifyAnswer:
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
     each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
-    ``likely_mistakes`` say what is wrong in a setup or instrument that contradicts the others, where that explains it.
+    ``likely_mistakes`` say what is wrong in a setup or instrument that contradicts the others, where that explains it,
+    ``file_doubts`` what the places and lengths that the file declares say against its columns, in sentences.
     ``not_seen`` are position and orientation errors that no number of the last run holds; ``seen_by`` names for what is
     not seen or not separated the one measurement that gives it a number, where there is one.
     """
@@ -144,6 +145,7 @@ class IdentifyAnswer:
     as_stated: tuple[AsStated, ...] | None = field(default=None, metadata=OMITTED)
     lack_of_fit_p: float | None = field(default=None, metadata=OMITTED)
     likely_mistakes: tuple[LikelyMistake, ...] | None = field(default=None, metadata=OMITTED)
+    file_doubts: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     not_seen: tuple[RefusedParameters, ...] | None = field(default=None, metadata=OMITTED)
     seen_by: Mapping[str, TestAnswer] | None = field(default=None, metadata=OMITTED)
 

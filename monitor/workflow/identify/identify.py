@@ -11,6 +11,7 @@ from monitor.exceptions import DataError
 from monitor.methods import InstrumentPlan, campaign_method
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.readers.doubts.doubts import result_doubts
 from monitor.records import Campaign, CurveCampaign
 from monitor.reporting.refused import refused_parameters
 from monitor.store import (
@@ -31,6 +32,7 @@ from monitor.workflow.identify.not_seen import not_seen, seen_by
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve, resolve_for
+from monitor.workflow.tool_frames import tool_frames
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ def compute(measured: Campaign | CurveCampaign, model: StoredModel) -> Identifie
         judged = None if stored.lack_of_fit is None else stored.lack_of_fit.p_value
         answer = machine_answer(measured, identification, judged)
         mistakes = mistaken_setups(measured, model, *solved[-1])
-        answer = replace(answer, likely_mistakes=mistakes or None)
+        doubted = () if mistakes else result_doubts(measured, tool_frames(measured))
+        answer = replace(answer, likely_mistakes=mistakes or None, file_doubts=doubted or None)
         if not isinstance(campaign_method(measured).plan, InstrumentPlan):
             return Identified(answer, stored)
         outside = not_seen(*solved[-1], identification)

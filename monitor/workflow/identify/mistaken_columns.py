@@ -20,6 +20,7 @@ from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
+from monitor.row_files import rows_in, runs_in
 from monitor.workflow.tool_frames import tool_frames
 
 
@@ -28,7 +29,7 @@ def refusal_of(
 ) -> DataError:
     """The refusal of a fit in the words of ``identify``: what is suspected, and the mistake of the file behind it."""
     if isinstance(refusal, TooFewReadingsError | TooManyRowsError):
-        return refusal
+        return with_mistake(refusal, campaign, problem_of)
     try:
         problem = problem_of(campaign)
     except DataError:
@@ -43,11 +44,13 @@ def with_mistake(
 
     Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
     it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
-    that would let the readings fit, which takes up to half a minute; where none does, what else the import noticed of
-    the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows
-    a part is tried.
+    that would let the readings fit, which takes up to half a minute, and as long again without rows of zeros, which are
+    named too where that is enough; where no change is, what else the import noticed of the columns is said. Where the
+    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
-    if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
+    if isinstance(refusal, TooFewReadingsError):
+        return _with_files(refusal, campaign)
+    if isinstance(refusal, MistakenUnitError | TooManyRowsError):
         return refusal
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
@@ -64,28 +67,48 @@ def with_mistake(
     misread = only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes = find_mistakes(part, problem_of, None)
+    mistakes, named = find_mistakes(part, problem_of, None), ()
+    if blank and not mistakes:
+        # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
+        mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
     said = (
-        (mistake_sentence(mistakes_found(mistakes)),)
+        (*named, mistake_sentence(mistakes_found(mistakes)))
         if mistakes
         else column_doubts(campaign, tool_frames(campaign))
     )
     return _with_sentences(refusal, said) if said else refusal
 
 
+def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:
+    """The refusal of too few readings with the files from which rows of runs are to be removed, where that helps."""
+    if not refusal.by_run:
+        return refusal
+    its = "its" if len(refusal.by_run) == 1 else "their"
+    files = dict.fromkeys((runs_in(campaign), rows_in(campaign)))
+    return TooFewReadingsError(
+        f"{refusal}: remove {its} rows from {' and '.join(files)}, withdraw the campaign and import it again",
+        refusal.by_run,
+    )
+
+
 def _fits_without(
     campaign: Campaign, rows: Collection[tuple[int, int]], problem_of: Callable[[Campaign], ChainProblem]
 ) -> bool:
     """Whether a machine of the file fits a campaign without some rows, each a run and a sequence number."""
-    probings = campaign.probings
-    pairs = zip(probings.run.tolist(), probings.sequence.tolist(), strict=True)
-    others = np.array([pair not in rows for pair in pairs])
     try:
         with np.errstate(all="ignore"):
-            solve_problem(problem_of(replace(campaign, probings=probings.rows(others))))
+            solve_problem(problem_of(_without(campaign, rows)))
     except (MonitorError, np.linalg.LinAlgError):
         return False
     return True
+
+
+def _without(campaign: Campaign, rows: Collection[tuple[int, int]]) -> Campaign:
+    """A campaign without some rows, each a run and a sequence number."""
+    probings = campaign.probings
+    pairs = zip(probings.run.tolist(), probings.sequence.tolist(), strict=True)
+    others = np.array([pair not in rows for pair in pairs])
+    return replace(campaign, probings=probings.rows(others))
 
 
 def _with_sentences(refusal: DataError, said: Sequence[str]) -> DataError:

@@ -31,8 +31,11 @@ IN_UNITS = {
     "_urad": {"mrad": 1e3, "nrad": 1e-3, "arc seconds": 1e6 * np.pi / 648e3, "degrees": 1e6 * np.pi / 180.0},
 }
 
-#: A bar is of the length that its balls are declared apart but for this part; balls are placed by hand.
-NEAR_LENGTH = 0.02
+#: A bar is of the length that its balls are declared apart but for this part, half of a gain that is refused; declared
+#: in whole millimetres they may be 0.4 mm off.
+NEAR_LENGTH = 0.005
+#: Units are told apart by a length that is as near as that.
+NEAR_UNIT = 0.02
 
 #: A campaign with a mistake undone.
 Undo = Callable[[Campaign], Campaign]
@@ -185,7 +188,7 @@ def _length_of_bar(campaign: Campaign) -> Iterator[Trial]:
     if abs(bar.length - declared) <= NEAR_LENGTH * declared:
         return
     apart = f"its balls {' and '.join(bar.balls)} are declared {declared:.4g} mm apart"
-    units = mistaken_for_mm(bar.length / declared, NEAR_LENGTH)
+    units = mistaken_for_mm(bar.length / declared, NEAR_UNIT)
     if units:
         what = f"the length of the scale bar was {UNIT_WORDS[units[0]]} (length_mm = {bar.length:g}; {apart})"
         yield what, _with_length(bar.length * units[0].factor)

@@ -30,6 +30,7 @@ from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, InstrumentEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, SettlingDriver
 from monitor.effects.drivers.gravity import Gravity
+from monitor.effects.drivers.run_time import RunTime
 from monitor.effects.shapes import Compliance, Const, Cyclic, Harmonic, Sawtooth, Step
 from monitor.effects.shapes.free import Free
 from monitor.machine import COMPONENTS, MOTION, Chain
@@ -140,14 +141,14 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
 def _same_drift(effect: MachineEffect, chain: Chain) -> list[ChainVariant]:
     """A drift of an axis as the same drift of every other: the catalogue has few of them, and one may stand for all.
 
-    The growth of a spindle is told as that: it is what warms up first there.
+    The growth of a spindle is told as that: it is what warms up first there. A drift with the time is anybody's.
     """
     if (
         not isinstance(effect, ChainEffect)
         or not isinstance(effect.shape, Const)
         or isinstance(effect.driver, Always | Gravity)
         or effect.term.stage != MOTION
-        or effect.joint.kind == "spindle"
+        or (effect.joint.kind == "spindle" and not isinstance(effect.driver, RunTime))
     ):
         return []
     names = [joint.name for joint in chain.joints if joint != effect.joint]
