@@ -37,16 +37,12 @@ from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import result_doubts
 from monitor.records import Campaign, CurveCampaign, Verdict
+from monitor.reporting.run_left_out import RunLeftOut
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
-from monitor.workflow.explain.explain_answer import (
-    CurveExplanation,
-    ExplainAnswer,
-    MachineExplanation,
-    RunLeftOut,
-)
+from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation
 from monitor.workflow.explain.measurements import with_measurements
 from monitor.workflow.explain.planned_ties import with_plans

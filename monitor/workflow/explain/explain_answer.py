@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from monitor.documents import INLINED, OMITTED, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
+from monitor.reporting.run_left_out import RunLeftOut
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
@@ -269,21 +270,6 @@ class InstrumentAlias:
     parameters: tuple[str, ...]
     searched: bool = False
     measurement: TestAnswer | None = None
-
-
-@dataclass(frozen=True)
-class RunLeftOut:
-    """A run that was left out: its ``readings`` determine as many unknowns of the model, and none is left over to judge
-    it by. It may have been broken off."""
-
-    run: int
-    readings: int
-
-    def __str__(self) -> str:
-        return (
-            f"Run {self.run} is left out: its {self.readings} readings determine as many unknowns of the model, and "
-            "nothing is left over to judge it by."
-        )
 
 
 @dataclass(frozen=True)
