@@ -142,7 +142,7 @@ def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
 def test_others_that_contradict_each_other_for_certain_are_compared_no_further(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    misread = _rows(tmp_path, 62, ("r-test-B", -1.0))
+    misread = _rows(tmp_path, 63, ("r-test-B", -1.0))
     told = contrasts_of(misread)
     monkeypatch.setattr("monitor.methods.instruments.contrasts.CERTAIN", 0.0)
     whole = contrasts_of(misread)

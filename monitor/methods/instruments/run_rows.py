@@ -126,8 +126,8 @@ def separated_by(nominal: Array, sizes: Array) -> Separated:
     is_shown = (length >= ROUNDING * sizes) & (length > 0.0)
     scale = np.where(is_shown, length, 1.0)
     matrix = np.where(is_shown, nominal, 0.0) / scale
-    triangle = np.linalg.qr(matrix[:, is_shown], mode="r")
-    if len(triangle) == triangle.shape[1] and inverse_of_full_rank(triangle) is not None:
+    triangle = np.asarray(np.linalg.qr(matrix[:, is_shown], mode="r"))
+    if inverse_of_full_rank(triangle) is not None:
         # Nothing is open but what these rows do not show.
         unknowns = np.eye(len(scale))[:, is_shown] / scale[:, None]
         return Separated(np.diag(is_shown.astype(np.float64)), unknowns, is_shown)

@@ -343,7 +343,7 @@ class NoiseDesign:
         """The degrees of freedom under a correlation: of readings, and of what setups state."""
         rest = self._own[1]
         numbers = self._numbers + rest.shape[0] * rest.shape[1]
-        return self._share * (numbers - float(np.count_nonzero(white.able)))
+        return float(self._share * (numbers - np.count_nonzero(white.able)))
 
     @cached_property
     def _known(self) -> dict[Correlation, _White]:
