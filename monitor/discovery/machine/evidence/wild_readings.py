@@ -22,7 +22,8 @@ from monitor.records import Array
 
 # From so many degrees of freedom on (a kurtosis of 3.2) sums of squares say as much.
 LIGHT = 30.0
-# Scores and unknowns in turn: what the unknowns still take of the scores then is a ten-thousandth.
+# Scores and unknowns in turn: the unknowns still take at most 0.25 % of the scores then (60 campaigns of 1, 4 and 7 runs
+# with tails of Student 3).
 STEPS = 10
 
 
@@ -33,9 +34,9 @@ def without_wild_readings(
     light."""
     beside = scene.remainders.beside(others)
     columns = orthonormal(without(beside.basis, candidate.columns))
-    left = without(columns, beside.residual[:, None])
+    remaining = without(columns, beside.residual[:, None])
     # Padding and readings without weight leave nothing at all.
-    tails = tails_of(left[beside.residual != 0.0])
+    tails = tails_of(remaining[beside.residual != 0.0])
     if tails.freedom >= LIGHT:
         return None
     numbers = beside.residual
@@ -55,7 +56,7 @@ def _scores(tails: Tails, numbers: Array) -> Array:
 
 def _taken_up(scene: ChainScene, beside: Remainder, scores: Array) -> Array:
     """The part of scores (M,) that is within what every run's own unknowns and the effects can do."""
-    own = scene.fit.nuisance.basis
-    of_runs = scores.reshape(own.shape[:2])
-    taken = np.einsum("rnk,rk->rn", own, np.einsum("rnk,rn->rk", own, of_runs)).reshape(-1)
+    unknowns = scene.fit.nuisance.basis
+    of_runs = scores.reshape(unknowns.shape[:2])
+    taken = np.einsum("rnk,rk->rn", unknowns, np.einsum("rnk,rn->rk", unknowns, of_runs)).reshape(-1)
     return np.asarray(taken + beside.basis @ (beside.basis.T @ scores))
