@@ -37,6 +37,7 @@ from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.explain.alias_ties import with_uneven_positions
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
@@ -125,6 +126,7 @@ def explained(
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
         explanation = replace(explanation, comparison=comparison)
     answer = replace(machine_explanation(explanation), rate=rate)
+    answer = with_uneven_positions(answer, explanation.final.problem.context)
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
     # Where several may be the wrong one, or none alone, the effects come first.
