@@ -17,6 +17,7 @@ from monitor.reporting.runs_that_tell import (
     further_runs,
     more_runs,
     poses_that_tell,
+    positions_that_tell,
     runs_in_reversed_order,
     runs_that_tell,
 )
@@ -233,6 +234,8 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
         return f"to tell {rivals} apart, {runs_in_reversed_order(tie.runs or 1)}"
     if tie.broken_by is TieBreak.MORE_POSES:
         return f"to tell {rivals} apart, measure {poses_that_tell(tie.axes, (effect, *tie.rivals))}"
+    if tie.step_mm is not None:
+        return f"to tell {rivals} apart, measure {positions_that_tell(tie.axes, tie.step_mm)}"
     if tie.setup is not None:
         return f"no pose of this set-up tells {rivals} apart: {further_runs(tie.runs or 1)} {IN_WORDS[tie.setup]}"
     return (

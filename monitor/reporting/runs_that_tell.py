@@ -84,3 +84,11 @@ def poses_that_tell(axes: Sequence[str], effects: Sequence[str]) -> str:
         return "some poses under another load"
     poses = f"more poses over the whole range of {' and '.join(axes) or 'all axes'}"
     return f"{poses}, and some under another load" if bends else f"{poses}, between the present ones"
+
+
+def positions_that_tell(axes: Sequence[str], step_mm: float) -> str:
+    """Return which positions of ``axes`` tell apart what is one at positions so many mm apart."""
+    return (
+        f"a run of the same movements with {' and '.join(axes)} at uneven positions, each off the present ones by another "
+        f"part of their {step_mm:g} mm (ISO 230-2)"
+    )

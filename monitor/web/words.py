@@ -19,6 +19,7 @@ from monitor.reporting.runs_that_tell import (
     further_runs,
     more_runs,
     poses_that_tell,
+    positions_that_tell,
     runs_in_reversed_order,
     runs_that_tell,
 )
@@ -321,6 +322,7 @@ def what_breaks(tie: Tie) -> str:
         TieBreak.REFERENCES: WHO_MOVED,
         TieBreak.REVERSED_ORDER: runs_in_reversed_order(tie.runs or 1),
         TieBreak.MORE_POSES: f"measure {poses_that_tell(tie.axes, tie.rivals)}",
+        TieBreak.UNEVEN_POSITIONS: f"measure {positions_that_tell(tie.axes, tie.step_mm or 0.0)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.SETUP: f"{further_runs(tie.runs or 1)} {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
         TieBreak.NOTHING: (

@@ -40,6 +40,7 @@ from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.reporting.run_left_out import RunLeftOut
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
+from monitor.workflow.explain.alias_ties import with_uneven_positions
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
@@ -129,6 +130,7 @@ def explained(
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
         explanation = replace(explanation, comparison=comparison)
     answer = replace(machine_explanation(explanation), rate=rate)
+    answer = with_uneven_positions(answer, explanation.final.problem.context)
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
     if not explanation.mistakes:

@@ -45,6 +45,8 @@ class TieBreak(Enum):
     REVERSED_ORDER = "reversed_order"
     #: More poses over the whole range of ``axes``, of what gives way another load: the method has no plan for pairs.
     MORE_POSES = "more_poses"
+    #: The same movements with ``axes`` at uneven positions: on the present ones, ``step_mm`` apart, they are one.
+    UNEVEN_POSITIONS = "uneven_positions"
     #: Another instrument at the same movement, or the ``measurement`` that a plan of instruments names.
     INSTRUMENT = "instrument"
     #: No pose of the present set-up does; ``runs`` with another stylus do, or with targets elsewhere (``setup``).
@@ -57,7 +59,7 @@ class TieBreak(Enum):
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
     ``axes`` those to index or to move, ``measurement`` the test of an instrument, ``runs`` those to measure besides,
-    ``setup`` the second set-up to measure in. What stays the same through a run shows nothing where ``drivers`` have to
+    ``setup`` the second set-up to measure in, ``step_mm`` how far apart positions are. What stays the same through a run shows nothing where ``drivers`` have to
     vary ``within_runs``."""
 
     rivals: tuple[str, ...]
@@ -68,6 +70,7 @@ class Tie:
     runs: int | None = field(default=None, metadata=OMITTED)
     measurement: TestAnswer | None = field(default=None, metadata=OMITTED)
     setup: SecondSetup | None = field(default=None, metadata=OMITTED)
+    step_mm: float | None = field(default=None, metadata=OMITTED)
 
 
 def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_planned: bool) -> tuple[Tie, ...]:

@@ -1,4 +1,4 @@
-"""Waves of one to two periods over the travel, which a few powers or a bump come near to as well.
+"""Waves of one and a half to two periods over the travel, which bends and bumps come near to as well.
 
 Whether so long a wave repeats nobody has seen. It is told where it alone is its error: where it says as much at the
 price of its pitch as a free shape or several powers, and no shape says more beside it. A cycle whose best pitch is the
@@ -28,7 +28,13 @@ from monitor.discovery.machine.shapes.refine import AT_END, NAMED_TO, refine
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle
 from monitor.discovery.machine.shapes.slight_shapes import p_value_of_all
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.variants import longest_pitch, pitch_limits, pitches_over
+from monitor.discovery.machine.shapes.variants import (
+    BEND_PERIODS,
+    SHORTEST_PITCH_MM,
+    longest_pitch,
+    pitch_limits,
+    pitches_over,
+)
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.rivals import UNDECIDED
@@ -38,6 +44,8 @@ from monitor.effects.drivers import Always
 from monitor.effects.shapes import Cyclic
 from monitor.machine import MOTION
 
+# A wave and its pitch, a zero and a gain are five numbers: at fewer positions it passes for a bump of any kind.
+FEWEST_POSITIONS = 8
 # Where an error in any shape says so much more beside a wave, the wave is not the whole of it.
 LEVEL = 0.01
 # A pitch within this part of half of the travel is the end of its range, to the tolerance of the search.
@@ -47,22 +55,28 @@ AT_HALF = 2e-3
 def long_wave(
     scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> list[ChainCandidate]:
-    """The wave of one to two periods that beside others is the whole of the error of which a candidate is a shape; none
+    """The wave of one and a half to two periods that beside others is the whole of the error of which a candidate is a shape; none
     where something else is, and where others are of that error."""
     effect, symbol = shape.effect, error_of(shape)
     assert isinstance(effect, ChainEffect)
     if any(error_of(other) == symbol for other in others):
         return []
     context = scene.fit.problem.context
+    positions = np.sort(context.positions[:, effect.term.joint])
+    if int(np.sum(np.diff(positions) > SHORTEST_PITCH_MM / 2.0)) + 1 < FEWEST_POSITIONS:
+        return []
     shortest, travel = pitch_limits(context)[effect.joint.name]
-    pitches = pitches_over(travel, travel)
+    longest = travel / BEND_PERIODS
+    pitches = pitches_over(travel, longest)
     long = [pitch for pitch in pitches if max(shortest, longest_pitch(travel)) < pitch]
     texts = [f"{symbol}:cyclic{pitch:.6g}mm" for pitch in long]
-    variants = [Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(pitches)) for text in texts]
+    variants = [
+        Variant(f"{symbol}:cyclic", parse_effect(text, context.chain), len(pitches)) for text in texts
+    ]
     starts = [wave for wave in scene_of(scene.fit, variants).candidates if wave.visible]
     waves = [refine(scene, [*others, wave], len(others)).candidate for wave in starts]
     weighed = weigh_beside(scene, waves, others)
-    if not weighed or is_at_longest(weighed[0].candidate, travel):
+    if not weighed or is_at_longest(weighed[0].candidate, longest):
         return []
     wave = weighed[0].candidate
     return [wave] if _pitch(wave) <= longest_pitch(travel) or _is_whole(scene, wave, others) else []

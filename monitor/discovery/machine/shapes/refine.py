@@ -11,6 +11,7 @@ import scipy
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import STEP as ORDER_STEP
 from monitor.discovery.machine.shapes.variants import (
+    BEND_PERIODS,
     TIME_CONSTANTS_S,
     frequency_step,
     longest_pitch,
@@ -131,9 +132,9 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
 
 
 def _longest_from(pitch: float, travel: float) -> float:
-    """The longest pitch in mm that is sought from one: half of the travel, or the whole from beyond."""
+    """The longest pitch in mm that is sought from one: half of the travel; from beyond, two thirds."""
     half = longest_pitch(travel)
-    return max(pitch, half if pitch <= (1.0 + NAMED_TO) * half else travel)
+    return max(pitch, half if pitch <= (1.0 + NAMED_TO) * half else travel / BEND_PERIODS)
 
 
 def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
