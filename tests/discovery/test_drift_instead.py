@@ -10,11 +10,12 @@ import pytest
 from monitor.discovery import explain
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainScene, scene_of
-from monitor.discovery.machine.separation.rivals import RivalSearch
+from monitor.discovery.machine.separation.rivals import RivalSearch, same_drift
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.scan import ScanResult, findings_of
 from monitor.effects import parse_effect
+from monitor.machine import parse_topology
 from monitor.readers import read_campaign
 from tests.discovery.ordered_balls import touched
 
@@ -48,6 +49,14 @@ def test_a_drift_has_the_same_of_the_other_axes_among_its_rivals(drifting: Fit) 
     found = RivalSearch(scene, [drift], ("run_time",)).rivals(0, 0.0, np.array([8e-3]))
     alike = {rival.effect.text for rival, same in found if same}
     assert {"EZX:const@run_time", "EZZ:const@run_time"} <= alike
+
+
+def test_a_drift_with_the_time_is_that_of_no_spindle_alone() -> None:
+    """Was: EZC1:const@run_time without EZX:const@run_time, which was hidden; growth as it warms up is the spindle's."""
+    chain = parse_topology("w C B b X Y Z (C1) t")
+    drift, growth = (parse_effect(f"EZC1:const@{driver}", chain) for driver in ("run_time", "warmup"))
+    assert "EZX:const@run_time" in {variant.family for variant in same_drift(drift, chain)}
+    assert same_drift(growth, chain) == []
 
 
 @pytest.mark.slow

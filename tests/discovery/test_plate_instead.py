@@ -75,9 +75,10 @@ def test_two_axes_that_grow_alike_are_the_part(
     assert {place.axis for place in missing.held} == {"X", "Y"}
     for place in missing.held:
         assert abs(place.reading - held["XY".index(place.axis)]) < 3.0 * place.u
-    # That two screws grow alike is possible, where the part is held at the zeros of both.
-    screws = {"EXX:poly1@plate_degC", "EYY:poly1@plate_degC"}
-    assert (screws <= {rival.effect for rival in missing.rivals}) == (held == (0.0, 0.0))
+    # That two screws grow alike is possible; held elsewhere than at reading 0 each shifts its axis besides.
+    named = {rival.effect for rival in missing.rivals}
+    assert {"EXX:poly1@plate_degC", "EYY:poly1@plate_degC"} <= named
+    assert ({"EX0X@plate_degC", "EY0Y@plate_degC"} <= named) == (held != (0.0, 0.0))
 
 
 @pytest.mark.slow
@@ -90,6 +91,20 @@ def test_two_axes_of_which_one_grows_twice_as_much_are_told(tmp_path: Path, seed
     for effect in found:
         hidden = per_kelvin["XY".index(effect.effect[1])]
         assert abs(effect.amplitude - hidden) < 3.0 * effect.u
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [700, 701, 702])
+def test_screws_that_are_held_elsewhere_than_at_zero_are_two_axes(tmp_path: Path, seed: int) -> None:
+    """Were: a plate held at Y = 868 mm beside a growth of Y, or two plates; a screw shifts its axis besides."""
+    found = explained(
+        campaign_of(tmp_path / "part", seed, 2, np.array([12e-6, 36e-6]), (630.0, 210.0))
+    ).missing
+    effects = {effect.effect: effect for effect in found}
+    assert set(effects) == {f"{term}@plate_degC" for term in ("EXX:poly1", "EYY:poly1", "EX0X", "EY0Y")}
+    for term, hidden in (("EXX:poly1", 12e-6), ("EYY:poly1", 36e-6)):
+        effect = effects[f"{term}@plate_degC"]
+        assert abs(effect.amplitude - hidden) < 3.5 * effect.u
 
 
 @pytest.mark.slow

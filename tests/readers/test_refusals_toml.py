@@ -64,7 +64,7 @@ ONE_FAULT = [
     ("[118.0, 6.0, 178.8]", "[118000000.0, 6.0, 178.8]", 32, "artefact.balls[1].nominal_mm", "is beyond 100000 mm; is its unit mm?"),
     ('["S1", "S2"]', '["S1", "S3"]', 46, "artefact.scale_bar.balls", "there is no ball 'S3'; the balls are 1, S1, S2"),
     ('["S1", "S2"]', '["S1", "S1"]', 46, "artefact.scale_bar.balls", "both ends are 'S1'; a bar has two balls"),
-    ("[50.0, 20.0, 20.0]", "[-50.0, 20.0, 20.0]", 45, "artefact.scale_bar", "its balls 'S1' and 'S2' have the same nominal_mm"),
+    ('[-150.0, -152.494615, 60.0]', '[-150.0, 152.494615, 60]', 45, "artefact.scale_bar", "its balls 'S1' and 'S2' have the same nominal_mm"),
     ('["S1", "S2"]', '"S1"', 46, "artefact.scale_bar.balls", "'S1' is not two ball ids"),
     ("304.98923", "-304.98923", 47, "artefact.scale_bar.length_mm", "-304.98923 must be greater than 0 (in mm)"),
     ("11.5e-6", "11.5", 50, "artefact.scale_bar.expansion_coefficient_per_K", "11.5 is beyond 0.001 1/K; is its unit 1/K?"),

@@ -103,7 +103,7 @@ class RivalSearch:
         if part_of_bend(candidate.effect, context) is not None:
             variants += bends_of(candidate.effect, context)
         variants += _of_other_errors(candidate.effect)
-        variants += _same_drift(candidate.effect, context.chain)
+        variants += same_drift(candidate.effect, context.chain)
         variants += aliases_of(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
@@ -138,7 +138,7 @@ def _of_other_errors(effect: MachineEffect) -> list[ChainVariant]:
     return [Variant(other.text, other) for other in others]
 
 
-def _same_drift(effect: MachineEffect, chain: Chain) -> list[ChainVariant]:
+def same_drift(effect: MachineEffect, chain: Chain) -> list[ChainVariant]:
     """A drift of an axis as the same drift of every other: the catalogue has few of them, and one may stand for all.
 
     The growth of a spindle is told as that: it is what warms up first there. A drift with the time is anybody's.

@@ -46,7 +46,8 @@ def axes_of_plate(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tup
         if best is None:
             continue
         kept, axes = best
-        if all(accepts([*kept, *except_for(axes, index)], axis) for index, axis in enumerate(axes)):
+        # Where a screw is held is part of its growth, as that of a plate is: beside the gains it pays its price alone.
+        if all(accepts([*kept, *except_for(axes, index)], axes[index]) for index in (0, 1)):
             return scene, ScanResult(findings_of(scene, [*kept, *axes]))
     return scene, result
 
