@@ -27,7 +27,6 @@ from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import without
-from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
 from monitor.effects.shape import Shape
@@ -78,9 +77,11 @@ class StepsOfError:
 
     @cached_property
     def _positions(self) -> Array:
-        """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood."""
-        joint = self.effect.joint
-        reading = np.sort(joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint])
+        """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood where readings have
+        weight: one that is left out shows no level."""
+        joint, fitted = self.effect.joint, self.scene.fit
+        places = fitted.problem.context.places[fitted.has_weight.any(axis=1), self.effect.term.joint]
+        reading = np.sort(joint.sign * places)
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
@@ -194,7 +195,7 @@ class StepsOfError:
             [*steps, *companions]
             for companions in self._companions(others)
             if (steps := self._steps([*others, *companions]))
-            and self._are_sharp(steps[0], [*others, *companions])
+            and self._are_sharp(steps[0], companions, others)
         ]
         # Each of several effects was chosen, as the parts of a free shape are.
         best = max(
@@ -229,10 +230,17 @@ class StepsOfError:
         steps = self._candidate(places, width)
         return [steps] if steps.visible else []
 
-    def _are_sharp(self, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
-        """Whether the steps say more beyond doubt than with a longer way in place of any of them: beside powers of the
-        position, steps follow any smooth curve about as well as a free shape does."""
-        return self.sharpness(steps, others) > UNDECIDED
+    def _are_sharp(
+        self, steps: ChainCandidate, companions: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+    ) -> bool:
+        """Whether the steps beside companions say more than with a longer way in place of any of them, at a price for
+        every place, width and companion but the first: together these follow any smooth curve about as well as a free
+        shape does."""
+        effect = steps.effect
+        assert isinstance(effect, ChainEffect)
+        assert isinstance(effect.shape, Step)
+        chosen = len(effect.shape.readings) + (effect.shape.width > 0.0) + len(companions)
+        return self.sharpness(steps, [*others, *companions]) > (chosen - 1) * LIMIT
 
     def sharpness(self, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
         """By how much, in twice the logarithm of a likelihood ratio, steps say more beside others than with a longer
