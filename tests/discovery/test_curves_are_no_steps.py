@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import Explanation, explain
+from monitor.discovery import explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 
@@ -25,7 +25,7 @@ def lasers(
     shift = rng.uniform(-3.0, 3.0, positions) if positions > 40 else np.zeros(positions)
     places = np.sort(np.linspace(0.0, TRAVEL, positions) + shift)
     way = np.concatenate([places, places[::-1]] * 2)
-    rows = []
+    rows: list[str] = []
     for run in range(1, runs + 1):
         time = 0.0
         for axis in "XYZ":
@@ -49,7 +49,7 @@ def lasers(
     return folder
 
 
-def told(folder: Path) -> Explanation:
+def told(folder):
     campaign = read_campaign(folder)
     problem = campaign_method(campaign).problem_of(campaign)
     return explain(campaign, problem, "m", rng=np.random.default_rng(1))
