@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 
@@ -60,7 +60,14 @@ class TooManyRowsError(DataError):
 
 
 class TooFewReadingsError(DataError):
-    """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for."""
+    """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for.
+
+    ``by_run`` are the readings of each run that has no more, where the campaign without these has more.
+    """
+
+    def __init__(self, message: str, by_run: Mapping[int, int] | None = None) -> None:
+        super().__init__(message)
+        self.by_run = dict(by_run or {})
 
 
 class NotConvergedError(DataError):

@@ -1,8 +1,8 @@
-"""Some runs of a campaign: one alone, or those that began before a moment."""
+"""Some runs of a campaign: one alone, all but some, or those that began before a moment."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from datetime import datetime
 
@@ -20,6 +20,11 @@ def only_run(campaign: Campaign, run: int) -> Campaign:
             f"campaign {campaign.name} has no run {run}; it has {', '.join(map(str, numbers))}"
         )
     return _part(campaign, lambda each: each.run == run)
+
+
+def without_runs(campaign: Campaign, numbers: Collection[int]) -> Campaign:
+    """A campaign without some of its runs."""
+    return _part(campaign, lambda run: run.run not in numbers)
 
 
 def runs_before(campaign: Campaign, moment: datetime | None) -> Campaign:

@@ -9,6 +9,8 @@ from by_path import simulator
 from monitor.discovery import explain, fit, steps_of_model
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
+from monitor.discovery.machine.shapes.steps_instead import steps_instead
+from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
@@ -45,6 +47,20 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
     # Maps and certificates say the same.
     for interval, same in zip(between, of_model, strict=True):
         assert (same.low, same.high) == pytest.approx((interval.low, interval.high))
+
+
+def test_a_free_shape_of_a_step_alone_is_told_by_its_place(virtual_campaigns):
+    """The flexible basis has a step between every two hats: near one of them it was `EXX:free(47)`."""
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=lambda q, travel, now: (q > 37.5) - 0.5)
+    campaign, _ = virtual_campaigns.virtual(203, [hidden], days=1, runs_per_day=2)
+    fitted = fit(problem_of(campaign).for_search())
+    names = ("EXX:free(47)", "EXX:free(7)")
+    variants = [Variant(name, parse_effect(name, fitted.problem.context.chain)) for name in names]
+    scene = scene_of(fitted, variants)
+    step_part, hat = scene.candidates
+    (named,) = steps_instead(scene, step_part, [])
+    assert named.effect.text.startswith("EXX:step(")
+    assert steps_instead(scene, hat, []) == []
 
 
 def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):

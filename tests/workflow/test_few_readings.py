@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,13 @@ QUESTIONS = ("identify", "compare", "explain", "uncertainty", "predict", "map", 
 TILT, SQUARENESS, SPHERE = (60e-6, -25e-6), -40e-6, np.array([80.0, 0.0, 60.0])
 
 
-def _few(folder: Path, kept: tuple[int, ...]) -> Path:
+def _few(folder: Path, kept: tuple[int, ...], seed: int = 20261127) -> Path:
     """The example with some poses of its first run, and with the readings of the errors above (numpy alone)."""
     shutil.copytree(EXAMPLES / "r-test", folder)
     table = folder / "probings.csv"
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     rows = [row for row in rows if row["run"] == "1" and int(row["sequence"]) in kept]
-    noise = np.random.default_rng(20261127).normal(0.0, 0.5, (len(rows), 3))
+    noise = np.random.default_rng(seed).normal(0.0, 0.5, (len(rows), 3))
     for row, of_row in zip(rows, noise, strict=True):
         cosine, sine = np.cos(np.radians(float(row["c_deg"]))), np.sin(np.radians(float(row["c_deg"])))
         turned = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -71,20 +72,23 @@ def test_four_poses_have_12_readings_and_13_names(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_it(tmp_path: Path) -> None:
     """Was: "measure more poses", as if nothing could be said of the four runs that have them."""
-    for name, broken_off in (("broken-off", True), ("whole", False)):
-        folder = _few(tmp_path / name, (1, 6, 11, 16, 3))
-        table = folder / "probings.csv"
+    lines = []
+    for run in range(1, 6):
+        poses = (1, 6, 11) if run == 5 else (1, 6, 11, 16, 3)
+        table = _few(tmp_path / f"run-{run}", poses, seed=run) / "probings.csv"
         head, *rows = table.read_text(encoding="utf-8").splitlines()
-        runs = [row.partition(",")[2] for row in rows]
-        lines = [f"{run},{row}" for run in range(1, 5) for row in runs]
-        lines += [f"5,{row}" for row in runs if row.split(",")[0] in ("1", "6", "11")] if broken_off else []
-        table.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
-        head, first, *_ = (folder / "runs.csv").read_text(encoding="utf-8").splitlines()
-        lines = [f"{run},{first.partition(',')[2]}" for run in range(1, 6 if broken_off else 5)]
-        (folder / "runs.csv").write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+        lines += [f"{run},{row.partition(',')[2]}" for row in rows]
+    for name, runs in (("broken-off", 5), ("whole", 4)):
+        folder = shutil.copytree(tmp_path / "run-1", tmp_path / name)
+        kept = [line for line in lines if int(line.partition(",")[0]) <= runs]
+        (folder / "probings.csv").write_text("\n".join([head, *kept]) + "\n", encoding="utf-8")
+        head_of_runs, first, *_ = (folder / "runs.csv").read_text(encoding="utf-8").splitlines()
+        dated = [f"{run},{first.partition(',')[2]}" for run in range(1, runs + 1)]
+        (folder / "runs.csv").write_text("\n".join([head_of_runs, *dated]) + "\n", encoding="utf-8")
     with monitor.open(tmp_path / "m.duckdb", new=True) as db:
         db.add(tmp_path / "broken-off")
-        for question in QUESTIONS:
+        told = db.ask("explain", campaign="r-test").explanation
+        for question in [each for each in QUESTIONS if each != "explain"]:
             with pytest.raises(
                 TooFewReadingsError, match=r"9 readings of run 5 .* or leave run 5 out: remove its rows"
             ):
@@ -92,3 +96,8 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
     with monitor.open(tmp_path / "n.duckdb", new=True) as db:
         db.add(tmp_path / "whole")
         assert len(db.ask("identify", campaign="r-test").runs) == 4
+        whole = db.ask("explain", campaign="r-test").explanation
+    (left_out,) = told.runs_left_out
+    assert (left_out.run, left_out.readings) == (5, 9)
+    assert told.answer == f"{whole.answer} {left_out}"
+    assert replace(told, answer=whole.answer, runs_left_out=None) == whole

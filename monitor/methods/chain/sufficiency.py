@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import NoReturn
 
 import numpy as np
@@ -40,12 +40,12 @@ def refuse_exact_fits(problem: ChainProblem, solution: Solution) -> None:
         if of_run <= rank
     }
     for run, of_run in exact.items():
-        _refuse(f"run {run}", of_run, list(exact) if len(exact) < len(numbers) else [])
+        _refuse(f"run {run}", of_run, exact if len(exact) < len(numbers) else {})
     if sum(numbers) <= int(solution.rank.sum() + solution.common_free.sum()):
-        _refuse("the campaign", sum(numbers), [])
+        _refuse("the campaign", sum(numbers), {})
 
 
-def _refuse(whose: str, numbers: int, without: Sequence[int]) -> NoReturn:
+def _refuse(whose: str, numbers: int, without: Mapping[int, int]) -> NoReturn:
     """Raise that nothing is left over, and which runs the campaign is answered ``without``; none where no other is."""
     listed = f"run{'s' * (len(without) > 1)} {', '.join(map(str, without))}"
     advice = (
@@ -54,5 +54,6 @@ def _refuse(whose: str, numbers: int, without: Sequence[int]) -> NoReturn:
     )
     raise TooFewReadingsError(
         f"the {numbers} readings of {whose} determine as many unknowns of the model: nothing is left over to judge it "
-        f"by; measure more poses{advice if without else ''}"
+        f"by; measure more poses{advice if without else ''}",
+        without,
     )

@@ -29,14 +29,16 @@ from monitor.discovery.curve.explain import explain_curve
 from monitor.discovery.machine.mistakes.cures import Maker
 from monitor.discovery.machine.shapes.variants import columns_of_pitches
 from monitor.documents import to_document
+from monitor.exceptions import TooFewReadingsError
 from monitor.methods import campaign_method
 from monitor.methods.chain.memory import TIMES_OF_FIT, TIMES_OF_SEARCH, within_memory
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.records import Campaign, CurveCampaign, Verdict
+from monitor.reporting.run_left_out import RunLeftOut
 from monitor.store import Database, StoredModel, save_analysis
-from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
@@ -159,10 +161,21 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
 
 
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:
-    # A search that has not the memory is refused before minutes of fitting.
-    first = first_fit(campaign, model, TIMES_OF_SEARCH)
+    left_out: tuple[RunLeftOut, ...] = ()
+    try:
+        # A search that has not the memory is refused before minutes of fitting.
+        first = first_fit(campaign, model, TIMES_OF_SEARCH)
+    except TooFewReadingsError as refusal:
+        if not refusal.by_run:
+            raise
+        left_out = tuple(RunLeftOut(run, readings) for run, readings in refusal.by_run.items())
+        campaign = without_runs(campaign, refusal.by_run)
+        first = first_fit(campaign, model, TIMES_OF_SEARCH)
     explanation = explanation_of(campaign, model, first, rate)
     answer = explained(explanation, campaign, model, rate)
+    if left_out:
+        sentences = " ".join((answer.answer, *map(str, left_out)))
+        answer = replace(answer, answer=sentences, runs_left_out=left_out)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.

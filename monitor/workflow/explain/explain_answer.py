@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from monitor.documents import INLINED, OMITTED, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
+from monitor.reporting.run_left_out import RunLeftOut
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
@@ -304,7 +305,7 @@ class MachineExplanation:
     other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
     instrument contradicts all others with all of this in the model too: that comes first. ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
-    of its own.
+    of its own. ``runs_left_out`` are those that were broken off, say.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -331,6 +332,7 @@ class MachineExplanation:
     added_together: tuple[str, ...] = ()
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
     rate: float | None = field(default=None, metadata=OMITTED)
+    runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,22 +33,28 @@ def free_of_other_axes(
     if not _is_motion(candidate):
         return
     assert isinstance(effect, ChainEffect)
-    of_other_kind = _go_together(context)
-    of_same_kind = is_free(candidate) and effect.joint.turns
+    kinds = _kinds_asked(candidate, effect, context)
     taken = {error_of(other) for other in others}
     shapes: dict[str, list[ChainCandidate]] = {}
     for shape in scene.candidates:
         other = shape.effect
-        if _is_motion(shape) and not is_free(shape) and isinstance(other, ChainEffect):
-            moves = float(np.ptp(context.positions[:, other.term.joint])) > 0.0
-            is_same_kind = other.joint.turns == effect.joint.turns
-            is_asked = (of_same_kind and other.joint != effect.joint) if is_same_kind else of_other_kind
-            if moves and is_asked and error_of(shape) not in taken:
-                shapes.setdefault(error_of(shape), []).append(shape)
+        if not _is_motion(shape) or is_free(shape) or not isinstance(other, ChainEffect):
+            continue
+        moves = float(np.ptp(context.positions[:, other.term.joint])) > 0.0
+        is_asked = other.joint.turns in kinds and other.joint != effect.joint
+        if moves and is_asked and error_of(shape) not in taken:
+            shapes.setdefault(error_of(shape), []).append(shape)
     for symbol, of_error in shapes.items():
         parts = parts_worth_keeping(scene, whole_basis(scene, symbol, of_error[0]), others)
         if parts:
             yield of_parts(scene, symbol, parts, of_error, others)
+
+
+def _kinds_asked(candidate: ChainCandidate, effect: ChainEffect, context: Context) -> set[bool]:
+    """Whether other turning axes are asked (True), linear ones (False), or both."""
+    turns = effect.joint.turns
+    of_other_kind = {not turns} if _go_together(context) else set()
+    return of_other_kind | ({True} if turns and is_free(candidate) else set())
 
 
 def _is_motion(candidate: ChainCandidate) -> bool:

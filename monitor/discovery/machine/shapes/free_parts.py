@@ -54,6 +54,11 @@ def price_of_choices(candidate: ChainCandidate) -> float:
     return price_of_parts(candidate) - 2.0 * PRICE * pairs
 
 
+def price_of_powers(scene: ChainScene, effects: Sequence[ChainCandidate]) -> float:
+    """What the choice of powers takes where they stand beside a step: with two of them it follows a bump."""
+    return 2.0 * PRICE * sum(any(effect is power for power in scene.powers) for effect in effects)
+
+
 def priced(
     scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate] = ()
 ) -> float:

@@ -25,6 +25,7 @@ from monitor.discovery.machine.shapes.free_parts import (
     of_parts_alone,
     parts_worth_keeping,
     price_of_parts,
+    price_of_powers,
     priced,
     whole_basis,
     with_nearest,
@@ -45,6 +46,7 @@ from monitor.discovery.machine.shapes.slight_shapes import (
     slight_shape,
     slight_wave,
 )
+from monitor.discovery.machine.shapes.steps_instead import steps_instead
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.teeth import TeethOfError, teeth_of
 from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
@@ -145,7 +147,7 @@ def _rather_waves(
 
 
 def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
-    """The selected effects with waves by their names, or a cycle, in place of a free shape or a table."""
+    """The selected effects with waves by their names, a cycle or steps in place of a free shape or a table."""
     for free in [shape for shape in selected if _is_any_curve(shape)]:
         others = [shape for shape in selected if shape is not free]
         shapes = [each for each in filter(_is_of_shape, scene.candidates) if error_of(each) == error_of(free)]
@@ -154,9 +156,8 @@ def _with_waves(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[Chai
         score = partial(_named_or_free, scene, others)
         in_parts = partial(of_parts, scene, error_of(free), shapes=shapes, others=others)
         taken = {other.family for other in others}
-        split = waves_instead(scene, free, taken, in_parts, score) or cycle_instead(
-            scene, free, others, score
-        )
+        split = waves_instead(scene, free, taken, in_parts, score)
+        split = split or cycle_instead(scene, free, others, score) or steps_instead(scene, free, others)
         if split and all(
             foretells_poses(scene, [wave], [*others, *split[:at]]) for at, wave in enumerate(split)
         ):
@@ -353,7 +354,8 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 # One goes in any case: where edges take the place of their error's other shapes, these do.
                 may_stay = of_others if has_edges and len(of_others) < len(gone) else gone[:-1]
                 staying = standing_beside(scene, beside, may_stay)
-                score = priced(scene, [*leading, *new, *staying])
+                price = has_edges * price_of_powers(scene, new)
+                score = priced(scene, [*leading, *new, *staying]) - price
                 if score > worth and _foretells_if_free(scene, new, leading):
                     best, worth = [*leading, *_named(scene, new, shapes, leading), *staying], score
     return best

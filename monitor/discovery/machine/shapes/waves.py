@@ -37,19 +37,26 @@ def waves_instead(
         return []
     waves = _able_waves(scene, error_of(free), taken)
     # Selected part by part a wave may have become a mixture of others: each alone is asked, too.
-    instead = [[wave] for wave in waves.values()]
-    parts = effect.shape.parts
-    orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
-    rest = [part - 1 for part in parts if part > 2 * HARMONICS]
-    whole = [order for order in orders if {2 * order - 1, 2 * order} <= set(parts)]
-    if orders and set(orders) <= set(waves) and len(orders) + bool(rest) <= MOST_NAMES:
-        instead.append([*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])])
-    elif len(whole) == 1 and whole[0] in waves:
-        # One wave has its cosine and its sine: single parts of others belong to what it leaves.
-        left = [part - 1 for part in parts if (part + 1) // 2 != whole[0]]
-        instead.append([waves[whole[0]], of_parts(left)])
+    instead = [[wave] for wave in waves.values()] + _in_names(effect.shape.parts, waves, of_parts)
     best = max(instead, key=score, default=[])
     return best if best and score(best) >= score([free]) else []
+
+
+def _in_names(
+    parts: Sequence[int], waves: dict[int, ChainCandidate], of_parts: OfParts
+) -> list[list[ChainCandidate]]:
+    """The parts of a free shape, from 1, as ``waves`` by order and what is left of them as a free shape; none where
+    they have none, or too many."""
+    orders = sorted({(part + 1) // 2 for part in parts if part <= 2 * HARMONICS})
+    rest = [part - 1 for part in parts if part > 2 * HARMONICS]
+    if orders and set(orders) <= set(waves) and len(orders) + bool(rest) <= MOST_NAMES:
+        return [[*(waves[order] for order in orders), *([of_parts(rest)] if rest else [])]]
+    whole = [order for order in orders if {2 * order - 1, 2 * order} <= set(parts)]
+    if len(whole) != 1 or whole[0] not in waves:
+        return []
+    # One wave has its cosine and its sine: single parts of others belong to what it leaves.
+    other_parts = [part - 1 for part in parts if (part + 1) // 2 != whole[0]]
+    return [[waves[whole[0]], of_parts(other_parts)]]
 
 
 def _able_waves(scene: ChainScene, symbol: str, taken: set[str]) -> dict[int, ChainCandidate]:
