@@ -12,6 +12,7 @@ from monitor.discovery.machine.joints.joint_curves import all_curves_were_search
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
+from monitor.discovery.machine.shapes.beside_steps import with_those_beside_steps
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.gears import gear_variants
@@ -74,9 +75,10 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
                 scene, result = with_tables(scene, result, scanned)
             result = with_base_instead(scene, result, rate)
             plain, catalogued = scene, standing_out(scene, result)
+            shaped = with_unknown_shapes(plain, catalogued)
             scene, result = several_instead(
                 plain,
-                with_unknown_shapes(plain, catalogued),
+                with_those_beside_steps(*shaped, lambda *of: standing_out(of[0], scanned(*of))),
                 partial(_in_their_own_shapes, plain, catalogued, drivers, rate),
             )
             accepts = ChainAcceptance(scene, drivers, rate).accepts

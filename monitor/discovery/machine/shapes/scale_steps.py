@@ -22,9 +22,9 @@ import numpy.typing as npt
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.scene_columns import columns_of
 from monitor.discovery.machine.shapes.bends import foretells_poses
-from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import PRICE, parts_worth_keeping, priced
 from monitor.discovery.machine.shapes.refine import LIMIT
+from monitor.discovery.machine.shapes.shown_cycles import is_told
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
@@ -53,6 +53,8 @@ PLACES, NEAR_PLACES = 36, 33
 # is wider than a twelfth is a curve, which hats follow.
 WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
+# Longer ways are tried in place of each step, as parts of the shortest that is no step: three gaps between positions.
+LONGER_WAYS = (1.0, 1.41, 2.0, 2.83, 4.0)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
 # Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
@@ -106,8 +108,9 @@ class StepsOfError:
 
     @cached_property
     def _positions(self) -> Array:
-        """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood."""
-        reading = np.sort(self._reading)
+        """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood where readings have
+        weight: one that is left out shows no level."""
+        reading = np.sort(self._reading[self.scene.fit.has_weight.any(axis=1)])
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
@@ -133,10 +136,16 @@ class StepsOfError:
         usual = float(np.median(np.diff(self._positions.mean(axis=1))))
         return [0.0, *(float(f"{travel * part:.3g}") for part in WIDTHS if travel * part > usual)]
 
+    def _ends(self, width: float) -> tuple[float, float]:
+        """The first and the last place in mm of steps over a width: at the level beyond either stand positions enough,
+        as beyond a step at once."""
+        at, half = self._positions.mean(axis=1), width / 2.0
+        return float(at[POSITIONS_BEYOND - 1]) + half, float(at[-POSITIONS_BEYOND]) - half
+
     def _places(self, width: float) -> Array:
         """The places among which steps of a width are looked for first."""
         if width:
-            return np.linspace(self._middles[0], self._middles[-1], PLACES)
+            return np.linspace(*self._ends(width), PLACES)
         count = len(self._middles)
         return np.asarray(
             self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
@@ -146,9 +155,8 @@ class StepsOfError:
         """The places between the neighbours of one among the first."""
         first = self._places(width)
         if width:
-            return np.asarray(
-                np.round(at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0]), 2)
-            )
+            near = at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0])
+            return np.asarray(np.round(near[(near >= first[0]) & (near <= first[-1])], 2))
         low, high = first[first < at_mm].max(initial=-np.inf), first[first > at_mm].min(initial=np.inf)
         return np.asarray(self._middles[(self._middles > low) & (self._middles < high)])
 
@@ -211,14 +219,15 @@ class StepsOfError:
 
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the steps that say most beside others, one effect of up to three, and a play or powers of it
-        beside them where that says more; none where it is among them, where none is worth its price, or where they
-        foretell no poses."""
-        if self.effect.term.symbol in map(error_of, others) or not len(self._gaps):
+        beside them where that says more; none where it is among them in another shape than a cycle, where none is
+        worth its price, or where they foretell no poses."""
+        if is_told(self.effect.term.symbol, others) or not len(self._gaps):
             return []
         choices = [
             [*steps, *companions]
             for companions in self._companions(others)
             if (steps := self._steps([*others, *companions]))
+            and self._are_sharp(steps[0], companions, others)
         ]
         # Each of several effects was chosen, as the parts of a free shape are.
         best = max(
@@ -252,6 +261,41 @@ class StepsOfError:
             places = self._worth_keeping(self._refined(places, width, others), width, others)
         steps = self._candidate(places, width)
         return [steps] if steps.visible else []
+
+    def _are_sharp(
+        self, steps: ChainCandidate, companions: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+    ) -> bool:
+        """Whether the steps beside companions say more than with a longer way in place of any of them, at a price for
+        every place, width and companion but the first: together these follow any smooth curve about as well as a free
+        shape does."""
+        effect = steps.effect
+        assert isinstance(effect, ChainEffect)
+        assert isinstance(effect.shape, Step)
+        chosen = len(effect.shape.readings) + (effect.shape.width > 0.0) + len(companions)
+        return self.sharpness(steps, [*others, *companions]) > (chosen - 1) * LIMIT
+
+    def sharpness(self, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
+        """By how much, in twice the logarithm of a likelihood ratio, steps say more beside others than with a longer
+        way in place of the least sharp of them."""
+        effect = steps.effect
+        assert isinstance(effect, ChainEffect)
+        assert isinstance(effect.shape, Step)
+        shape, freedom = effect.shape, self.scene.remainders.beside(others).degrees_of_freedom
+        longer = [
+            float(self._left_with([at_mm], rest, shape.width, others, way)[0])
+            for index, at_mm in enumerate(shape.readings)
+            for rest in [[*shape.readings[:index], *shape.readings[index + 1 :]]]
+            for way in self._longer_ways(at_mm, shape.width)
+        ]
+        return freedom * float(np.log(min(longer))) - self._cost([steps], others)
+
+    def _longer_ways(self, at_mm: float, width: float) -> list[float]:
+        """Ways in mm about a place that take at least two positions on either side off the levels of a step there."""
+        at = self._positions.mean(axis=1)
+        after = int(np.clip(np.searchsorted(at, at_mm), 1, len(at) - 1))
+        gap = at[after] - at[after - 1]
+        around = at[min(after + 1, len(at) - 1)] - at[max(after - 2, 0)]
+        return [max(3.0 * gap, around, 2.0 * width) * part for part in LONGER_WAYS]
 
     def _choice(self) -> float:
         """The logarithm of the number of places and widths."""
@@ -322,11 +366,17 @@ class StepsOfError:
         return worthy
 
     def _left_with(
-        self, near: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
+        self,
+        near: Sequence[float],
+        rest: Sequence[float],
+        width: float,
+        others: Sequence[ChainCandidate],
+        way: float | None = None,
     ) -> Array:
-        """What is left (k,) of the residual with a step at each of some places, beside steps at ``rest`` and others."""
+        """What is left (k,) of the residual with a step at each of some places, over another ``way`` if given, beside
+        steps at ``rest`` and others."""
         basis, residual = self._beside(rest, width, others)
-        columns = without(self.scene.remainders.beside(others).basis, self._columns(near, width))
+        columns = without(self.scene.remainders.beside(others).basis, self._columns(near, width if way is None else way))
         columns = without(basis, columns)
         length = np.linalg.norm(columns, axis=0)
         onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)

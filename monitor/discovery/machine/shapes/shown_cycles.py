@@ -6,9 +6,12 @@ follows what is read of the axis and so the noise of the readings.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate
+from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.effects import ChainEffect
 from monitor.effects.shapes import Cyclic
@@ -25,6 +28,12 @@ def is_cycle(candidate: ChainCandidate) -> bool:
     """Return whether an effect repeats along a linear axis."""
     effect = candidate.effect
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Cyclic)
+
+
+def is_told(symbol: str, effects: Sequence[ChainCandidate]) -> bool:
+    """Return whether an error is among effects in another shape than a cycle, beside which what else it does is
+    asked."""
+    return any(error_of(effect) == symbol and not is_cycle(effect) for effect in effects)
 
 
 def is_shown(cycle: ChainCandidate, coefficients: Array, removed: float) -> bool:

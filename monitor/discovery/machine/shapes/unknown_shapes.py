@@ -38,6 +38,7 @@ from monitor.discovery.machine.shapes.inside_shapes import (
 )
 from monitor.discovery.machine.shapes.refined_instead import refined_instead
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
+from monitor.discovery.machine.shapes.shown_cycles import is_told
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
     p_value_of_all,
@@ -408,10 +409,10 @@ def _of_error(
     worth: float,
 ) -> list[list[ChainCandidate]]:
     """What an error, of which the ``whole`` basis is given, may be beside leading effects: one free shape, whether or
-    not it foretells poses, or several powers of the position that say as much; none where it is among them, or where
-    with those that may stay it is not worth so much."""
+    not it foretells poses, or several powers of the position that say as much; none where it is among them in another
+    shape than a cycle, or where with those that may stay it is not worth so much."""
     symbol = error_of(whole)
-    if symbol in map(error_of, leading):
+    if is_told(symbol, leading):
         return []
     parts = parts_worth_keeping(scene, whole, leading)
     if not parts:
