@@ -91,13 +91,21 @@ def _between(effect: BetweenPoints, texts: Texts) -> str:
 
 def _place_of(step: StepPlace, texts: Texts) -> str:
     """Where a step may lie, and what follows."""
+    over = "_over" if step.width_mm else ""
+    between = "_zero_between" if step.zero_between else ""
+    first, last = step.middle_mm
     return texts(
-        "page.map_step_zero_between" if step.zero_between else "page.map_step",
+        f"page.map_step{over}{between}",
         parameter=step.parameter,
         size=_tenths(step.size, texts),
         unit=step.unit,
+        u=f" (u = {texts.number(round_uncertainty(step.u))} {step.unit})" if step.u else "",
+        width=_tenths(step.width_mm or 0.0, texts),
+        first=_tenths(first, texts),
+        last=_tenths(last, texts),
         low=_tenths(step.low_mm, texts),
         high=_tenths(step.high_mm, texts),
+        error=_tenths(step.error, texts),
         axis=step.axis,
     )
 

@@ -51,6 +51,9 @@ WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
+# Places about a step over a width, from the nearest positions outside of it and one width further, of which it is asked
+# whether it may lie there; between two of them the likelihood is taken as straight.
+PLACES_OVER_WIDTH = 97
 # Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
 # together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
@@ -59,10 +62,11 @@ POSITIONS_OF_BENDS = 12
 
 @dataclass(frozen=True)
 class Between:
-    """The readings in mm between which a step lies."""
+    """The readings in mm between which a step lies, with the way ``width`` over which it goes."""
 
     low: float
     high: float
+    width: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,10 +78,15 @@ class StepsOfError:
     effect: ChainEffect
 
     @cached_property
+    def _readings(self) -> Array:
+        """The readings (n,) of the axis in mm, in rising order."""
+        joint = self.effect.joint
+        return np.sort(joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint])
+
+    @cached_property
     def _positions(self) -> Array:
         """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood."""
-        joint = self.effect.joint
-        reading = np.sort(joint.sign * self.scene.fit.problem.context.places[:, self.effect.term.joint])
+        reading = self._readings
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
@@ -286,31 +295,74 @@ class StepsOfError:
         return np.asarray(remainder.residual @ remainder.residual - onto**2)
 
     def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
-        """The readings between which each step of a shape lies beside others: from the nearest ones around it to all
-        gaps in whose middle it would not be 3.84 (twice the logarithm of a likelihood ratio) less likely than where it
-        says most."""
-        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        """The readings between which each step of a shape lies beside others: all at which it would not be 3.84 (twice
+        the logarithm of a likelihood ratio) less likely than where it says most.
+
+        A step at once lies in gaps between positions, in those next to it at least. Positions tell the place of one
+        over a width also where they are within it.
+        """
         intervals = []
         for index, at_mm in enumerate(shape.readings):
-            around = nearest_readings(self._positions, at_mm, shape.width)
             rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-            places = [*map(float, self._middles), at_mm]
-            remaining = self._left_with(places, rest, shape.width, others)
-            ends = self._gaps[freedom * np.log(remaining[:-1] / remaining.min()) < LIMIT]
+            around = nearest_readings(self._readings, at_mm, shape.width)
+            if shape.width:
+                low, high = self._likely(at_mm, rest, shape.width, around, others)
+                intervals.append(Between(low - shape.width / 2.0, high + shape.width / 2.0, shape.width))
+                continue
+            excess = self._excess([*map(float, self._middles), at_mm], rest, shape.width, others)
+            ends = self._gaps[excess[:-1] < LIMIT]
             intervals.append(
                 Between(float(ends.min(initial=around.low)), float(ends.max(initial=around.high)))
             )
         return tuple(intervals)
 
+    def _excess(
+        self, places: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> Array:
+        """Twice the logarithm of the likelihood ratio (k,) of a step at each of some places to the best of them."""
+        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        remaining = self._left_with(places, rest, width, others)
+        return np.asarray(freedom * np.log(remaining / remaining.min()))
+
+    def _likely(
+        self,
+        at_mm: float,
+        rest: Sequence[float],
+        width: float,
+        around: Between,
+        others: Sequence[ChainCandidate],
+    ) -> tuple[float, float]:
+        """From where to where in mm the middle of a step over a width may lie; ``around`` are the nearest readings
+        outside of it."""
+        near = np.linspace(around.low - width, around.high + width, PLACES_OVER_WIDTH)
+        near = np.clip(near, self._positions[0, 0], self._positions[-1, 1])
+        places = np.union1d(np.concatenate([near, self._middles]), [at_mm])
+        excess = self._excess(places.tolist(), rest, width, others)
+        able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
+        ends = []
+        for inside, outside in ((able[0], able[0] - 1), (able[-1], able[-1] + 1)):
+            end = places[inside]
+            if 0 <= outside < len(places) and excess[inside] < LIMIT:
+                part = (LIMIT - excess[inside]) / (excess[outside] - excess[inside])
+                end += part * (places[outside] - end)
+            ends.append(float(end))
+        return ends[0], ends[1]
+
 
 def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
     """The nearest readings in mm before and after the width over which a step at a place goes; the end of the width
-    where none was ``measured``."""
+    where none was ``measured``. A step at a position itself has those of its neighbours: half of it is there."""
     begin, end = at_mm - width / 2.0, at_mm + width / 2.0
+    if not width:
+        measured = np.sort(measured)
+        first = np.flatnonzero(np.diff(measured, prepend=-np.inf) > SAME_POSITION)
+        for here in np.split(measured, first[1:]):
+            if here[0] <= at_mm <= here[-1] and np.ptp(here) < 2.0 * SAME_POSITION:
+                measured = measured[(measured < here[0]) | (measured > here[-1])]
     below, above = measured[measured <= begin], measured[measured >= end]
     low = float(below.max()) if below.size else begin
     high = float(above.min()) if above.size else end
-    return Between(low, high)
+    return Between(low, high, width)
 
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
