@@ -15,8 +15,8 @@ import pytest
 from monitor.discovery import fit
 from monitor.effects import parse_effect
 from monitor.methods import campaign_method
-from monitor.readers import read_campaign
 from monitor.methods.model import Model
+from monitor.readers import read_campaign
 from monitor.uncertainty import measured_run, sensitivity_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

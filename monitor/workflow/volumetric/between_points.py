@@ -22,6 +22,8 @@ from monitor.workflow.volumetric.error_map import VolumetricMap
 POINTS_A_PERIOD = 8
 #: Points of the line on which the size of an error is looked for: more than any period has that is told.
 POINTS_OF_LINE = 4001
+#: A smaller step, in µm or µrad, is printed as none: points between do not err by it.
+LEAST_STEP = 0.05
 
 
 def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
@@ -56,12 +58,14 @@ def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
             start = columns.start + number * each
             of_step = slice(start, start + each)
             size = float(np.ptp(_along(mapped, effect, errors.estimate, of_step)))
-            if size:
+            if unit.to_display(size) >= LEAST_STEP:
                 low, high = between.low, between.high
                 # Of a driver that differs between runs the run of the map has one multiplier alone.
                 by_coefficient = np.array(
                     [
-                        float(np.ptp(_along(mapped, effect, np.ones(columns.stop), slice(column, column + 1))))
+                        float(
+                            np.ptp(_along(mapped, effect, np.ones(columns.stop), slice(column, column + 1)))
+                        )
                         for column in range(start, start + each)
                     ]
                 )

@@ -68,6 +68,11 @@ class Between:
     high: float
     width: float = 0.0
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """From where to where in mm the middle of the step may lie."""
+        return self.low + self.width / 2.0, self.high - self.width / 2.0
+
 
 @dataclass(frozen=True)
 class StepsOfError:
