@@ -34,7 +34,7 @@ class StepPlace:
     there. No U contains that.
 
     ``width_mm`` is the way over which it goes, None for a step at once: its middle is known to what is left between the
-    ends, and points err by that part of its size. ``u`` is the standard uncertainty of the size.
+    ends, and points err by that part of its size.
     """
 
     parameter: str
@@ -45,7 +45,6 @@ class StepPlace:
     unit: str
     zero_between: bool
     width_mm: float | None = field(default=None, metadata=OMITTED)
-    u: float | None = field(default=None, metadata=OMITTED)
 
     @property
     def middle_mm(self) -> tuple[float, float]:
@@ -67,8 +66,7 @@ class StepPlace:
             if self.zero_between
             else " where a workpiece's zero is set between"
         )
-        u = f" (u = {self.u:.2g} {self.unit})" if self.u else ""
-        step = f"{self.parameter}, a step of {self.size:.1f} {self.unit}{u}"
+        step = f"{self.parameter}, a step of {self.size:.1f} {self.unit}"
         if not self.width_mm:
             return (
                 f"{step}, lies somewhere between {self.low_mm:.2f} and "

@@ -18,8 +18,8 @@ class Outside(StrEnum):
 
 @dataclass(frozen=True)
 class Lies:
-    """Where a step lies as far as the readings tell: somewhere from ``low_mm`` to ``high_mm`` of the ``axis``, the middle
-    of one that goes over ``width_mm``."""
+    """Where a step lies as far as the readings tell: somewhere from ``low_mm`` to ``high_mm`` of the ``axis``, the
+    middle of one that goes over ``width_mm``."""
 
     axis: str
     low_mm: float

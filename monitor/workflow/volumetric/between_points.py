@@ -69,7 +69,6 @@ def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
                         for column in range(start, start + each)
                     ]
                 )
-                u = float(np.sqrt(by_coefficient @ errors.covariance[of_step, of_step] @ by_coefficient))
                 places.append(
                     StepPlace(
                         parameter=errors.names[start + int(np.argmax(by_coefficient))],
@@ -80,7 +79,6 @@ def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
                         unit=unit.name,
                         zero_between=zero is not None and low < zero < high,
                         width_mm=between.width or None,
-                        u=unit.to_display(u),
                     )
                 )
     return tuple(places)

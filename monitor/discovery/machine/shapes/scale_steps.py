@@ -51,8 +51,8 @@ WIDTHS = (1 / 96, 1 / 48, 1 / 24, 1 / 12)
 NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
-# Places about a step over a width, from the nearest positions outside of it and one width further, of which it is asked
-# whether it may lie there; between two of them the likelihood is taken as straight.
+# So many places about a step over a width, from the nearest positions outside of it and one width further, and so many
+# again among those where it may lie.
 PLACES_OVER_WIDTH = 97
 # Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
 # together follow any curve.
@@ -339,19 +339,16 @@ class StepsOfError:
     ) -> tuple[float, float]:
         """From where to where in mm the middle of a step over a width may lie; ``around`` are the nearest readings
         outside of it."""
-        near = np.linspace(around.low - width, around.high + width, PLACES_OVER_WIDTH)
-        near = np.clip(near, self._positions[0, 0], self._positions[-1, 1])
-        places = np.union1d(np.concatenate([near, self._middles]), [at_mm])
-        excess = self._excess(places.tolist(), rest, width, others)
-        able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
-        ends = []
-        for inside, outside in ((able[0], able[0] - 1), (able[-1], able[-1] + 1)):
-            end = places[inside]
-            if 0 <= outside < len(places) and excess[inside] < LIMIT:
-                part = (LIMIT - excess[inside]) / (excess[outside] - excess[inside])
-                end += part * (places[outside] - end)
-            ends.append(float(end))
-        return ends[0], ends[1]
+        first, last = float(self._positions[0, 0]), float(self._positions[-1, 1])
+        low, high = max(around.low - width, first), min(around.high + width, last)
+        places = np.union1d([*np.linspace(low, high, PLACES_OVER_WIDTH), at_mm], self._middles)
+        for _ in range(2):
+            excess = self._excess(places.tolist(), rest, width, others)
+            able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
+            low, high = places[max(able[0] - 1, 0)], places[min(able[-1] + 1, len(places) - 1)]
+            within = float(places[able[0]]), float(places[able[-1]])
+            places = np.union1d(np.linspace(low, high, PLACES_OVER_WIDTH), [at_mm])
+        return within
 
 
 def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
