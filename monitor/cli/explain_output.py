@@ -246,7 +246,9 @@ def _tie(effect: str, tie: Tie, campaign: str) -> str:
 
 def _size_words(effect: MachineMissing) -> str:
     size = f"{output.rounded(effect.amplitude, effect.u)} ± {output.two_digits(effect.u)} {effect.unit}"
-    return size if effect.largest is None else f"up to {size} (the node {effect.largest})"
+    if effect.largest is None:
+        return size
+    return f"up to {size} (the {'node' if effect.steps is None else 'step'} {effect.largest})"
 
 
 def _unit_of_peak(effect: MachineMissing) -> str:
@@ -304,7 +306,7 @@ def _where(effect: MachineMissing) -> None:
     """Where an effect lies, as far as it was looked for: its steps, or the place at which a plate is held."""
     for step in effect.steps or ():
         size = f"{output.rounded(step.value, step.u)} ± {output.two_digits(step.u)} {effect.unit}"
-        output.say(f"   {step_in_words(effect.effect, size, step.low_mm, step.high_mm)}")
+        output.say(f"   {step_in_words(effect.effect, size, step.low_mm, step.high_mm, step.width_mm)}")
     if effect.held_at is not None:
         places = (
             f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"

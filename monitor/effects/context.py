@@ -75,8 +75,10 @@ class Context:
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
     (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
-    scale shapes and drivers where these probings are only planned, None where these are it; ``resting`` names the
-    targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were brought to a target.
+    scale shapes and drivers where these probings are only planned or a part of them, None where these are it;
+    ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were
+    brought to a target; ``part_of`` are the probings of the campaign of which these are the rows ``rows`` (n,), in runs
+    that may have other numbers; None where these are all of them.
     """
 
     chain: Chain
@@ -96,6 +98,8 @@ class Context:
     measured: Context | None = None
     resting: frozenset[str] = frozenset()
     stops_are_stated: bool = False
+    part_of: Context | None = None
+    rows: npt.NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.run)
@@ -119,6 +123,21 @@ class Context:
     def scaling(self) -> Context:
         """The probings whose ranges scale shapes and drivers: these, or those measured before these were planned."""
         return self if self.measured is None else self.measured
+
+    @property
+    def campaign(self) -> Context:
+        """The probings of the whole campaign: what runs, times and channels make of a row is told by all of them."""
+        return self if self.part_of is None else self.part_of
+
+    def of_campaign(self, columns: Array) -> Array:
+        """Return of columns (N, ...) of the whole campaign those (n, ...) of these probings."""
+        return columns if self.rows is None else np.asarray(columns[self.rows])
+
+    def part(self, rows: npt.NDArray[np.int64]) -> Context:
+        """Return the chosen rows as part of the campaign, of which drivers and ranges remain."""
+        chosen = self.taken(rows)
+        of_all = rows if chosen.rows is None else chosen.rows
+        return replace(chosen, part_of=self.campaign, rows=of_all, measured=self.scaling)
 
     def taken(self, rows: npt.NDArray[np.int64]) -> Context:
         """Return the chosen rows (any number of them), in that order, with repetitions."""

@@ -162,6 +162,19 @@ class Effect(Protocol):
         ...
 
 
+def _labels_of(driver: Driver, context: Context) -> tuple[str, ...]:
+    """Return a suffix for each multiplier of a driver in the campaign of some probings."""
+    return driver.labels(context.campaign)
+
+
+def _columns_of(driver: Driver, context: Context, joint: int | None) -> Array:
+    """Return the multipliers (n, m) at some probings: which run it was, what a channel is in the mean and what went
+    before on that day is told by the whole campaign."""
+    campaign = context.campaign
+    columns = campaign.remembered(driver, joint, lambda: driver.columns(campaign, joint))
+    return context.of_campaign(columns)
+
+
 @dataclass(frozen=True)
 class ChainEffect:
     """An error of one joint."""
@@ -201,12 +214,12 @@ class ChainEffect:
         # The gain is named by its ISO 230-1 symbol alone; that is how certificates print it.
         # So is an error at a node of the user: EXX(-110).
         name = self.term.symbol if self.is_gain or isinstance(self.shape, Nodes) else self.text
-        return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
+        return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in _labels_of(self.driver, context))
 
     def basis(self, context: Context) -> ChainBasis:
         joint = self.term.joint
         shape = context.remembered(self.shape, joint, lambda: self.shape.columns(context, joint))
-        driver = context.remembered(self.driver, joint, lambda: self.driver.columns(context, joint))
+        driver = _columns_of(self.driver, context, joint)
         product = (shape[:, :, None] * driver[:, None, :]).reshape(len(shape), -1)
         return ChainBasis(self.term, product)
 
@@ -233,7 +246,9 @@ class _DrivenChange(Generic[AnyChange]):
 
     def parameters(self, context: Context) -> tuple[str, ...]:
         return tuple(
-            f"{self.text}{s}{d}" for s in self.change.labels(context) for d in self.driver.labels(context)
+            f"{self.text}{s}{d}"
+            for s in self.change.labels(context.campaign)
+            for d in _labels_of(self.driver, context)
         )
 
 
@@ -242,8 +257,8 @@ class ArtefactEffect(_DrivenChange[ArtefactChange]):
     """A change of the targets."""
 
     def basis(self, context: Context) -> ArtefactBasis:
-        shift = self.change.shifts(context)
-        driver = self.driver.columns(context, None)
+        shift = context.of_campaign(self.change.shifts(context.campaign))
+        driver = _columns_of(self.driver, context, None)
         product = (shift[:, :, :, None] * driver[:, None, None, :]).reshape(len(shift), 3, -1)
         return ArtefactBasis(product)
 
@@ -254,7 +269,7 @@ class TurnEffect(_DrivenChange[Turn]):
 
     def basis(self, context: Context) -> TurnBasis:
         turns = self.change.turns(context)
-        driver = self.driver.columns(context, self.change.joint(context.chain))
+        driver = _columns_of(self.driver, context, self.change.joint(context.chain))
         product = (turns[:, :, :, None] * driver[:, None, None, :]).reshape(len(turns), 3, -1)
         return TurnBasis(self.change.joint(context.chain), product)
 
@@ -264,8 +279,8 @@ class InstrumentEffect(_DrivenChange[InstrumentChange]):
     """A change of what an instrument shows."""
 
     def basis(self, context: Context) -> InstrumentBasis:
-        shown = self.change.shown(context)
-        driver = self.driver.columns(context, None)
+        shown = context.of_campaign(self.change.shown(context.campaign))
+        driver = _columns_of(self.driver, context, None)
         if self.change.needs_driver:
             driver = self.change.since_the_first(driver, context)
         product = shown[:, :, :, None] * driver[:, None, None, :]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import explain, fit, steps_of_model
+from monitor.discovery import explain, fit, nearest_readings, steps_of_model
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.discovery.machine.shapes.steps_instead import steps_instead
@@ -69,6 +69,35 @@ def test_a_free_shape_of_a_step_alone_is_told_by_its_place(virtual_campaigns):
     (named,) = steps_instead(scene, step_part, [])
     assert named.effect.text.startswith("EXX:step(")
     assert steps_instead(scene, hat, []) == []
+
+
+def test_a_step_over_a_width_is_known_by_the_positions_within_it(virtual_campaigns):
+    """Half of the width on either side was said, whatever the positions told."""
+
+    def ramp(q, travel, now):
+        return np.clip((q - 20.0) / 60.0, -0.5, 0.5)
+
+    hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=ramp)
+    campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=2)
+    ((between,),) = steps_of_model(
+        fit(problem_of(campaign, Model("grown", added=("EXX:step60mm(20)",))))
+    ).values()
+    first, last = between.middle
+    assert between.width == 60.0
+    assert first <= 20.0 <= last
+    assert (between.low, between.high) == pytest.approx((first - 30.0, last + 30.0))
+    # At the next position on either side of the ramp the middle could lie 20 mm off.
+    assert last - first < 20.0
+
+
+def test_a_step_at_a_position_lies_between_its_neighbours():
+    at = np.repeat([0.0, 200.0, 250.0, 300.0], 3) + np.tile([-0.01, 0.0, 0.01], 4)
+    for place, low, high in ((250.0, 200.01, 299.99), (230.0, 200.01, 249.99), (250.2, 250.01, 299.99)):
+        between = nearest_readings(at, place, 0.0)
+        assert (between.low, between.high) == pytest.approx((low, high))
+    # Positions everywhere tell the place of any.
+    dense = nearest_readings(np.arange(0.0, 100.0, 0.2), 50.1, 0.0)
+    assert (dense.low, dense.high) == pytest.approx((50.0, 50.2))
 
 
 def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):

@@ -44,14 +44,14 @@ PLACED = {
     (
         "de",
         False,
-    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
-    "Messwerte es zeigen: Punkte dazwischen können um ihn abweichen, und alle Punkte, wenn der Nullpunkt eines "
+    ): "EXX:step(12), eine Stufe von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
+    "Messwerte es zeigen: Punkte dazwischen können um sie abweichen, und alle Punkte, wenn der Nullpunkt eines "
     "Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
     (
         "de",
         True,
-    ): "EXX:step(12), ein Sprung von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
-    "Messwerte es zeigen: Punkte dazwischen können um ihn abweichen, und alle Punkte, weil der Nullpunkt des "
+    ): "EXX:step(12), eine Stufe von 6,2 µm, liegt irgendwo zwischen 8,8 mm und 39,6 mm von X, soweit die "
+    "Messwerte es zeigen: Punkte dazwischen können um sie abweichen, und alle Punkte, weil der Nullpunkt des "
     "Werkstücks dazwischen liegt; keine Messunsicherheit U enthält das.",
 }
 
@@ -68,6 +68,29 @@ def test_a_certificate_and_its_digital_form_say_where_a_step_may_lie(
     assert said in dcc_xml(replace(record, country="DE", volumetric=(stepped,))).decode()
     assert from_document(VolumetricResult, to_document(stepped)).step_places == stepped.step_places
     assert "step_places" not in to_document(plain)
+
+
+OVER = {
+    "en": "EXX:step(12), a step of 6.2 µm over 20 mm, has its middle somewhere between 18.8 mm and 29.6 mm of X, as far "
+    "as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a workpiece's "
+    "zero is set between; no U contains that.",
+    "de": "EXX:step(12), eine Stufe von 6,2 µm über 20 mm, hat ihre Mitte irgendwo zwischen 18,8 mm und 29,6 mm von X, "
+    "soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und alle "
+    "Punkte, wenn der Nullpunkt eines Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
+}
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_of_a_step_over_a_width_it_is_said_where_its_middle_may_lie(
+    make_record: Callable[..., CertificateRecord], language: str
+) -> None:
+    (plain,) = make_record(language=language, maps=1).volumetric
+    over = replace(STEP, width_mm=20.0)
+    printed = printed_map(replace(plain, step_places=(over,)), texts_of(language)).explained
+    assert printed.endswith(OVER[language])
+    assert "over 20 mm, has its middle somewhere between 18.78 and 29.58 mm of X" in str(over)
+    # What is known no better than the width may be off by the whole step.
+    assert replace(STEP, width_mm=4.0).error == STEP.size
 
 
 @pytest.mark.parametrize("language", ["en", "de"])

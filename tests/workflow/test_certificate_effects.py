@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -183,6 +184,39 @@ def test_an_effect_without_a_stored_value_is_named_in_words(outside) -> None:
     printed = printed_effects(before, texts_of())
     assert not printed.rows
     assert str(printed.unknown).endswith(f"of which the campaign has no stored value: {BACKLASH}.")
+
+
+@pytest.mark.parametrize(
+    ("language", "sentence"),
+    [
+        (
+            "en",
+            "lies somewhere between {low} mm and {high} mm of X, as far as the readings tell; no uncertainty",
+        ),
+        ("de", "liegt irgendwo zwischen {low} mm und {high} mm von X, soweit die Messwerte es zeigen; keine"),
+    ],
+)
+def test_the_paper_says_where_a_step_lies_without_a_map_too(stated, language: str, sentence: str) -> None:
+    """``step at 20 mm`` with a value and its u was all that stood there."""
+    db, answers = stated
+    model = replace(answers["with-backlash"].model, added=("EXX:step(20)",), effects=("EXX:step(20)",))
+    plain = answers["with-backlash"]
+    answer = replace(
+        plain.answer,
+        effects=("EXX:step(20)",),
+        guf=replace(
+            plain.answer.guf,
+            estimate={**plain.answer.guf.estimate, "EXX:step(20)": 1.0},
+            u={**plain.answer.guf.u, "EXX:step(20)": 0.5},
+        ),
+        units={**plain.answer.units, "EXX:step(20)": "µm"},
+    )
+    (effect,) = effects_of(db, StatedUncertainty(plain.campaign, model, answer))
+    assert effect.lies.axis == "X"
+    assert effect.lies.low_mm < 20.0 < effect.lies.high_mm
+    texts = texts_of(language)
+    low, high = (texts.number(Decimal(f"{end:.1f}")) for end in (effect.lies.low_mm, effect.lies.high_mm))
+    assert sentence.format(low=low, high=high) in printed_effects((effect,), texts).explained
 
 
 def test_the_methods_own_model_has_none(stated) -> None:

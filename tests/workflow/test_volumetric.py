@@ -79,6 +79,22 @@ def test_a_shared_effect_takes_part_in_the_map(database):
     assert found.least_certain.u_um < plain.least_certain.u_um
 
 
+def test_what_is_determined_of_an_effect_is_in_the_map(database):
+    """One step beyond all positions took the other out of the map."""
+    answers = []
+    for model, places in (("one", "20"), ("beyond", "20,9000")):
+        add_effect(database, AddEffectRequest(f"EXX:step({places})", "samba", model))
+        answers.append(map_answer(map_run(database, VolumetricRequest("hidden", points=3, model=model))))
+    alone, beside = answers
+    name, beyond = "EXX:step(20,9000).20mm", "EXX:step(20,9000).9000mm"
+    assert name in beside.parameters
+    assert beyond not in beside.parameters
+    assert beyond in [left.parameter for left in beside.left_out]
+    assert name not in [left.parameter for left in beside.left_out]
+    assert beside.worst.error_um == pytest.approx(alone.worst.error_um, rel=1e-6)
+    assert beside.worst.u_um == pytest.approx(alone.worst.u_um, rel=1e-6)
+
+
 def test_strokes_of_the_machine_file_bound_the_map(database):
     mapped = map_run(database, VolumetricRequest("hidden", points=2))
     found = map_answer(mapped)

@@ -73,8 +73,8 @@ class Step(DescribedShape):
 
     def phrase(self, error: JointError) -> str:
         places = " and ".join(f"{_mm(reading)} mm" for reading in self.readings)
-        over = f", each over {_mm(self.width)} mm" if self.width else ""
         several = len(self.readings) > 1
+        over = f", {'each ' if several else ''}over {_mm(self.width)} mm" if self.width else ""
         return f", which jumps at {'the readings' if several else 'the reading'} {places}{over}"
 
     def explanation(self, error: JointError) -> Explanation:

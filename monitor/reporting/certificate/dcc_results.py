@@ -9,6 +9,7 @@ from monitor.reporting.certificate.behind import behind_sentences
 from monitor.reporting.certificate.dcc_elements import DccVersion, add, say, version_of
 from monitor.reporting.certificate.dsi import expanded_uncertainty, joint_values, real, standard_uncertainty
 from monitor.reporting.certificate.model_effect import ModelEffect
+from monitor.reporting.certificate.model_effects import place_in_words
 from monitor.reporting.certificate.record import CertificateRecord, Condition, NotApplicable
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import printed_map
@@ -68,6 +69,12 @@ def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, 
     explained = texts(key, effects=effect.name, runs=effect.runs, days=effect.days)
     if effect.outside is not None:
         explained += " " + texts(f"page.outside_{effect.outside.value}")
+    if effect.lies is not None:
+        explained += " " + place_in_words(effect.name, effect.lies, texts)
+        if effect.joint:
+            element = add(parent, "result")
+            say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
+            say(add(element, "data"), "text", explained, texts.language)
     # One that is among the results is there with its value and the covariance.
     values = [] if effect.joint else [(description, effect.value, effect.u)]
     if effect.reversal_value is not None and effect.u_reversal is not None:

@@ -17,12 +17,24 @@ class Outside(StrEnum):
 
 
 @dataclass(frozen=True)
+class Lies:
+    """Where a step lies as far as the readings tell: somewhere from ``low_mm`` to ``high_mm`` of the ``axis``, the
+    middle of one that goes over ``width_mm``."""
+
+    axis: str
+    low_mm: float
+    high_mm: float
+    width_mm: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
 class ModelEffect:
     """An effect of the model that all runs share: its size with standard uncertainty, in its display unit.
 
     With ``joint`` it is one of the results, the value of all runs together. Else the size is the mean of what ``runs``
     runs on ``days`` days say by themselves, and ``outside`` says why. ``reversal_value`` (ISO 230-2) and ``u_reversal``
-    of a play, twice its amplitude; None of another effect. ``value`` is None where nothing is stored of it.
+    of a play, twice its amplitude; None of another effect. ``value`` is None where nothing is stored of it. ``lies`` is
+    where a step lies; None of another effect.
     """
 
     name: str
@@ -35,3 +47,4 @@ class ModelEffect:
     u_reversal: float | None = None
     joint: bool = field(default=False, metadata=OMITTED)
     outside: Outside | None = field(default=None, metadata=OMITTED)
+    lies: Lies | None = field(default=None, metadata=OMITTED)

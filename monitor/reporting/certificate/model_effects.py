@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from monitor.reporting.certificate.model_effect import ModelEffect
+from monitor.reporting.certificate.model_effect import Lies, ModelEffect
 from monitor.reporting.certificate.tables import Number, aligned
-from monitor.reporting.numbers import round_result, round_uncertainty
+from monitor.reporting.numbers import round_result, round_to_place, round_uncertainty
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
@@ -65,4 +66,20 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
         sentences.append(texts.markup("page.effects_explained", runs=alone[0].runs, days=alone[0].days))
     outside = {effect.outside for effect in effects if effect.outside is not None}
     sentences += [texts.markup(f"page.outside_{reason.value}") for reason in sorted(outside)]
+    sentences += [
+        escape(place_in_words(effect.name, effect.lies, texts))
+        for effect in effects
+        if effect.lies is not None
+    ]
     return Markup(" ").join(sentences)
+
+
+def place_in_words(name: str, lies: Lies, texts: Texts) -> str:
+    """Where a step lies, which its name says as one number."""
+    return texts(
+        "page.effect_lies" if lies.width_mm is None else "page.effect_lies_over",
+        effect=name,
+        axis=lies.axis,
+        low=texts.number(round_to_place(lies.low_mm, Decimal("0.1"))),
+        high=texts.number(round_to_place(lies.high_mm, Decimal("0.1"))),
+    )

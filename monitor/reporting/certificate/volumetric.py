@@ -91,13 +91,20 @@ def _between(effect: BetweenPoints, texts: Texts) -> str:
 
 def _place_of(step: StepPlace, texts: Texts) -> str:
     """Where a step may lie, and what follows."""
+    over = "_over" if step.width_mm else ""
+    between = "_zero_between" if step.zero_between else ""
+    first, last = step.middle_mm
     return texts(
-        "page.map_step_zero_between" if step.zero_between else "page.map_step",
+        f"page.map_step{over}{between}",
         parameter=step.parameter,
         size=_tenths(step.size, texts),
         unit=step.unit,
+        width=texts.number(Decimal(f"{step.width_mm or 0.0:g}")),
+        first=_tenths(first, texts),
+        last=_tenths(last, texts),
         low=_tenths(step.low_mm, texts),
         high=_tenths(step.high_mm, texts),
+        error=_tenths(step.error, texts),
         axis=step.axis,
     )
 

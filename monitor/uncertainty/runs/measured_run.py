@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -139,6 +139,16 @@ class MeasuredRun(ABC):
 
         begin = np.tile(start, (inputs.shape[1], 1))
         return np.asarray(solve(linearise, begin, fixed).local.T)
+
+
+AnyProblem = TypeVar("AnyProblem", bound=ChainProblem)
+
+
+def rows_of_run(problem: AnyProblem, run: int) -> AnyProblem:
+    """The problem of one run, in which added effects are what they are in the whole campaign."""
+    rows = np.flatnonzero(problem.context.run == run)
+    single = problem.taken(rows, problem.context.run[rows])
+    return replace(single, context=problem.context.part(rows))
 
 
 def same_plan(first: ChainProblem, other: ChainProblem) -> bool:

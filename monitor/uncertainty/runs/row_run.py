@@ -19,7 +19,7 @@ from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
-from monitor.uncertainty.runs.measured_run import MeasuredRun, same_plan
+from monitor.uncertainty.runs.measured_run import MeasuredRun, rows_of_run, same_plan
 from monitor.uncertainty.runs.touched_run import touch_run
 
 
@@ -120,8 +120,7 @@ def measured_run(problem: ChainProblem, run: int, common: Array | None = None) -
     held = np.zeros(len(problem.added_names)) if common is None else np.asarray(common, dtype=np.float64)
     if isinstance(problem, TouchProblem):
         return touch_run(problem, run, held)
-    rows = np.flatnonzero(problem.context.run == run)
-    return RowRun(problem.taken(rows, problem.context.run[rows]), held)
+    return RowRun(rows_of_run(problem, run), held)
 
 
 def repeated_readings(problem: ChainProblem) -> Array:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from monitor.machine import MOTION
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
-from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun, rows_of_run
 
 
 @dataclass(frozen=True)
@@ -103,9 +103,8 @@ class TouchedRun(MeasuredRun):
 def touch_run(problem: TouchProblem, run: int, common: Array) -> TouchedRun:
     """One ``run`` of touched balls, with the common unknowns held at ``common`` (c,)."""
     index = int(np.flatnonzero(problem.runs == run)[0])
-    rows = np.flatnonzero(problem.context.run == run)
     single = replace(
-        problem.taken(rows, problem.context.run[rows]),
+        rows_of_run(problem, run),
         distances=tuple(replace(d, length=d.length[[index]]) for d in problem.distances),
     )
     return TouchedRun(single, common)

@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from monitor.effects import ChainEffect
+from monitor.effects.shapes import Step
 from monitor.methods import campaign_method
 from monitor.records import Array
-from monitor.reporting.certificate.model_effect import ModelEffect
+from monitor.reporting.certificate.model_effect import Lies, ModelEffect
 from monitor.store import Database, MachineHistory, machine_history
 from monitor.workflow.identify.answer import Estimate, reversal_value
 from monitor.workflow.models import as_model
@@ -40,7 +42,12 @@ def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect,
         # An effect of which nothing is known is named as a whole.
         whole = len(unstated) == len(names_of[text])
         alone += [*stated, *(ModelEffect(name) for name in ([text] if whole else unstated))]
-    return (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
+    stated_effects = (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
+    places = _places(evaluated)
+    return tuple(
+        replace(effect, lies=places.get(effect.name)) if effect.value is not None else effect
+        for effect in stated_effects
+    )
 
 
 def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
@@ -49,6 +56,33 @@ def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
     problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
     names = {added.effect.text: added.names() for added in problem.shared}
     return {**names, **{text: (text,) for text in problem.left_out if text not in names}}
+
+
+def _places(evaluated: StatedUncertainty) -> dict[str, Lies]:
+    """Where the steps of the model lie, by the names of their coefficients."""
+    problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
+    stepped = [
+        effect
+        for effect in problem.added
+        if isinstance(effect, ChainEffect) and isinstance(effect.shape, Step)
+    ]
+    if not stepped:
+        return {}
+    # Loaded here: a certificate without steps waits for no solver.
+    from monitor.discovery import fit, steps_of_model
+
+    between = steps_of_model(fit(problem))
+    places = {}
+    for effect in stepped:
+        steps = between[effect.text]
+        names = effect.parameters(problem.context)
+        # A driver may have several columns for each step.
+        each = len(names) // len(steps)
+        for number, name in enumerate(names):
+            step = steps[number // each]
+            first, last = step.middle
+            places[name] = Lies(effect.joint.name, first, last, step.width or None)
+    return places
 
 
 def _from_history(db: Database, evaluated: StatedUncertainty, names: Sequence[str]) -> dict[str, ModelEffect]:

@@ -63,12 +63,14 @@ class CurvePoint:
 @dataclass(frozen=True)
 class StepBetween:
     """A step of an error: its ``value`` towards higher readings with its standard uncertainty, and the readings of the
-    axis between which it lies; no data say where between them."""
+    axis between which it lies; no data say where between them. ``width_mm`` is the way over which it goes, None for a
+    step at once: its middle lies half of that within."""
 
     value: float
     u: float
     low_mm: float
     high_mm: float
+    width_mm: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

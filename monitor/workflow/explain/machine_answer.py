@@ -185,7 +185,7 @@ def _steps_between(effect: ChainMissing) -> tuple[StepBetween, ...] | None:
     sizes = coefficients(effect).values()
     return (
         tuple(
-            StepBetween(size.value, size.u, between.low, between.high)
+            StepBetween(size.value, size.u, between.low, between.high, between.width or None)
             for size, between in zip(sizes, effect.steps, strict=False)
         )
         or None

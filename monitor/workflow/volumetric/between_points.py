@@ -22,6 +22,8 @@ from monitor.workflow.volumetric.error_map import VolumetricMap
 POINTS_A_PERIOD = 8
 #: Points of the line on which the size of an error is looked for: more than any period has that is told.
 POINTS_OF_LINE = 4001
+#: A smaller step, in µm or µrad, is printed as none: points between do not err by it.
+LEAST_STEP = 0.05
 
 
 def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
@@ -33,7 +35,7 @@ def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
         low, high = mapped.ranges[effect.joint.name]
         spacing = (high - low) / (mapped.points - 1)
         unit: Unit = effect.term.unit
-        largest = unit.to_display(float(np.abs(_along(mapped, effect, columns)).max()))
+        largest = unit.to_display(float(np.abs(_along(mapped, effect, errors.estimate, columns)).max()))
         if largest and spacing * POINTS_A_PERIOD > effect.shape.pitch:
             unfollowed.append(
                 BetweenPoints(effect.text, effect.joint.name, effect.shape.pitch, spacing, largest, unit.name)
@@ -51,15 +53,34 @@ def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
         zero = None if mapped.error.datum is None else sign * float(mapped.error.datum[axis])
         # A driver may have several columns for each step.
         each = (columns.stop - columns.start) // len(effect.shape.readings)
+        unit: Unit = effect.term.unit
         for number, between in enumerate(mapped.steps[effect.text]):
             start = columns.start + number * each
-            unit: Unit = effect.term.unit
-            size = unit.to_display(float(np.ptp(_along(mapped, effect, slice(start, start + each)))))
-            if size:
+            of_step = slice(start, start + each)
+            size = float(np.ptp(_along(mapped, effect, errors.estimate, of_step)))
+            if unit.to_display(size) >= LEAST_STEP:
                 low, high = between.low, between.high
-                has_zero = zero is not None and low < zero < high
-                name = errors.names[start]
-                places.append(StepPlace(name, effect.joint.name, low, high, size, unit.name, has_zero))
+                # Of a driver that differs between runs the run of the map has one multiplier alone.
+                by_coefficient = np.array(
+                    [
+                        float(
+                            np.ptp(_along(mapped, effect, np.ones(columns.stop), slice(column, column + 1)))
+                        )
+                        for column in range(start, start + each)
+                    ]
+                )
+                places.append(
+                    StepPlace(
+                        parameter=errors.names[start + int(np.argmax(by_coefficient))],
+                        axis=effect.joint.name,
+                        low_mm=low,
+                        high_mm=high,
+                        size=unit.to_display(size),
+                        unit=unit.name,
+                        zero_between=zero is not None and low < zero < high,
+                        width_mm=between.width or None,
+                    )
+                )
     return tuple(places)
 
 
@@ -72,11 +93,11 @@ def _with_columns(errors: GeometricErrors) -> Iterator[tuple[ChainEffect, slice]
         first = last
 
 
-def _along(mapped: VolumetricMap, effect: ChainEffect, columns: slice) -> Array:
-    """The errors of all joints along the axis of an effect that some of its coefficients make, mm and rad."""
+def _along(mapped: VolumetricMap, effect: ChainEffect, coefficients: Array, columns: slice) -> Array:
+    """The errors of all joints along the axis of an effect that some of the ``coefficients`` make, mm and rad."""
     errors, ranges = mapped.errors, mapped.ranges
     chain, values = errors.chain, np.zeros_like(errors.estimate)
-    values[columns] = errors.estimate[columns]
+    values[columns] = coefficients[columns]
     positions = np.tile(middle(chain, ranges), (POINTS_OF_LINE, 1))
     joint = chain.index(effect.joint.name)
     positions[:, joint] = effect.joint.sign * np.linspace(*ranges[effect.joint.name], POINTS_OF_LINE)

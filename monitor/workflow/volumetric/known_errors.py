@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import Fit
 from monitor.effects import ChainEffect
@@ -28,7 +29,7 @@ def geometric_errors(
     problem, solution = fit.problem, fit.solution
     run = int(np.flatnonzero(problem.runs == evaluated.run)[0])
     of_run, left_out = _of_run(evaluated, fit)
-    shared, places, reasons = _shared(fit)
+    shared, places, settled, reasons = _shared(fit)
     covariance = np.zeros((len(of_run.names) + len(shared.names),) * 2)
     local = [problem.base_names.index(name) for name in of_run.names]
     joint = [name for name in shared.names if name in (evaluated.answer.effects or ())]
@@ -37,9 +38,12 @@ def geometric_errors(
     at = [*range(len(of_run.names)), *(len(of_run.names) + shared.names.index(name) for name in joint)]
     factors = [*of_run.factors, *(units[name] for name in joint)]
     covariance[np.ix_(at, at)] = evaluated.covariance[np.ix_(columns, columns)] * np.outer(factors, factors)
-    if len(solution.common) and len(joint) < len(shared.names):
+    if len(solution.common) and len(joint) < np.count_nonzero(settled):
         # Effects outside of the joint region are known by what the readings say of them alone.
         added = _of_shared(fit, run, local, places)
+        unsettled = len(local) + np.flatnonzero(~settled)
+        added[unsettled] = 0.0
+        added[:, unsettled] = 0.0
         if joint or evaluated.answer.effects_outside is Outside.FEW_RUNS:
             # What they pull the run's parameters by is in these already, and those inside have their own.
             inside = [row for row in range(len(added)) if row in at]
@@ -102,9 +106,12 @@ def _of_run(evaluated: StatedUncertainty, fit: Fit) -> tuple[_Known, dict[str, R
     return _Known(tuple(effects), tuple(names), values, tuple(factors)), left_out
 
 
-def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
-    """The effects that all runs share and the plan determines, the indices of their common unknowns, and the others
-    with the reason."""
+def _shared(
+    fit: Fit,
+) -> tuple[_Known, list[int], npt.NDArray[np.bool_], dict[str, RefusedParameters]]:
+    """The effects that all runs share, the indices of their common unknowns, which of their parameters (k,) the plan
+    determines, and the others with the reason. Those of an effect that are not determined beside some that are stand
+    at zero: whatever they are, the readings are the same with these."""
     problem, solution = fit.problem, fit.solution
     fixed, coefficients = problem.resolved(solution.common)
     effects: list[ChainEffect] = []
@@ -112,25 +119,33 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
     estimate: list[float] = []
     factors: list[float] = []
     indices: list[int] = []
+    determined: list[bool] = []
     left_out: dict[str, RefusedParameters] = {}
     # What is held at zero is in the numbers of others.
     settled = solution.common_free | solution.common_held
     first = coefficient = 0
     for shared, plain in zip(problem.shared, fixed.added, strict=True):
         unknowns = range(first, first + shared.size)
+        own = settled[list(unknowns)]
         first += shared.unknowns
         if not isinstance(plain, ChainEffect):
             left_out |= _refused(shared.names(), ReasonKind.NO_MACHINE_ERROR)
-        elif not all(settled[list(unknowns)]):
+        elif not np.any(own):
             left_out |= _refused(shared.names(), ReasonKind.NOT_DETERMINED)
         else:
+            parameters = shared.effect.parameters(problem.context)
+            unknown = [name for name, known in zip(parameters, own, strict=True) if not known]
+            left_out |= _refused(unknown, ReasonKind.NOT_DETERMINED)
             effects.append(plain)
-            names += shared.effect.parameters(problem.context)
-            estimate += map(float, coefficients[coefficient : coefficient + shared.size])
+            names += parameters
+            of_effect = coefficients[coefficient : coefficient + shared.size]
+            estimate += map(float, np.where(own, of_effect, 0.0))
             factors += [plain.unit.factor] * shared.size
             indices += unknowns
+            determined += map(bool, own)
         coefficient += shared.size
-    return _Known(tuple(effects), tuple(names), tuple(estimate), tuple(factors)), indices, left_out
+    known = _Known(tuple(effects), tuple(names), tuple(estimate), tuple(factors))
+    return known, indices, np.array(determined, dtype=bool), left_out
 
 
 def _refused(names: Iterable[str], kind: ReasonKind) -> dict[str, RefusedParameters]:

@@ -52,7 +52,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
             points=len(error.lengths),
         ),
         datum=None if error.datum is None else _at(chain, error.datum),
-        parameters=tuple(error.names),
+        parameters=tuple(name for name in error.names if name not in mapped.left_out),
         left_out=tuple(_left_out(name, refused) for name, refused in mapped.left_out.items()),
         worst=_point(mapped, error.worst, k, by_parameter),
         mean=_length(*error.mean, k),

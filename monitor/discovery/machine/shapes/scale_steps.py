@@ -57,6 +57,9 @@ NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 LONGER_WAYS = (1.0, 1.41, 2.0, 2.83, 4.0)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
+# So many places about a step over a width, from the nearest positions outside of it and one width further, and so many
+# again among those where it may lie.
+PLACES_OVER_WIDTH = 97
 # Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
 # together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
@@ -67,10 +70,16 @@ MOST_NUMBERS = 4_000_000
 
 @dataclass(frozen=True)
 class Between:
-    """The readings in mm between which a step lies."""
+    """The readings in mm between which a step lies, with the way ``width`` over which it goes."""
 
     low: float
     high: float
+    width: float = 0.0
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """From where to where in mm the middle of the step may lie."""
+        return self.low + self.width / 2.0, self.high - self.width / 2.0
 
 
 @dataclass(frozen=True)
@@ -107,10 +116,15 @@ class StepsOfError:
         return np.array([self._made[at_mm, width] for at_mm in places]).T
 
     @cached_property
+    def _readings(self) -> Array:
+        """The readings (n,) of the axis in mm where they have weight, in rising order."""
+        return np.sort(self._reading[self.scene.fit.has_weight.any(axis=1)])
+
+    @cached_property
     def _positions(self) -> Array:
         """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood where readings have
         weight: one that is left out shows no level."""
-        reading = np.sort(self._reading[self.scene.fit.has_weight.any(axis=1)])
+        reading = self._readings
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
@@ -383,31 +397,71 @@ class StepsOfError:
         return np.asarray(residual @ residual - onto**2)
 
     def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
-        """The readings between which each step of a shape lies beside others: from the nearest ones around it to all
-        gaps in whose middle it would not be 3.84 (twice the logarithm of a likelihood ratio) less likely than where it
-        says most."""
-        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        """The readings between which each step of a shape lies beside others: all at which it would not be 3.84 (twice
+        the logarithm of a likelihood ratio) less likely than where it says most.
+
+        A step at once lies in gaps between positions, in those next to it at least. Positions tell the place of one
+        over a width also where they are within it.
+        """
         intervals = []
         for index, at_mm in enumerate(shape.readings):
-            around = nearest_readings(self._positions, at_mm, shape.width)
             rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-            places = [*map(float, self._middles), at_mm]
-            remaining = self._left_with(places, rest, shape.width, others)
-            ends = self._gaps[freedom * np.log(remaining[:-1] / remaining.min()) < LIMIT]
+            around = nearest_readings(self._readings, at_mm, shape.width)
+            if shape.width:
+                low, high = self._likely(at_mm, rest, shape.width, around, others)
+                intervals.append(Between(low - shape.width / 2.0, high + shape.width / 2.0, shape.width))
+                continue
+            excess = self._excess([*map(float, self._middles), at_mm], rest, shape.width, others)
+            ends = self._gaps[excess[:-1] < LIMIT]
             intervals.append(
                 Between(float(ends.min(initial=around.low)), float(ends.max(initial=around.high)))
             )
         return tuple(intervals)
 
+    def _excess(
+        self, places: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
+    ) -> Array:
+        """Twice the logarithm of the likelihood ratio (k,) of a step at each of some places to the best of them."""
+        freedom = self.scene.remainders.beside(others).degrees_of_freedom
+        remaining = self._left_with(places, rest, width, others)
+        return np.asarray(freedom * np.log(remaining / remaining.min()))
+
+    def _likely(
+        self,
+        at_mm: float,
+        rest: Sequence[float],
+        width: float,
+        around: Between,
+        others: Sequence[ChainCandidate],
+    ) -> tuple[float, float]:
+        """From where to where in mm the middle of a step over a width may lie; ``around`` are the nearest readings
+        outside of it."""
+        first, last = float(self._positions[0, 0]), float(self._positions[-1, 1])
+        low, high = max(around.low - width, first), min(around.high + width, last)
+        places = np.union1d([*np.linspace(low, high, PLACES_OVER_WIDTH), at_mm], self._middles)
+        for _ in range(2):
+            excess = self._excess(places.tolist(), rest, width, others)
+            able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
+            low, high = places[max(able[0] - 1, 0)], places[min(able[-1] + 1, len(places) - 1)]
+            within = float(places[able[0]]), float(places[able[-1]])
+            places = np.union1d(np.linspace(low, high, PLACES_OVER_WIDTH), [at_mm])
+        return within
+
 
 def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
     """The nearest readings in mm before and after the width over which a step at a place goes; the end of the width
-    where none was ``measured``."""
+    where none was ``measured``. A step at a position itself has those of its neighbours: half of it is there."""
     begin, end = at_mm - width / 2.0, at_mm + width / 2.0
+    if not width:
+        measured = np.sort(measured)
+        first = np.flatnonzero(np.diff(measured, prepend=-np.inf) > SAME_POSITION)
+        for here in np.split(measured, first[1:]):
+            if here[0] <= at_mm <= here[-1] and np.ptp(here) < 2.0 * SAME_POSITION:
+                measured = measured[(measured < here[0]) | (measured > here[-1])]
     below, above = measured[measured <= begin], measured[measured >= end]
     low = float(below.max()) if below.size else begin
     high = float(above.min()) if above.size else end
-    return Between(low, high)
+    return Between(low, high, width)
 
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
