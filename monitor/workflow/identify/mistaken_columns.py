@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.exceptions import (
     DataError,
-    MistakenUnitError,
+    MistakenAxesError,
     MonitorError,
     TooFewReadingsError,
     TooManyRowsError,
@@ -47,8 +47,11 @@ def with_mistake(
     the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought. Of very many rows
     a part is tried.
     """
-    if isinstance(refusal, MistakenUnitError | TooFewReadingsError | TooManyRowsError):
+    if isinstance(refusal, MistakenAxesError | TooFewReadingsError | TooManyRowsError):
         return refusal
+    mistaken = _mistaken_axes(campaign, problem_of)
+    if mistaken is not None:
+        return MistakenAxesError(f"the readings contradict the machine file: {mistaken}")
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
         return _with_sentences(refusal, tuple(blank_words(blank)))
@@ -71,6 +74,14 @@ def with_mistake(
         else column_doubts(campaign, tool_frames(campaign))
     )
     return _with_sentences(refusal, said) if said else refusal
+
+
+def _mistaken_axes(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> str | None:
+    """What the positions say of signs, columns and units of the axes before any fit; None where nothing."""
+    try:
+        return problem_of(campaign).mistaken_axes
+    except MonitorError:
+        return None
 
 
 def _fits_without(
