@@ -51,8 +51,9 @@ class DataError(InputError):
     """Readings, arrays or groups from which the requested result cannot be computed."""
 
 
-class MistakenUnitError(DataError):
-    """Readings that no machine of the file fits, with the unit that explains them: nothing else is to be looked for."""
+class MistakenAxesError(DataError):
+    """Readings that no machine of the file fits, with the unit, the sign or the exchanged columns of axes that explain
+    them: nothing else is to be looked for."""
 
 
 class TooManyRowsError(DataError):

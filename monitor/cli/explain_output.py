@@ -56,6 +56,9 @@ def _machine(explanation: MachineExplanation) -> None:
         output.say(explanation.answer)
         residual_output.summary(explanation.comparison)
         return
+    comes_first = explanation.work_points_elsewhere is not None
+    if comes_first:
+        output.say(explanation.answer)
     residual_output.summary(explanation.comparison)
     output.say()
     if explanation.against_others is not None:
@@ -67,7 +70,8 @@ def _machine(explanation: MachineExplanation) -> None:
         _bad_probing(reading, explanation.target_word)
     for reading in explanation.recurring_data:
         _recurring_probing(reading, explanation.target_word)
-    output.say(explanation.answer)
+    if not comes_first:
+        output.say(explanation.answer)
     _remaining(explanation)
     _next_step(explanation)
     for alias in explanation.taken_for_machine:

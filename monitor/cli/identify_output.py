@@ -31,6 +31,8 @@ def show(answer: IdentifyAnswer) -> None:
 
 def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     """The parameters of the last runs, newest last, and what was refused."""
+    if answer.work_points_elsewhere is not None:
+        output.say(str(answer.work_points_elsewhere))
     shown = runs[-SHOWN_RUNS:]
     before = f" (the last {len(shown)} of {len(runs)} runs; --json has all)" if len(runs) > len(shown) else ""
     output.table(

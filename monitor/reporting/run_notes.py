@@ -129,17 +129,23 @@ class OffsetNoted(Sentence):
 
 
 @dataclass(frozen=True)
-class DisplacedNoted(Sentence):
-    """A work point of a setup that comes out ``distance`` mm from where campaign.toml states it."""
+class WorkPointsElsewhere(Sentence):
+    """Work points that come out elsewhere than campaign.toml states them: ``setups``, and the largest ``distances`` in
+    mm over the runs."""
 
-    run: int
-    setup: str
-    distance: float
+    setups: tuple[str, ...]
+    distances: tuple[float, ...]
 
     def __str__(self) -> str:
+        points = joined_by_and(
+            [
+                f"setup {setup} by {distance:.3g} mm"
+                for setup, distance in zip(self.setups, self.distances, strict=True)
+            ]
+        )
         return (
-            f"run {self.run}: the work point of setup {self.setup} comes out {self.distance:.3g} mm from its "
-            "work_point_mm: check the signs, units and columns of the axes, and the points in campaign.toml"
+            f"The work points come out elsewhere than work_point_mm says: that of {points}: check the signs, units and "
+            "columns of the axes, and the points in campaign.toml, before any number"
         )
 
 

@@ -30,6 +30,9 @@ from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.results import _lacking
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.likeness import LikeRequest, simulate_like
@@ -392,31 +395,63 @@ def moved(campaign: Campaign, change) -> Campaign:
 
 
 @pytest.mark.parametrize(
-    ("change", "apart"),
+    ("change", "said"),
     [
-        # The sphere of the file stands at (80, 0, 60). Read with the other sign, or with X and Y exchanged, it seems to
-        # stand on the axis, about which it goes around twice.
-        (lambda read: {**read, "X": -read["X"]}, 80.0),
-        (lambda read: {**read, "X": read["Y"], "Y": read["X"]}, 80.0),
+        # The sphere of the file stands at (80, 0, 60). Read with the other sign, or with X and Y exchanged, it goes
+        # around twice, and stays where it is only with that undone.
+        (lambda read: {**read, "X": -read["X"]}, "the sign of X were the other way round"),
+        # C the other way round does the same, and a sphere without y stays at its place with both.
+        (lambda read: {**read, "Y": -read["Y"]}, "the sign of Y were .* or the sign of C were .*"),
+        (
+            lambda read: {**read, "X": read["Y"], "Y": read["X"]},
+            "the columns x_mm and y_mm were exchanged",
+        ),
     ],
 )
-def test_a_work_point_that_the_readings_put_elsewhere(change, apart: float) -> None:
+def test_a_sphere_that_wanders_is_refused_with_the_sign_or_the_columns(change, said: str) -> None:
     campaign = read_campaign(EXAMPLES / "r-test")
     assert grounds(campaign, 1) == ()
-    (ground,) = grounds(moved(campaign, change), 1)
+    for setup in (campaign.artefact.setups[0], replace(campaign.artefact.setups[0], work_point=(82, -1, 61))):
+        stated = replace(moved(campaign, change), artefact=replace(campaign.artefact, setups=(setup,)))
+        with Database(":memory:") as db:
+            import_campaign(db, stated)
+            with pytest.raises(DataError, match=f"wanders by .* mm about the work point.* if {said}$"):
+                identify(db, IdentifyRequest("r-test"))
+
+
+def test_a_work_point_that_the_readings_put_elsewhere() -> None:
+    campaign = read_campaign(EXAMPLES / "r-test")
+    (setup,) = campaign.artefact.setups
+
+    def stated_at(*point: float) -> Campaign:
+        setups = (replace(setup, work_point=point),)
+        return replace(campaign, artefact=replace(campaign.artefact, setups=setups))
+
+    elsewhere = stated_at(80.0, 35.0, 60.0)
+    (ground,) = grounds(elsewhere, 1)
     assert (ground.kind, ground.subject, ground.limit) == (GroundKind.WORK_POINT, "r-test", 5.0)
-    assert ground.size == pytest.approx(apart, abs=2.0)
+    assert ground.size == pytest.approx(35.0, abs=2.0)
     assert "werkstückseitige Punkt der Aufstellung r-test" in ground_sentence(ground, texts_of("de"))
     with Database(":memory:") as db:
-        import_campaign(db, moved(campaign, change))
-        (run,) = identify(db, IdentifyRequest("r-test")).runs
-    assert f"the work point of setup r-test comes out {ground.size:.3g} mm from its work_point_mm" in run.note
-    # One that is stated nowhere may stand anywhere.
-    (setup,) = campaign.artefact.setups
-    unstated = replace(
-        campaign, artefact=replace(campaign.artefact, setups=(replace(setup, work_point=(0, 0, 0)),))
-    )
-    assert GroundKind.WORK_POINT not in {ground.kind for ground in grounds(unstated, 1)}
+        import_campaign(db, elsewhere)
+        answers = (
+            identify(db, IdentifyRequest("r-test")),
+            compare(db, CompareRequest("r-test")),
+            explain(db, ExplainRequest("r-test")).explanation,
+        )
+    for answer in answers:
+        said = f"that of setup r-test by {ground.size:.3g} mm: check the signs, units and columns of the axes"
+        assert said in str(answer.work_points_elsewhere)
+    _, comparison, explanation = answers
+    assert comparison.comparison.verdict == explanation.comparison.verdict == "something is missing"
+    assert explanation.answer.startswith("The work points come out elsewhere than work_point_mm says")
+    # One that is stated nowhere may stand anywhere, and some millimetres are how people state one.
+    for point in ((0.0, 0.0, 0.0), (82.0, -2.0, 61.0)):
+        with Database(":memory:") as db:
+            import_campaign(db, stated_at(*point))
+            assert identify(db, IdentifyRequest("r-test")).work_points_elsewhere is None
+            assert compare(db, CompareRequest("r-test")).work_points_elsewhere is None
+        assert GroundKind.WORK_POINT not in {ground.kind for ground in grounds(stated_at(*point), 1)}
 
 
 @pytest.mark.parametrize(("axes", "said"), [("XYZ", "x_mm, y_mm and z_mm were"), ("Z", "z_mm was")])

@@ -48,6 +48,8 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    if answer.work_points_elsewhere is not None:
+        output.say(str(answer.work_points_elsewhere))
     residual_output.summary(answer.comparison)
     if isinstance(answer.comparison, MachineComparison) and answer.comparison.verdict is Verdict.EXPLAINED:
         output.say(TOGETHER.format(campaign=answer.comparison.campaign))

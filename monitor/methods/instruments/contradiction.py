@@ -6,12 +6,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
-from monitor.exceptions import MistakenUnitError
-from monitor.machine import Chain, evaluate, orientation
+from monitor.exceptions import MistakenAxesError
+from monitor.machine import Chain
 from monitor.methods.chain.measured import Displaced
+from monitor.methods.instruments.mistaken_axes import (
+    STATED_WITHIN,
+    mistaken_axes,
+    nominal,
+    read_in_work,
+    tool_in_work,
+)
 from monitor.methods.instruments.part import Part
-from monitor.methods.instruments.reading import Plain, direction_of
+from monitor.methods.instruments.reading import direction_of
 from monitor.methods.instruments.readings.displacement import BEAM_ANGLES, Displacement
 from monitor.methods.instruments.readings.distance import FLAT, DistanceReading
 from monitor.methods.instruments.readings.vector import AtWorkPoint, VectorReading
@@ -23,10 +31,8 @@ CONTRADICTS = 0.1
 # Residuals of lengths beyond this part of the travel, and beyond a millimetre, are those of another machine: the limit
 # of the tracker.
 CONTRADICTS_TRAVEL, LEAST_CONTRADICTION = 0.02, 1.0
-# mm. A work point is stated to some millimetres. Positions in inches, with another sign or of another column put it a
-# hundred away, and the fit follows them: the errors come out as of a machine of another size. A unit is named where it
-# takes away all but a tenth of what is more than this.
-STATED_WITHIN, LEFT_BY_UNIT = 5.0, 0.1
+# A unit is named where it takes away all but this part of what a work point is off.
+LEFT_BY_UNIT = 0.1
 # A laser's readings are its travel to some hundredths: gains of machines are thousands of times smaller. A travel of
 # less than a millimetre says nothing of that.
 SAME_TRAVEL, LEAST_TRAVEL = 0.02, 1.0
@@ -61,14 +67,21 @@ OTHER_TRAVELS = (
 
 
 def contradiction(
-    parts: Sequence[Part], unknowns: Sequence[Array], sigma: Array, vectors: Array, travel: float
+    parts: Sequence[Part],
+    unknowns: Sequence[Array],
+    numbers: npt.NDArray[np.int64],
+    sigma: Array,
+    vectors: Array,
+    travel: float,
 ) -> str | None:
     """Why the readings are those of another machine, in words, None where they may be this one's; ``unknowns`` (R, q)
-    of the parts, ``sigma`` and ``vectors`` (n, d) after the fit, ``travel`` mm is how far the machine moved.
-    MistakenUnitError where a unit of the positions explains it."""
-    unit = _wrong_unit(parts)
-    if unit is not None:
-        raise MistakenUnitError(f"the readings contradict the machine file: {unit}")
+    of the parts, ``numbers`` (R,) of the runs, ``sigma`` and ``vectors`` (n, d) after the fit, ``travel`` mm is how far
+    the machine moved. MistakenAxesError where a unit of the positions, a sign or exchanged columns explain it."""
+    wrong = _wrong_unit(parts)
+    if wrong is None and _puts_work_points_elsewhere(parts, unknowns):
+        wrong = mistaken_axes(parts, numbers, everywhere=True)
+    if wrong is not None:
+        raise MistakenAxesError(f"the readings contradict the machine file: {wrong}")
     return (
         _wrong_length(parts, sigma, vectors, travel)
         or _wrong_direction(parts, sigma, vectors)
@@ -160,7 +173,7 @@ def other_travels(parts: Iterable[Part]) -> Iterator[tuple[str, str]]:
             continue
         for index in np.unique(part.rows.run):
             mine = part.rows.run == index
-            travel = _nominal(part)[mine] @ direction_of(part.reading.setup)
+            travel = nominal(part)[mine] @ direction_of(part.reading.setup)
             travel = travel - travel.mean()
             read = part.rows.measured[mine, 0] - part.rows.measured[mine, 0].mean()
             what = _travel_in_words(travel, read)
@@ -177,14 +190,12 @@ def _other_lengths(parts: Iterable[Part]) -> Iterator[str]:
             continue
         length = part.reading.setup.length
         assert length is not None  # the reader asks for it
-        stated = np.linalg.norm(_nominal(part), axis=1)
-        off = (
-            abs(np.median(long) / length - 1.0) < OTHER_LENGTH for long in (stated, _radii(_nominal(part)))
-        )
+        stated = np.linalg.norm(nominal(part), axis=1)
+        off = (abs(np.median(long) / length - 1.0) < OTHER_LENGTH for long in (stated, _radii(nominal(part))))
         if any(off):
             continue
         named.add(length)
-        radius = float(np.median(_radii(_nominal(part))))
+        radius = float(np.median(_radii(nominal(part))))
         meant = (
             f": {why}" for factor, why in OTHER_LENGTHS if abs(length / radius / factor - 1.0) < OTHER_LENGTH
         )
@@ -211,12 +222,8 @@ def _other_tool_points(parts: Iterable[Part]) -> Iterator[str]:
             continue
         rows, setup = part.rows, part.reading.setup
         first = (rows.run == rows.run[0]) & np.isfinite(rows.measured).all(axis=1)
-        sides = orientation(rows.chain, rows.positions, np.zeros((len(rows), len(rows.chain.joints), 2, 6)))
-        tool = (np.swapaxes(sides.work, 1, 2) @ sides.tool)[first]
-        measured = rows.measured[first]
-        if setup.frame == "tool":
-            measured = np.einsum("nij,nj->ni", tool, measured)
-        off = _nominal(part)[first] - measured
+        tool = tool_in_work(part)[first]
+        off = (nominal(part) - read_in_work(part))[first]
         before = off - off.mean(axis=0)
         by_point = (tool - tool.mean(axis=0)).reshape(-1, 3)
         move = np.linalg.lstsq(by_point, -before.reshape(-1), rcond=1e-3)[0]
@@ -261,6 +268,16 @@ def displaced_work_points(parts: Iterable[Part], unknowns: Iterable[Array]) -> I
                 yield Displaced(part.id, distance)
 
 
+def _puts_work_points_elsewhere(parts: Sequence[Part], unknowns: Sequence[Array]) -> bool:
+    """Whether a fit puts a work point of a vector elsewhere than stated in a run, or where nothing states one."""
+    for part, values in zip(parts, unknowns, strict=True):
+        if isinstance(part.reading, VectorReading) and not part.reading.holds("work_point"):
+            off = np.linalg.norm(values[:, :3] - part.reading.setup.work_point, axis=1)
+            if not any(part.reading.setup.work_point) or off.max(initial=0.0) > STATED_WITHIN:
+                return True
+    return False
+
+
 def _is_sought(reading: AtWorkPoint) -> bool:
     """Whether a work point is stated (the machine's zero is what a file without one has), and not as known."""
     return not reading.holds("work_point") and any(reading.setup.work_point)
@@ -280,14 +297,4 @@ def _units(chain: Chain) -> Iterator[tuple[str, Array, str]]:
 
 def _off(part: Part, scale: Array) -> float:
     """How far (mm, median) a machine without errors is from the stated work point, for positions times ``scale``."""
-    return float(np.median(np.linalg.norm(_nominal(part, scale), axis=1)))
-
-
-def _nominal(part: Part, scale: Array | float = 1.0) -> Array:
-    """The vectors r (n, 3) mm of a machine without errors, for positions times ``scale``."""
-    assert isinstance(part.reading, Plain)
-    rows, setup = part.rows, part.reading.setup
-    count, joints = len(rows), len(rows.chain.joints)
-    work, tool = np.tile(setup.work_point, (count, 1)), np.tile(setup.tool_point, (count, 1))
-    none = np.zeros((count, joints, 2, 6))
-    return evaluate(rows.chain, rows.positions * scale, none, work, tool).residual
+    return float(np.median(np.linalg.norm(nominal(part, scale), axis=1)))

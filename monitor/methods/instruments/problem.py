@@ -20,6 +20,7 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
 from monitor.methods.instruments.first_guess import first_guess, stance_at
+from monitor.methods.instruments.mistaken_axes import mistaken_axes
 from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
 from monitor.methods.instruments.readings.distance import DistanceReading
@@ -445,4 +446,9 @@ class InstrumentProblem(ChainProblem):
         travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
         first = len(self.base_names)
         unknowns = [solution.local[:, first + columns] for columns in self.own_columns]
-        return contradiction(self.parts, unknowns, self.sigma, vectors, travel)
+        return contradiction(self.parts, unknowns, self.runs, self.sigma, vectors, travel)
+
+    @property
+    def mistaken_axes(self) -> str | None:
+        """Signs, columns or units of axes with which the tool point stays at the work points of its vectors."""
+        return mistaken_axes(self.parts, self.runs, everywhere=False)

@@ -20,6 +20,7 @@ from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
 from monitor.workflow.identify.mistaken_setups import mistaken_setups
+from monitor.workflow.identify.notes import elsewhere_under
 from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.instruments.drifting import running_with_time
 from monitor.workflow.instruments.instruments import disagreement
@@ -63,13 +64,15 @@ def _compare_machine(fit: Fit, campaign: Campaign, model: StoredModel) -> tuple[
     apart = disagreement(fit.problem, fit.solution, ability)
     beside = contradiction_in(fit, ability)
     drifting = running_with_time(fit.problem, fit.solution, ability)
-    if beside is not None and comparison.verdict is Verdict.EXPLAINED:
-        # The residual of many rows hides what one setup of few says against all others.
+    displaced = elsewhere_under(fit.problem, fit.solution)
+    if (beside is not None or displaced is not None) and comparison.verdict is Verdict.EXPLAINED:
+        # The residual of many rows hides what one setup of few says against all others, and without a unit of length
+        # a machine of another size leaves as little.
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
     mistakes = mistaken_setups(campaign, model, fit.problem, fit.solution)
     answer = CompareAnswer(
         machine_comparison(comparison, fit.problem), apart, beside, mistakes or None, drifting or None,
-        fit.problem.target_word,
+        fit.problem.target_word, displaced,
     )  # fmt: skip
     return answer, draw
 

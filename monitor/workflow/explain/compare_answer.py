@@ -12,6 +12,7 @@ from typing import ClassVar
 
 from monitor.documents import INLINED, OMITTED
 from monitor.records import Verdict
+from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise, LikelyMistake
 from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
@@ -144,7 +145,8 @@ class CompareAnswer:
     ``instruments_disagree`` is there where instruments say of one parameter what chance does not explain,
     ``against_others`` where a setup or instrument contradicts all others together,
     ``likely_mistakes`` where a sign, a unit or exchanged columns of it explain that,
-    ``run_with_time`` where readings of a setup drift by more than chance explains.
+    ``run_with_time`` where readings of a setup drift by more than chance explains,
+    ``work_points_elsewhere`` where work points come out further from where they are stated than people misstate them.
     """
 
     comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
@@ -153,4 +155,5 @@ class CompareAnswer:
     likely_mistakes: tuple[LikelyMistake, ...] | None = field(default=None, metadata=OMITTED)
     run_with_time: tuple[RunsWithTime, ...] | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -50,6 +50,7 @@ from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
+from monitor.workflow.identify.notes import elsewhere_under
 from monitor.workflow.instruments.against_others import contradiction_in
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
@@ -125,7 +126,9 @@ def explained(
         beside = contradiction_in(explanation.final, campaign_method(campaign).instruments)
     comparison = explanation.comparison
     is_explained = comparison.verdict is Verdict.EXPLAINED
-    if beside is not None and is_explained:
+    final = explanation.final
+    displaced = elsewhere_under(final.problem, final.solution)
+    if (beside is not None or displaced is not None) and is_explained:
         # As `compare` judges: the residual of many rows hides what one setup of few says against all others.
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
         explanation = replace(explanation, comparison=comparison)
@@ -141,6 +144,8 @@ def explained(
     # Where several may be the wrong one, or none alone, the effects come first.
     if beside is not None and (is_explained or len(beside.suspects) == 1):
         answer = replace(answer, against_others=beside)
+    if displaced is not None:
+        answer = replace(answer, work_points_elsewhere=displaced, answer=f"{displaced}. {answer.answer}")
     return answer
 
 

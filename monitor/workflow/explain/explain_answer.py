@@ -9,6 +9,7 @@ from monitor.documents import INLINED, OMITTED, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.reporting.run_left_out import RunLeftOut
+from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
@@ -305,7 +306,9 @@ class MachineExplanation:
     The residual is pictured where something is missing. ``taken_for_machine`` are errors of
     instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
     other powers of its error, of which each alone says little. ``against_others`` is there where one setup or
-    instrument contradicts all others with all of this in the model too: that comes first. ``rate`` is the false
+    instrument contradicts all others with all of this in the model too: that comes first; so does
+    ``work_points_elsewhere``, where work points come out further from where they are stated than people misstate them.
+    ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
     of its own. ``runs_left_out`` are those that were broken off, say.
     """
@@ -333,6 +336,7 @@ class MachineExplanation:
     unlike_runs: tuple[UnlikeRun, ...] = ()
     added_together: tuple[str, ...] = ()
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
     rate: float | None = field(default=None, metadata=OMITTED)
     runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
 

@@ -10,6 +10,7 @@ from monitor.effects.shapes import REVERSAL_VALUE, has_reversal_value
 from monitor.methods.chain.identification import AsStated, TakenUp
 from monitor.records import FrameOfReference
 from monitor.reporting.refused import RefusedParameters
+from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.workflow.plan.test_answer import TestAnswer
 
 
@@ -128,6 +129,8 @@ class IdentifyAnswer:
     ``file_doubts`` what the places and lengths that the file declares say against its columns, in sentences.
     ``not_seen`` are position and orientation errors that no number of the last run holds; ``seen_by`` names for what is
     not seen or not separated the one measurement that gives it a number, where there is one.
+    ``work_points_elsewhere`` says which come out further from where they are stated than people misstate them: no
+    number counts before that is mended.
     """
 
     campaign: str
@@ -148,6 +151,7 @@ class IdentifyAnswer:
     file_doubts: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     not_seen: tuple[RefusedParameters, ...] | None = field(default=None, metadata=OMITTED)
     seen_by: Mapping[str, TestAnswer] | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

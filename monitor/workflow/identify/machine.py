@@ -19,7 +19,7 @@ from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun, reversal_value
 from monitor.workflow.identify.lack_of_fit import lack_of_fit
-from monitor.workflow.identify.notes import note
+from monitor.workflow.identify.notes import elsewhere, note
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.machine_frame import frames_of, refers_to
 
@@ -69,6 +69,7 @@ def machine_answer(
         taken_up=identification.taken_up or None,
         as_stated=identification.as_stated or None,
         lack_of_fit_p=lack_of_fit_p,
+        work_points_elsewhere=elsewhere(point for run in identification.runs for point in run.displaced),
     )
 
 

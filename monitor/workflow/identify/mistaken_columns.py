@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.exceptions import (
     DataError,
-    MistakenUnitError,
+    MistakenAxesError,
     MonitorError,
     TooFewReadingsError,
     TooManyRowsError,
@@ -50,8 +50,11 @@ def with_mistake(
     """
     if isinstance(refusal, TooFewReadingsError):
         return _with_files(refusal, campaign)
-    if isinstance(refusal, MistakenUnitError | TooManyRowsError):
+    if isinstance(refusal, MistakenAxesError | MistakenUnitError | TooManyRowsError):
         return refusal
+    mistaken = _mistaken_axes(campaign, problem_of)
+    if mistaken is not None:
+        return MistakenAxesError(f"the readings contradict the machine file: {mistaken}")
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
         return _with_sentences(refusal, tuple(blank_words(blank)))
@@ -89,6 +92,14 @@ def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:
         f"{refusal}: remove {its} rows from {' and '.join(files)}, withdraw the campaign and import it again",
         refusal.by_run,
     )
+
+
+def _mistaken_axes(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> str | None:
+    """What the positions say of signs, columns and units of the axes before any fit; None where nothing."""
+    try:
+        return problem_of(campaign).mistaken_axes
+    except MonitorError:
+        return None
 
 
 def _fits_without(

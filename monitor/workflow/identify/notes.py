@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -11,17 +11,20 @@ from monitor.machine.terms import LOCATION, parse_term
 from monitor.methods import method_named
 from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.measured import Displaced
+from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.model import chain_of
 from monitor.readers.row_places import RowPlaces
 from monitor.records import Machine
 from monitor.reporting.run_notes import (
     AngleNoted,
     AxisAt,
-    DisplacedNoted,
     GrossReadingNoted,
     OffsetNoted,
     ResidualsNoted,
     UnsearchedNoted,
+    WorkPointsElsewhere,
 )
 from monitor.units import DEGREE
 
@@ -43,13 +46,25 @@ def note(machine: Machine, identification: Identification, run: RunIdentificatio
         if reading.run == run.run
     )
     unsearched = (UnsearchedNoted(number) for number in identification.unsearched if number == run.run)
-    displaced = (DisplacedNoted(run.run, point.setup, point.distance) for point in run.displaced)
     return "; ".join(
         map(
             str,
-            (*gross, *unsearched, *_residuals(run), *displaced, *_locations(machine, identification, run)),
+            (*gross, *unsearched, *_residuals(run), *_locations(machine, identification, run)),
         )
     )
+
+
+def elsewhere(points: Iterable[Displaced]) -> WorkPointsElsewhere | None:
+    """Work points of all runs that are not where the file states them, in one sentence; None where all are."""
+    largest: dict[str, float] = {}
+    for point in points:
+        largest[point.setup] = max(point.distance, largest.get(point.setup, 0.0))
+    return WorkPointsElsewhere(tuple(largest), tuple(largest.values())) if largest else None
+
+
+def elsewhere_under(problem: ChainProblem, solution: Solution) -> WorkPointsElsewhere | None:
+    """Work points that a solution puts elsewhere than the file, in one sentence."""
+    return elsewhere(point for local in solution.local for point in problem.displaced(local))
 
 
 def gross_noted(reading: GrossReading, target_word: str, places: RowPlaces) -> GrossReadingNoted:
