@@ -88,7 +88,8 @@ def poses_that_tell(axes: Sequence[str], effects: Sequence[str]) -> str:
 
 def positions_that_tell(axes: Sequence[str], step_mm: float) -> str:
     """Return which positions of ``axes`` tell apart what is one at positions so many mm apart."""
+    names = " and ".join(axes)
     return (
-        f"a run of the same movements with {' and '.join(axes)} at uneven positions, each off the present ones by another "
-        f"part of their {step_mm:g} mm (ISO 230-2)"
+        f"a run of the same movements with {names} at uneven positions, each off the present ones by another part of "
+        f"their {step_mm:g} mm (ISO 230-2)"
     )

@@ -14,7 +14,7 @@ from monitor.effects import ChainEffect, Context, parse_effect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes import Cyclic
 from monitor.exceptions import EffectError
-from monitor.workflow.explain.explain_answer import MachineExplanation, MachineMissing
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.ties import Tie, TieBreak
 
 
@@ -22,15 +22,20 @@ def with_uneven_positions(explanation: MachineExplanation, context: Context) -> 
     """The explanation with the positions that tell a cycle from those that are one with it on the grid of ``context``,
     where no plan selects poses for them."""
     missing = (
-        replace(effect, ties=tuple(each for tie in effect.ties for each in _ties(effect, tie, context)))
+        replace(
+            effect,
+            ties=tuple(
+                each for tie in effect.ties for each in ties_at_uneven_positions(effect.effect, tie, context)
+            ),
+        )
         for effect in explanation.missing
     )
     return replace(explanation, missing=tuple(missing))
 
 
-def _ties(effect: MachineMissing, tie: Tie, context: Context) -> Iterator[Tie]:
-    """A tie, of the rivals that are one with the effect on the grid by themselves."""
-    found = _cycle(effect.effect, context)
+def ties_at_uneven_positions(effect: str, tie: Tie, context: Context) -> Iterator[Tie]:
+    """A tie of an effect, of the rivals that are one with it on the grid by themselves."""
+    found = _cycle(effect, context)
     if tie.broken_by is not TieBreak.MORE_POSES or found is None:
         yield tie
         return

@@ -59,8 +59,8 @@ class TieBreak(Enum):
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
     ``axes`` those to index or to move, ``measurement`` the test of an instrument, ``runs`` those to measure besides,
-    ``setup`` the second set-up to measure in, ``step_mm`` how far apart positions are. What stays the same through a run shows nothing where ``drivers`` have to
-    vary ``within_runs``."""
+    ``setup`` the second set-up to measure in, ``step_mm`` how far apart these are. What stays the same through a run
+    shows nothing where ``drivers`` have to vary ``within_runs``."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak

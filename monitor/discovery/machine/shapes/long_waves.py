@@ -55,8 +55,8 @@ AT_HALF = 2e-3
 def long_wave(
     scene: ChainScene, shape: ChainCandidate, others: Sequence[ChainCandidate]
 ) -> list[ChainCandidate]:
-    """The wave of one and a half to two periods that beside others is the whole of the error of which a candidate is a shape; none
-    where something else is, and where others are of that error."""
+    """The wave of one and a half to two periods that beside others is the whole of the error of which a candidate is a
+    shape; none where something else is, and where others are of that error."""
     effect, symbol = shape.effect, error_of(shape)
     assert isinstance(effect, ChainEffect)
     if any(error_of(other) == symbol for other in others):
