@@ -135,9 +135,8 @@ class Context:
 
     def part(self, rows: npt.NDArray[np.int64]) -> Context:
         """Return the chosen rows as part of the campaign, of which drivers and ranges remain."""
-        chosen = self.taken(rows)
-        of_all = rows if chosen.rows is None else chosen.rows
-        return replace(chosen, part_of=self.campaign, rows=of_all, measured=self.scaling)
+        of_campaign = rows if self.rows is None else self.rows[rows]
+        return replace(self.taken(rows), part_of=self.campaign, rows=of_campaign, measured=self.scaling)
 
     def taken(self, rows: npt.NDArray[np.int64]) -> Context:
         """Return the chosen rows (any number of them), in that order, with repetitions."""

@@ -71,9 +71,9 @@ def test_a_certificate_and_its_digital_form_say_where_a_step_may_lie(
 
 
 OVER = {
-    "en": "EXX:step(12), a step of 6.2 µm over 20 mm, has its middle somewhere between 18.8 mm and 29.6 mm of X, as far "
-    "as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a workpiece's "
-    "zero is set between; no U contains that.",
+    "en": "EXX:step(12), a step of 6.2 µm over 20 mm, has its middle somewhere between 18.8 mm and 29.6 mm of X, as "
+    "far as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a "
+    "workpiece's zero is set between; no U contains that.",
     "de": "EXX:step(12), eine Stufe von 6,2 µm über 20 mm, hat ihre Mitte irgendwo zwischen 18,8 mm und 29,6 mm von X, "
     "soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und alle "
     "Punkte, wenn der Nullpunkt eines Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",

@@ -49,10 +49,18 @@ def printed_map(volumetric: VolumetricResult, texts: Texts) -> PrintedMap:
         rows=_rows(volumetric, texts),
         explained=" ".join(explained),
         left_out=" ".join(
-            texts("page.map_left_out", parameters=name, why=why_refused(refused, texts))
-            for name, refused in volumetric.refused
+            texts("page.map_left_out", parameters=", ".join(names), why=why)
+            for why, names in _by_reason(volumetric, texts).items()
         ),
     )
+
+
+def _by_reason(volumetric: VolumetricResult, texts: Texts) -> dict[str, list[str]]:
+    """The parameters that the map leaves out, by the reason in words."""
+    by_reason: dict[str, list[str]] = {}
+    for name, refused in volumetric.refused:
+        by_reason.setdefault(why_refused(refused, texts), []).append(name)
+    return by_reason
 
 
 def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:

@@ -126,26 +126,26 @@ def _shared(
     first = coefficient = 0
     for shared, plain in zip(problem.shared, fixed.added, strict=True):
         unknowns = range(first, first + shared.size)
-        own = settled[list(unknowns)]
+        is_settled = settled[list(unknowns)]
         first += shared.unknowns
         if not isinstance(plain, ChainEffect):
             left_out |= _refused(shared.names(), ReasonKind.NO_MACHINE_ERROR)
-        elif not np.any(own):
+        elif not np.any(is_settled):
             left_out |= _refused(shared.names(), ReasonKind.NOT_DETERMINED)
         else:
             parameters = shared.effect.parameters(problem.context)
-            unknown = [name for name, known in zip(parameters, own, strict=True) if not known]
+            unknown = [name for name, stated in zip(parameters, is_settled, strict=True) if not stated]
             left_out |= _refused(unknown, ReasonKind.NOT_DETERMINED)
             effects.append(plain)
             names += parameters
             of_effect = coefficients[coefficient : coefficient + shared.size]
-            estimate += map(float, np.where(own, of_effect, 0.0))
+            estimate += map(float, np.where(is_settled, of_effect, 0.0))
             factors += [plain.unit.factor] * shared.size
             indices += unknowns
-            determined += map(bool, own)
+            determined += map(bool, is_settled)
         coefficient += shared.size
-    known = _Known(tuple(effects), tuple(names), tuple(estimate), tuple(factors))
-    return known, indices, np.array(determined, dtype=bool), left_out
+    of_machine = _Known(tuple(effects), tuple(names), tuple(estimate), tuple(factors))
+    return of_machine, indices, np.array(determined, dtype=bool), left_out
 
 
 def _refused(names: Iterable[str], kind: ReasonKind) -> dict[str, RefusedParameters]:

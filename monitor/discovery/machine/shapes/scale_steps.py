@@ -455,9 +455,9 @@ def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
     if not width:
         measured = np.sort(measured)
         first = np.flatnonzero(np.diff(measured, prepend=-np.inf) > SAME_POSITION)
-        for here in np.split(measured, first[1:]):
-            if here[0] <= at_mm <= here[-1] and np.ptp(here) < 2.0 * SAME_POSITION:
-                measured = measured[(measured < here[0]) | (measured > here[-1])]
+        for position in np.split(measured, first[1:]):
+            if position[0] <= at_mm <= position[-1] and np.ptp(position) < 2.0 * SAME_POSITION:
+                measured = measured[(measured < position[0]) | (measured > position[-1])]
     below, above = measured[measured <= begin], measured[measured >= end]
     low = float(below.max()) if below.size else begin
     high = float(above.min()) if above.size else end
