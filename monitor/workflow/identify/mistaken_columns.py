@@ -50,7 +50,7 @@ def with_mistake(
     """
     if isinstance(refusal, TooFewReadingsError):
         return _with_files(refusal, campaign)
-    if isinstance(refusal, MistakenAxesError | MistakenUnitError | TooManyRowsError):
+    if isinstance(refusal, MistakenAxesError | TooManyRowsError):
         return refusal
     mistaken = _mistaken_axes(campaign, problem_of)
     if mistaken is not None:

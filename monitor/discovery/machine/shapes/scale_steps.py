@@ -390,7 +390,9 @@ class StepsOfError:
         """What is left (k,) of the residual with a step at each of some places, over another ``way`` if given, beside
         steps at ``rest`` and others."""
         basis, residual = self._beside(rest, width, others)
-        columns = without(self.scene.remainders.beside(others).basis, self._columns(near, width if way is None else way))
+        columns = without(
+            self.scene.remainders.beside(others).basis, self._columns(near, width if way is None else way)
+        )
         columns = without(basis, columns)
         length = np.linalg.norm(columns, axis=0)
         onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)
