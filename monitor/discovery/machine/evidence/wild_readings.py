@@ -22,8 +22,8 @@ from monitor.records import Array
 
 # From so many degrees of freedom on (a kurtosis of 3.2) sums of squares say as much.
 LIGHT = 30.0
-# Scores and unknowns in turn: the unknowns still take at most 0.25 % of the scores then (60 campaigns of 1, 4 and 7 runs
-# with tails of Student 3).
+# Scores and unknowns in turn: the unknowns still take at most 0.25 % of the scores then (60 campaigns of 1, 4 and 7
+# runs with tails of Student 3).
 STEPS = 10
 
 

@@ -301,7 +301,7 @@ class StepsOfError:
             for rest in [[*shape.readings[:index], *shape.readings[index + 1 :]]]
             for way in self._longer_ways(at_mm, shape.width)
         ]
-        return freedom * float(np.log(min(longer))) - self._cost([steps], others)
+        return freedom * float(np.log(min(longer))) - self._cost(shape.readings, shape.width, others)
 
     def _longer_ways(self, at_mm: float, width: float) -> list[float]:
         """Ways in mm about a place that take at least two positions on either side off the levels of a step there."""
