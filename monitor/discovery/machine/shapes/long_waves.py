@@ -108,13 +108,13 @@ def price_of_several(
     scene: ChainScene, several: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
 ) -> float:
     """What the choice of each of several shapes beyond the first takes from their score, where one wave would do; a
-    screw has one lead: two shapes that both look long have to be shown beyond doubt."""
+    screw has one lead: each further shape that looks long has to be shown beyond doubt."""
     context = scene.fit.problem.context
     long = [
         each for each in several if as_it_appears(each.effect, context) or is_clipped(scene, each, others)
     ]
     choice = 2.0 * float(np.log(scene.families))
-    return choice * (len(several) - 1) + (UNDECIDED if len(long) > 1 else 0.0)
+    return choice * (len(several) - 1) + UNDECIDED * max(len(long) - 1, 0)
 
 
 def _is_whole(scene: ChainScene, wave: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:

@@ -39,8 +39,8 @@ def refined_instead(
     if len(several) < 2 or not (sought or longer):
         return None
     choice = 2.0 * float(np.log(scene.families))
-    # A screw has one lead: two that both look longer have to be shown beyond doubt.
-    margin = WORTH_EXCHANGING if len(longer) < 2 else -UNDECIDED
+    # A screw has one lead: each further one that looks longer has to be shown beyond doubt.
+    margin = WORTH_EXCHANGING if len(longer) < 2 else -UNDECIDED * (len(longer) - 1)
     worth = score_beside(scene, several, others) - choice * len(several) + margin
     ones = [refine(scene, [*others, shape], len(others)).candidate for shape in sought]
     ones += _free(scene, several, others)
