@@ -67,7 +67,8 @@ def with_mistake(
     misread = only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes, named = find_mistakes(part, problem_of, None), ()
+    named: tuple[str, ...] = ()
+    mistakes = find_mistakes(part, problem_of, None)
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
