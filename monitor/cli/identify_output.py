@@ -12,6 +12,7 @@ from monitor.records import FrameOfReference
 from monitor.reporting import messages
 from monitor.reporting.curve_finding import correlation
 from monitor.reporting.frames import frame_words
+from monitor.reporting.machine_finding import doubt_sentence
 from monitor.workflow.history.refuted import REFUTED_P
 from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
@@ -45,7 +46,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         output.say(note)
     likely_mistakes(answer.likely_mistakes)
     for doubt in answer.file_doubts or ():
-        output.say(f"look at the file first: {doubt}")
+        output.say(doubt_sentence(doubt))
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     _not_seen(answer)

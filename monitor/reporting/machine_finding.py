@@ -295,6 +295,11 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
     return sentences
 
 
+def doubt_sentence(doubt: str) -> str:
+    """What the places and lengths that a file declares say against its columns, beside a result."""
+    return f"Look at the file first: {doubt.removesuffix('.')}."
+
+
 def mistake_sentence(mistakes: Sequence[MistakeFound]) -> str:
     """What looks wrong in the file, in one sentence."""
     first = mistakes[0]

@@ -20,10 +20,10 @@ from monitor.effects import Basis, ChainEffect
 from monitor.exceptions import DataError, NotConvergedError
 from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
+from monitor.methods.chain.another_machine import Limited, refuse_another_machine
 from monitor.methods.chain.condensed import triangles
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
-from monitor.methods.chain.measured import LARGEST_GAIN, MeasuredChain
-from monitor.methods.chain.mistaken_unit import mistaken_unit
+from monitor.methods.chain.measured import MeasuredChain
 from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.methods.chain.sessions import solve_sessions
 from monitor.records import Array
@@ -31,8 +31,6 @@ from monitor.units import Unit
 
 #: Up to so many rows the derivatives of all stand side by side: 7 kB a row, 1 GB. Of more, those of ``ROWS_AT_ONCE``.
 MOST_AT_ONCE, ROWS_AT_ONCE = 140_000, 10_000
-#: A gain is told for certain beyond its limit by so many standard uncertainties.
-CERTAIN = 4.0
 
 
 @dataclass(frozen=True)
@@ -362,7 +360,16 @@ def solve_problem(
 def _accepted(problem: ChainProblem, solution: Solution, held: npt.NDArray[np.bool_]) -> Solution:
     """A solution with what was held at zero; DataError where it is that of another machine."""
     solution = replace(solution, common_held=held)
-    _refuse_another_machine(problem, solution)
+    limited = [
+        Limited(
+            problem.base_names[columns.start],
+            columns.start,
+            isinstance(effect, ChainEffect) and effect.is_gain,
+        )
+        for effect, columns in zip(problem.base, problem.base_columns, strict=True)
+        if problem.is_limited[columns.start]
+    ]
+    refuse_another_machine(problem, solution, limited)
     return solution
 
 
@@ -406,48 +413,3 @@ def _best_of(
         assert fault is not None
         raise fault
     return min(solutions, key=lambda solution: float(np.sum(solution.last.residual**2)))
-
-
-def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
-    """DataError where a location angle or a gain comes out too large to be an error, or too much is left.
-
-    The largest of all runs is named, and how many runs have one.
-    """
-    limited = [
-        (effect, columns.start)
-        for effect, columns in zip(problem.base, problem.base_columns, strict=True)
-        if problem.is_limited[columns.start]
-    ]
-    columns = [column for _, column in limited]
-    free = solution.local_free[:, columns]
-    small = (
-        np.zeros(free.shape[1], dtype=bool) if problem.stays_small is None else problem.stays_small[columns]
-    )
-    errors = np.where(free | small, solution.local[:, columns], 0.0)
-    gains = np.array([isinstance(each, ChainEffect) and each.is_gain for each, _ in limited], dtype=bool)
-    too_large = np.abs(errors) > np.where(free, problem.largest_error, LARGEST_GAIN)
-    u = np.sqrt(np.diagonal(solution.local_covariance, axis1=-2, axis2=-1)[:, columns])
-    too_large |= free & gains & (np.abs(errors) - CERTAIN * u > problem.largest_gain)
-    if too_large.any():
-        run, which = np.unravel_index(int((np.abs(errors) * too_large).argmax()), errors.shape)
-        column, error = limited[int(which)][1], float(errors[run, which])
-        is_gain = gains[int(which)]
-        of_run = errors[run, free[run] & gains]
-        looks = (
-            mistaken_unit(error, of_run, has_bar=bool(problem.measured_joints))
-            if is_gain and error > -1.0 and of_run.size
-            else ""
-        )
-        has_length = is_gain and problem.measured_joints and problem.extra_names
-        of_bar = ", the length of the bar" if has_length else ""
-        others = int(too_large.any(axis=1).sum()) - 1
-        alike = f" ({others} other run{'s' * (others > 1)} too)" if others else ""
-        raise DataError(
-            f"run {problem.runs[run]}{alike}: {problem.base_names[column]} comes out at {error:.3g} "
-            f"{'mm/mm' if is_gain else 'rad'}, which is no error of a machine: the readings contradict the machine "
-            f"file{looks}; check the axis signs, the topology, the units, the columns"
-            f"{of_bar} and the order of the targets"
-        )
-    wrong = problem.contradiction(solution)
-    if wrong is not None:
-        raise DataError(f"the readings contradict the machine file: {wrong}")

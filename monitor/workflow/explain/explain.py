@@ -37,6 +37,7 @@ from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import result_doubts
 from monitor.records import Campaign, CurveCampaign, Verdict
+from monitor.reporting.machine_finding import doubt_sentence
 from monitor.reporting.run_left_out import RunLeftOut
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
@@ -137,9 +138,7 @@ def explained(
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
     if not explanation.mistakes:
-        doubted = (
-            f"Look at the file first: {doubt}." for doubt in result_doubts(campaign, tool_frames(campaign))
-        )
+        doubted = map(doubt_sentence, result_doubts(campaign, tool_frames(campaign)))
         answer = replace(answer, answer=" ".join((answer.answer, *doubted)))
     # Where several may be the wrong one, or none alone, the effects come first.
     if beside is not None and (is_explained or len(beside.suspects) == 1):

@@ -18,6 +18,7 @@ from monitor.discovery.machine.shapes.free_parts import priced
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, except_for, findings_of
 from monitor.effects import ChainEffect, InstrumentEffect
 from monitor.effects.instrument.plate import PlateExpansion
@@ -45,29 +46,29 @@ def axes_of_plate(scene: ChainScene, result: ChainScan, accepts: Accepts) -> tup
         )
         if best is None:
             continue
-        kept, axes = best
+        beside, axes = best
         # Where a screw is held is part of its growth, as that of a plate is: beside the gains it pays its price alone.
-        if all(accepts([*kept, *except_for(axes, index)], axes[index]) for index in (0, 1)):
-            return scene, ScanResult(findings_of(scene, [*kept, *axes]))
+        if all(accepts([*beside, *except_for(axes, index)], axes[index]) for index in (0, 1)):
+            return scene, ScanResult(findings_of(scene, [*beside, *axes]))
     return scene, result
 
 
 def _best_axes(
-    scene: ChainScene, beside: Sequence[Sequence[ChainCandidate]], least: float
+    scene: ChainScene, selections: Sequence[Sequence[ChainCandidate]], least: float
 ) -> tuple[Sequence[ChainCandidate], tuple[ChainCandidate, ...]] | None:
-    """Which of several selections ``beside`` two axes says most with these, ``least`` or more, and the axes; None where
+    """Which of several selections two axes say most beside, with these, ``least`` or more, and the axes; None where
     none does."""
-    scores = [
-        (score, kept, axes)
-        for kept in beside
-        for known in [priced(scene, kept)]
-        for axes in growing_axes(scene, kept)
-        if (score := known + priced(scene, axes, kept)) >= least
-    ]
-    for _, kept, axes in sorted(scores, key=lambda trial: trial[0], reverse=True):
-        if _differ(scene, axes, kept):
-            return kept, axes
-    return None
+    scored = []
+    for beside in selections:
+        for with_shifts in growing_axes(scene, beside):
+            bare, *others = ((priced(scene, axes, beside), axes) for axes in with_shifts)
+            best = max(others, key=lambda each: each[0], default=bare)
+            # Shifts have to be shown; one that is left out where it is needed makes gains differ that are alike.
+            worth, axes = best if best[0] > bare[0] + UNDECIDED else bare
+            if len(axes) == 2 or _differ(scene, with_shifts[-1], beside):
+                scored.append((priced(scene, beside) + worth, beside, axes))
+    enough = sorted((each for each in scored if each[0] >= least), key=lambda each: each[0], reverse=True)
+    return next(((beside, axes) for _, beside, axes in enough if _differ(scene, axes, beside)), None)
 
 
 def axes_as_likely(
@@ -83,7 +84,8 @@ def axes_as_likely(
             for index, axis in enumerate(axes)
         )
 
-    best = max(growing_axes(scene, others), key=likelihood, default=())
+    every = (axes for with_shifts in growing_axes(scene, others) for axes in with_shifts)
+    best = max(every, key=likelihood, default=())
     return list(best) if best and likelihood(best) >= least else []
 
 
@@ -93,28 +95,37 @@ def is_plate(candidate: ChainCandidate) -> bool:
     return isinstance(effect, InstrumentEffect) and isinstance(effect.change, PlateExpansion)
 
 
-def growing_axes(scene: ChainScene, others: Sequence[ChainCandidate]) -> list[tuple[ChainCandidate, ...]]:
-    """Return all pairs of linear axes that grow by a driver by which plates grow too, none of them among others; and
-    each pair with the shifts of one or both of its axes by that driver, behind the two."""
+def growing_axes(
+    scene: ChainScene, others: Sequence[ChainCandidate]
+) -> list[list[tuple[ChainCandidate, ...]]]:
+    """Return all pairs of linear axes that grow by a driver by which plates grow too, none of them among others: of
+    each pair the two, and the two with the shifts of one or both of them by that driver behind them."""
     drivers = [each.effect.driver for each in scene.candidates if is_plate(each)]
     taken = {other.family for other in others}
     free = [each for each in scene.candidates if each.visible and each.family not in taken]
-    growing, shifting = list(filter(_grows, free)), list(filter(_shifts, free))
-    several: list[tuple[ChainCandidate, ...]] = []
-    for pair in combinations(growing, 2):
-        first, second = (each.effect for each in pair)
-        if first.driver != second.driver or pair[0].family == pair[1].family or first.driver not in drivers:
-            continue
-        joints = [each.effect.joint for each in pair if isinstance(each.effect, ChainEffect)]
-        beside = [
-            each
-            for each in shifting
-            if isinstance(each.effect, ChainEffect)
-            and each.effect.driver == first.driver
-            and each.effect.joint in joints
-        ]
-        several += [(*pair, *some) for size in range(len(beside) + 1) for some in combinations(beside, size)]
-    return several
+    shifting = list(filter(_shifts, free))
+    pairs = [
+        (first, second)
+        for first, second in combinations(filter(_grows, free), 2)
+        if first.effect.driver == second.effect.driver
+        and first.family != second.family
+        and first.effect.driver in drivers
+    ]
+    return [[(*pair, *shifts) for shifts in _some(_shifts_of(pair, shifting))] for pair in pairs]
+
+
+def _shifts_of(pair: Sequence[ChainCandidate], shifting: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+    """The shifts of two axes by the driver by which they grow."""
+    symbols = {f"E{name[1]}0{name[1]}" for name in (each.family for each in pair)}
+    driver = pair[0].effect.driver
+    return [
+        each for each in shifting if each.effect.driver == driver and each.family.partition("@")[0] in symbols
+    ]
+
+
+def _some(shifts: Sequence[ChainCandidate]) -> list[tuple[ChainCandidate, ...]]:
+    """None of some shifts, each, and all of them."""
+    return [some for size in range(len(shifts) + 1) for some in combinations(shifts, size)]
 
 
 def _grows(candidate: ChainCandidate) -> bool:
