@@ -42,6 +42,8 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
         assert interval.low < place < interval.high
         assert interval.low < told < interval.high
     assert found.variant.tries > 1
+    # Over three gaps between positions or more each of the steps says far less.
+    assert steps.sharpness(found, []) > 50.0
     grown = problem_of(campaign, Model("grown", added=(found.effect.text,)))
     (of_model,) = steps_of_model(fit(grown)).values()
     # Maps and certificates say the same.

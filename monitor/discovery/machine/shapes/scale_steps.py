@@ -148,7 +148,8 @@ class StepsOfError:
         """The widths in mm that are tried; a way between two positions is a step at once."""
         travel = float(self._positions[-1, 1] - self._positions[0, 0])
         usual = float(np.median(np.diff(self._positions.mean(axis=1))))
-        return [0.0, *(float(f"{travel * part:.3g}") for part in WIDTHS if travel * part > usual)]
+        widths = [float(f"{travel * part:.3g}") for part in WIDTHS if travel * part > usual]
+        return [0.0, *(width for width in widths if np.diff(self._ends(width)) > 0.0)]
 
     def _ends(self, width: float) -> tuple[float, float]:
         """The first and the last place in mm of steps over a width: at the level beyond either stand positions enough,
@@ -207,6 +208,11 @@ class StepsOfError:
         between = np.diff(np.searchsorted(self._middles_of_positions, ordered), axis=-1)
         apart = (between >= POSITIONS_BEYOND) & (np.diff(ordered, axis=-1) >= self._least_region(width))
         return np.asarray(np.all(apart, axis=-1))
+
+    def _are_inside(self, places: Sequence[float], width: float) -> bool:
+        """Whether there are positions enough beyond the first and the last of some steps."""
+        first, last = self._ends(width)
+        return first <= min(places) and max(places) <= last
 
     def _of_shape(self, kind: type[Shape] | UnionType) -> list[ChainCandidate]:
         """The candidates of this error of some kinds of shape that follow no driver and are seen."""
@@ -269,7 +275,7 @@ class StepsOfError:
     ) -> list[ChainCandidate]:
         """The steps at the best width about one that was tried; none where the data do not see them."""
         widths = [float(f"{width * part:.3g}") for part in NEAR_WIDTHS] if width else []
-        able = [some for some in widths if self._are_apart(places, some)]
+        able = [some for some in widths if self._are_apart(places, some) and self._are_inside(places, some)]
         if able:
             width = min(able, key=lambda some: self._cost(places, some, others))
             places = self._worth_keeping(self._refined(places, width, others), width, others)
@@ -285,8 +291,8 @@ class StepsOfError:
         effect = steps.effect
         assert isinstance(effect, ChainEffect)
         assert isinstance(effect.shape, Step)
-        chosen = len(effect.shape.readings) + (effect.shape.width > 0.0) + len(companions)
-        return self.sharpness(steps, [*others, *companions]) > (chosen - 1) * LIMIT
+        count = len(effect.shape.readings) + (effect.shape.width > 0.0) + len(companions)
+        return self.sharpness(steps, [*others, *companions]) > (count - 1) * LIMIT
 
     def sharpness(self, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
         """By how much, in twice the logarithm of a likelihood ratio, steps say more beside others than with a longer
