@@ -35,20 +35,20 @@ def with_uneven_positions(explanation: MachineExplanation, context: Context) -> 
 
 def ties_at_uneven_positions(effect: str, tie: Tie, context: Context) -> Iterator[Tie]:
     """A tie of an effect, of the rivals that are one with it on the grid by themselves."""
-    found = _cycle(effect, context)
-    if tie.broken_by is not TieBreak.MORE_POSES or found is None:
+    named_cycle = _cycle(effect, context)
+    if tie.broken_by is not TieBreak.MORE_POSES or named_cycle is None:
         yield tie
         return
     steps = {
         rival: step
         for rival in tie.rivals
         if (cycle := _cycle(rival, context)) is not None
-        and cycle.term == found.term
-        and (step := grid_on_which_they_are_one([found, cycle], context)) is not None
+        and cycle.term == named_cycle.term
+        and (step := grid_on_which_they_are_one([named_cycle, cycle], context)) is not None
     }
     if steps:
         step_mm = round(next(iter(steps.values())), 3)
-        yield Tie(tuple(steps), TieBreak.UNEVEN_POSITIONS, axes=(found.joint.name,), step_mm=step_mm)
+        yield Tie(tuple(steps), TieBreak.UNEVEN_POSITIONS, axes=(named_cycle.joint.name,), step_mm=step_mm)
     if rest := tuple(rival for rival in tie.rivals if rival not in steps):
         yield replace(tie, rivals=rest)
 
