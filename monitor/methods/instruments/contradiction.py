@@ -75,8 +75,8 @@ def contradiction(
     targets: Array,
 ) -> str | None:
     """Why the readings are those of another machine, in words, None where they may be this one's; ``unknowns`` (R, q)
-    of the parts, ``numbers`` (R,) of the runs, ``sigma`` and ``vectors`` (n, d) after the fit, ``targets`` (n, 3) mm are
-    where the file puts them. MistakenAxesError where a unit of the positions, a sign or exchanged columns explain it."""
+    of the parts, ``numbers`` (R,) of the runs, ``sigma`` and ``vectors`` (n, d) after the fit, ``targets`` (n, 3) mm
+    as the file puts them. MistakenAxesError where a unit of the positions, a sign or exchanged columns explain it."""
     travel = float(np.linalg.norm(targets.std(axis=0)))
     wrong = _wrong_unit(parts)
     if wrong is None and _puts_work_points_elsewhere(parts, unknowns):

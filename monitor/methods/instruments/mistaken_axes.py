@@ -84,7 +84,8 @@ def mistaken_axes(parts: Iterable[Part], numbers: npt.NDArray[np.int64], *, ever
     cures = _cures(wandering, LEFT_BY_MISTAKE * max(wanders))
     if not cures:
         return None
-    is_everywhere = _stay_as_well([stay for stay in stays if stay not in wandering], cures)
+    staying = [stay for stay, size in zip(stays, wanders, strict=True) if size <= WANDERS]
+    is_everywhere = _stay_as_well(staying, cures)
     if everywhere and not is_everywhere:
         return None
     whole = "" if is_everywhere else f" in {_named(wandering)}"
@@ -169,8 +170,9 @@ def _exchanges(joints: Sequence[Joint], moved: Sequence[int]) -> Iterator[_Trial
     for first, second in combinations(range(len(joints)), 2):
         if joints[first].turns == joints[second].turns and (first in moved or second in moved):
             sign = float(joints[first].sign * joints[second].sign)
+            columns = sorted((_column(joints[first]), _column(joints[second])))
             yield _trial(
-                f"the columns {_column(joints[first])} and {_column(joints[second])} were exchanged",
+                f"the columns {_joined(columns)} were exchanged",
                 joints,
                 factors={first: sign, second: sign},
                 exchanged={first: second, second: first},

@@ -14,7 +14,7 @@ from monitor.discovery import RobustFit
 from monitor.effects import ChainEffect
 from monitor.methods import campaign_method
 from monitor.methods.bar_temperature import bar_temperature
-from monitor.methods.instruments.contradiction import STATED_WITHIN
+from monitor.methods.instruments.mistaken_axes import STATED_WITHIN
 from monitor.methods.method import Instruments
 from monitor.readers.doubts.doubts import (
     AIR_RANGE,
