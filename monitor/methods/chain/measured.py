@@ -273,7 +273,6 @@ class MeasuredChain(ABC):
         """Why the readings cannot come from this chain, in words; None where they may."""
         return None
 
-    @property
     def mistaken_axes(self) -> str | None:
         """The signs, columns or units of axes by which the readings belong to the chain, in words, where that can be
         said before a fit; None where they do as recorded, or nothing that is tried is enough."""

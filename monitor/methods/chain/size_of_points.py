@@ -69,7 +69,8 @@ def refuse_other_size(
     raise DataError(
         f"measured points and joint readings do not belong together row by row: in no frame and at no size do these "
         f"points come from this chain ({alone:.3g} mm are left as measured); check that each row of {columns} stands "
-        "beside the joint readings of its own pose, then the order, the signs and the directions of the axes"
+        "beside the joint readings of its own pose and that all of them are in mm, then the order, the signs and the "
+        "directions of the axes"
     )
 
 

@@ -72,11 +72,12 @@ def contradiction(
     numbers: npt.NDArray[np.int64],
     sigma: Array,
     vectors: Array,
-    travel: float,
+    targets: Array,
 ) -> str | None:
     """Why the readings are those of another machine, in words, None where they may be this one's; ``unknowns`` (R, q)
-    of the parts, ``numbers`` (R,) of the runs, ``sigma`` and ``vectors`` (n, d) after the fit, ``travel`` mm is how far
-    the machine moved. MistakenAxesError where a unit of the positions, a sign or exchanged columns explain it."""
+    of the parts, ``numbers`` (R,) of the runs, ``sigma`` and ``vectors`` (n, d) after the fit, ``targets`` (n, 3) mm
+    as the file puts them. MistakenAxesError where a unit of the positions, a sign or exchanged columns explain it."""
+    travel = float(np.linalg.norm(targets.std(axis=0)))
     wrong = _wrong_unit(parts)
     if wrong is None and _puts_work_points_elsewhere(parts, unknowns):
         wrong = mistaken_axes(parts, numbers, everywhere=True)

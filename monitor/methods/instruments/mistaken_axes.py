@@ -78,26 +78,34 @@ def mistaken_axes(parts: Iterable[Part], numbers: npt.NDArray[np.int64], *, ever
     stays = [stay for part in vectors for stay in _stays(part, numbers)]
     if not stays:
         return None
-    joints = stays[0].part.rows.chain.joints
-    as_recorded = _trial("", joints)
-    wanders = np.array([_wanders(stay.vectors(as_recorded)) for stay in stays])
+    as_recorded = _trial("", stays[0].part.rows.chain.joints)
+    wanders = [_wanders(stay.vectors(as_recorded)) for stay in stays]
     wandering = [stay for stay, size in zip(stays, wanders, strict=True) if size > WANDERS]
-    staying = [stay for stay, size in zip(stays, wanders, strict=True) if size <= WANDERS]
-    if not wandering:
-        return None
-    most = LEFT_BY_MISTAKE * float(wanders.max())
-    cures = _best([cure for trial in _trials(joints, wandering) if (cure := _tried(wandering, trial, most))])
+    cures = _cures(wandering, LEFT_BY_MISTAKE * max(wanders))
     if not cures:
         return None
-    is_everywhere = all(_wanders(stay.vectors(cure.trial)) <= WANDERS for cure in cures for stay in staying)
+    staying = [stay for stay, size in zip(stays, wanders, strict=True) if size <= WANDERS]
+    is_everywhere = _stay_as_well(staying, cures)
     if everywhere and not is_everywhere:
         return None
     whole = "" if is_everywhere else f" in {_named(wandering)}"
     what = " or ".join(cure.trial.what for cure in cures)
     return (
-        f"setup {wandering[0].part.id}: the tool point wanders by {wanders.max():.3g} mm about the work point, at "
+        f"setup {wandering[0].part.id}: the tool point wanders by {max(wanders):.3g} mm about the work point, at "
         f"which it should stay, and by {max(cure.wanders for cure in cures):.2g} mm if {what}{whole}"
     )
+
+
+def _cures(wandering: Sequence[_Stay], most: float) -> list[_Cure]:
+    """The mistakes that undone leave the tool point within ``most`` in all rows in which it wanders, as good as the
+    best."""
+    trials = _trials(wandering[0].part.rows.chain.joints, wandering) if wandering else ()
+    return _best([cure for trial in trials if (cure := _tried(wandering, trial, most))])
+
+
+def _stay_as_well(staying: Iterable[_Stay], cures: Sequence[_Cure]) -> bool:
+    """Whether the tool point stays with each of the mistakes undone where it stays as recorded."""
+    return all(_wanders(stay.vectors(cure.trial)) <= WANDERS for stay in staying for cure in cures)
 
 
 def _stays(part: Part, numbers: npt.NDArray[np.int64]) -> Iterator[_Stay]:
@@ -143,37 +151,41 @@ def _wanders(vectors: Array) -> float:
 
 def _trials(joints: Sequence[Joint], stays: Sequence[_Stay]) -> Iterator[_Trial]:
     """Every mistake that is tried of the axes that moved."""
-    moved = [
-        index
-        for index in range(len(joints))
-        if any(np.ptp(stay.part.rows.positions[:, index]) > 0.0 for stay in stays)
-    ]
+    positions = np.vstack([stay.part.rows.positions for stay in stays])
+    moved = [index for index in range(len(joints)) if np.ptp(positions[:, index]) > 0.0]
+    yield from _signs(joints, moved)
+    yield from _exchanges(joints, moved)
+    yield from _units(joints, moved)
+
+
+def _signs(joints: Sequence[Joint], moved: Sequence[int]) -> Iterator[_Trial]:
     for count in range(1, len(moved) + 1):
         for subset in combinations(moved, count):
-            signs = "signs" if count > 1 else "sign"
-            yield _trial(
-                f"the {signs} of {_joined([joints[index].name for index in subset])} were the other way round",
-                joints,
-                factors=dict.fromkeys(subset, -1.0),
-                size=count,
-            )
+            names = _joined([joints[index].name for index in subset])
+            what = f"the sign{'s' * (count > 1)} of {names} were the other way round"
+            yield _trial(what, joints, factors=dict.fromkeys(subset, -1.0), size=count)
+
+
+def _exchanges(joints: Sequence[Joint], moved: Sequence[int]) -> Iterator[_Trial]:
     for first, second in combinations(range(len(joints)), 2):
         if joints[first].turns == joints[second].turns and (first in moved or second in moved):
-            columns = f"{_column(joints[first])} and {_column(joints[second])}"
             sign = float(joints[first].sign * joints[second].sign)
+            columns = sorted((_column(joints[first]), _column(joints[second])))
             yield _trial(
-                f"the columns {columns} were exchanged",
+                f"the columns {_joined(columns)} were exchanged",
                 joints,
                 factors={first: sign, second: sign},
                 exchanged={first: second, second: first},
             )
+
+
+def _units(joints: Sequence[Joint], moved: Sequence[int]) -> Iterator[_Trial]:
     linear = [index for index in moved if not joints[index].turns]
+    columns = _joined(sorted(_column(joints[index]) for index in linear)) if linear else ""
+    verb = "were" if len(linear) > 1 else "was"
     for unit in mistaken_for_mm() if linear else ():
-        columns = _joined(sorted(_column(joints[index]) for index in linear))
-        verb = "were" if len(linear) > 1 else "was"
-        yield _trial(
-            f"{columns} {verb} {UNIT_WORDS[unit]}", joints, factors=dict.fromkeys(linear, unit.factor)
-        )
+        factors = dict.fromkeys(linear, unit.factor)
+        yield _trial(f"{columns} {verb} {UNIT_WORDS[unit]}", joints, factors=factors)
 
 
 def _trial(

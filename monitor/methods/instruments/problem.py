@@ -371,8 +371,7 @@ class InstrumentProblem(ChainProblem):
         for number, (index, u) in enumerate(self._priors):
             residual[:, number] = nuisance[:, index] / u
             by_own[:, number, index] = 1.0 / u
-        others = self.from_others
-        if others is not None:
+        if (others := self.from_others) is not None:
             columns = others.columns - len(self.base_names)
             residual[:, others.rows] = (nuisance[:, columns] - others.values) @ others.root.T
             by_own[:, others.rows] = 0.0
@@ -443,12 +442,9 @@ class InstrumentProblem(ChainProblem):
     def contradiction(self, solution: Solution) -> str | None:
         """Positions in another unit, directions and lengths that are off by more than any machine's errors."""
         vectors = self.vectors(solution.local, solution.common)
-        travel = float(np.linalg.norm(self.context.nominal.std(axis=0)))
-        first = len(self.base_names)
-        unknowns = [solution.local[:, first + columns] for columns in self.own_columns]
-        return contradiction(self.parts, unknowns, self.runs, self.sigma, vectors, travel)
+        unknowns = [solution.local[:, len(self.base_names) + columns] for columns in self.own_columns]
+        return contradiction(self.parts, unknowns, self.runs, self.sigma, vectors, self.context.nominal)
 
-    @property
     def mistaken_axes(self) -> str | None:
         """Signs, columns or units of axes with which the tool point stays at the work points of its vectors."""
         return mistaken_axes(self.parts, self.runs, everywhere=False)

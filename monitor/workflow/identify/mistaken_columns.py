@@ -98,7 +98,7 @@ def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:
 def _mistaken_axes(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> str | None:
     """What the positions say of signs, columns and units of the axes before any fit; None where nothing."""
     try:
-        return problem_of(campaign).mistaken_axes
+        return problem_of(campaign).mistaken_axes()
     except MonitorError:
         return None
 
