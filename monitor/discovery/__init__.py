@@ -19,7 +19,7 @@ from monitor.discovery.machine.mistakes.mistakes import (
 )
 from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
 from monitor.discovery.machine.mistakes.setup_mistakes import find_setup_mistakes, only_misread
-from monitor.discovery.machine.shapes.scale_steps import Between, nearest_readings
+from monitor.discovery.machine.shapes.step_places import Between, nearest_readings
 from monitor.discovery.machine.shapes.steps_of_model import steps_of_model
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict

@@ -9,6 +9,7 @@ from by_path import simulator
 from monitor.discovery import explain, fit, nearest_readings, steps_of_model
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
+from monitor.discovery.machine.shapes.step_places import places_of_steps
 from monitor.discovery.machine.shapes.steps_instead import steps_instead
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
@@ -36,7 +37,7 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
     campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=2)
     steps, (found,) = steps_beside_nothing(campaign, "EXX")
     shape = found.effect.shape
-    between = steps.between(shape, [])
+    between = places_of_steps(steps, shape, [])
     assert len(between) == len(places)
     for place, told, interval in zip(places, shape.readings, between, strict=True):
         assert interval.low < place < interval.high

@@ -17,7 +17,7 @@ from monitor.discovery.machine.separation.separate import Separation, separating
 from monitor.discovery.machine.shapes.curves import Curve, follows
 from monitor.discovery.machine.shapes.held_place import HeldPlace, held_place
 from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
-from monitor.discovery.machine.shapes.scale_steps import Between, steps_between
+from monitor.discovery.machine.shapes.step_places import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
 from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn, size_of, spread_or_length

@@ -57,29 +57,12 @@ NEAR_WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)
 LONGER_WAYS = (1.0, 1.41, 2.0, 2.83, 4.0)
 # Steps up and down that lie nearer than so many of their widths are a bump, which free shapes follow.
 WIDTHS_APART = 4.0
-# So many places about a step over a width, from the nearest positions outside of it and one width further, and so many
-# again among those where it may lie.
-PLACES_OVER_WIDTH = 97
 # Powers of the position that are tried together beside steps; at fewer positions than a free shape has hats the two
 # together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
 POSITIONS_OF_BENDS = 12
 # So many numbers of columns are remembered of an error, 32 MB.
 MOST_NUMBERS = 4_000_000
-
-
-@dataclass(frozen=True)
-class Between:
-    """The readings in mm between which a step lies, with the way ``width`` over which it goes."""
-
-    low: float
-    high: float
-    width: float = 0.0
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """From where to where in mm the middle of the step may lie."""
-        return self.low + self.width / 2.0, self.high - self.width / 2.0
 
 
 @dataclass(frozen=True)
@@ -116,54 +99,54 @@ class StepsOfError:
         return np.array([self._made[at_mm, width] for at_mm in places]).T
 
     @cached_property
-    def _readings(self) -> Array:
+    def readings(self) -> Array:
         """The readings (n,) of the axis in mm where they have weight, in rising order."""
         return np.sort(self._reading[self.scene.fit.has_weight.any(axis=1)])
 
     @cached_property
-    def _positions(self) -> Array:
+    def positions(self) -> Array:
         """The lowest and the highest reading (n, 2) in mm of each position at which the axis stood where readings have
         weight: one that is left out shows no level."""
-        reading = self._readings
+        reading = self.readings
         apart = np.flatnonzero(np.diff(reading) > SAME_POSITION)
         first, last = np.concatenate([[0], apart + 1]), np.concatenate([apart, [len(reading) - 1]])
         return np.column_stack([reading[first], reading[last]])
 
     @cached_property
-    def _gaps(self) -> Array:
+    def gaps(self) -> Array:
         """The lower and upper ends (g, 2) in mm of what lies between neighbouring positions, where a step may be."""
-        between = np.column_stack([self._positions[:-1, 1], self._positions[1:, 0]])
+        between = np.column_stack([self.positions[:-1, 1], self.positions[1:, 0]])
         between = between[POSITIONS_BEYOND - 1 : len(between) - POSITIONS_BEYOND + 1]
-        first, last = self._positions[0, 0], self._positions[-1, 1]
+        first, last = self.positions[0, 0], self.positions[-1, 1]
         wide = LEAST_REGION * (last - first)
         return np.asarray(between[(between[:, 1] > first + wide) & (between[:, 0] < last - wide)])
 
     @cached_property
-    def _middles(self) -> Array:
+    def middles(self) -> Array:
         """The middles (g,) of the gaps, in mm with two digits: gaps are wider than ``SAME_POSITION``."""
-        return np.asarray(np.round(self._gaps.mean(axis=1), 2))
+        return np.asarray(np.round(self.gaps.mean(axis=1), 2))
 
     @cached_property
     def _widths(self) -> list[float]:
         """The widths in mm that are tried; a way between two positions is a step at once."""
-        travel = float(self._positions[-1, 1] - self._positions[0, 0])
-        usual = float(np.median(np.diff(self._positions.mean(axis=1))))
+        travel = float(self.positions[-1, 1] - self.positions[0, 0])
+        usual = float(np.median(np.diff(self.positions.mean(axis=1))))
         widths = [float(f"{travel * part:.3g}") for part in WIDTHS if travel * part > usual]
         return [0.0, *(width for width in widths if np.diff(self._ends(width)) > 0.0)]
 
     def _ends(self, width: float) -> tuple[float, float]:
         """The first and the last place in mm of steps over a width: at the level beyond either stand positions enough,
         as beyond a step at once."""
-        at, half = self._positions.mean(axis=1), width / 2.0
+        at, half = self.positions.mean(axis=1), width / 2.0
         return float(at[POSITIONS_BEYOND - 1]) + half, float(at[-POSITIONS_BEYOND]) - half
 
     def _places(self, width: float) -> Array:
         """The places among which steps of a width are looked for first."""
         if width:
             return np.linspace(*self._ends(width), PLACES)
-        count = len(self._middles)
+        count = len(self.middles)
         return np.asarray(
-            self._middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
+            self.middles[np.unique(np.linspace(0, count - 1, min(count, PLACES)).astype(np.int64))]
         )
 
     def _near(self, at_mm: float, width: float) -> Array:
@@ -173,7 +156,7 @@ class StepsOfError:
             near = at_mm + np.linspace(-1.0, 1.0, NEAR_PLACES) * (first[1] - first[0])
             return np.asarray(np.round(near[(near >= first[0]) & (near <= first[-1])], 2))
         low, high = first[first < at_mm].max(initial=-np.inf), first[first > at_mm].min(initial=np.inf)
-        return np.asarray(self._middles[(self._middles > low) & (self._middles < high)])
+        return np.asarray(self.middles[(self.middles > low) & (self.middles < high)])
 
     @cached_property
     def _wholes(self) -> list[tuple[Array, float, ChainCandidate]]:
@@ -188,18 +171,18 @@ class StepsOfError:
         shape = Step(tuple(map(float, places)), width)
         effect = replace(self.effect, shape=shape, shape_text=shape.text)
         # Between two positions all places are one.
-        tries = comb(len(self._gaps), min(len(places), MOST_STEPS)) * len(self._widths)
+        tries = comb(len(self.gaps), min(len(places), MOST_STEPS)) * len(self._widths)
         variant = Variant(f"{self.effect.term.symbol}:step", effect, max(tries, 1))
         return scene_of(self.scene.fit, [variant]).candidates[0]
 
     def _least_region(self, width: float) -> float:
         """How far apart in mm steps over a width have to be."""
-        travel = float(self._positions[-1, 1] - self._positions[0, 0])
+        travel = float(self.positions[-1, 1] - self.positions[0, 0])
         return max(WIDTHS_APART * width, LEAST_REGION * travel)
 
     @cached_property
     def _middles_of_positions(self) -> Array:
-        return np.asarray(self._positions.mean(axis=1))
+        return np.asarray(self.positions.mean(axis=1))
 
     def _are_apart(self, places: Array | Sequence[float], width: float) -> npt.NDArray[np.bool_]:
         """Whether there are positions enough between neighbouring steps at places (..., k), at which both have come to
@@ -233,7 +216,7 @@ class StepsOfError:
         plays = weigh_beside(self.scene, self._of_shape(Reversal | WindUp), [*others, curve])
         with_play = [[plays[0].candidate]] if plays and plays[0].score > 0.0 else []
         powers = {each.family.partition(":")[2]: each for each in self._of_shape(Poly)}
-        able = BENDS if len(self._positions) >= POSITIONS_OF_BENDS else BENDS[:1]
+        able = BENDS if len(self.positions) >= POSITIONS_OF_BENDS else BENDS[:1]
         bends = [[powers[name] for name in names] for names in able if powers.keys() >= {*names}]
         return [[*play, *bend] for play, bend in product([[], *with_play], bends)]
 
@@ -241,7 +224,7 @@ class StepsOfError:
         """The error as the steps that say most beside others, one effect of up to three, and a play or powers of it
         beside them where that says more; none where it is among them in another shape than a cycle, where none is
         worth its price, or where they foretell no poses."""
-        if is_told(self.effect.term.symbol, others) or not len(self._gaps):
+        if is_told(self.effect.term.symbol, others) or not len(self.gaps):
             return []
         choices = [
             [*steps, *companions]
@@ -302,7 +285,7 @@ class StepsOfError:
         assert isinstance(effect.shape, Step)
         shape, freedom = effect.shape, self.scene.remainders.beside(others).degrees_of_freedom
         longer = [
-            float(self._left_with([at_mm], rest, shape.width, others, way)[0])
+            float(self.left_with([at_mm], rest, shape.width, others, way)[0])
             for index, at_mm in enumerate(shape.readings)
             for rest in [[*shape.readings[:index], *shape.readings[index + 1 :]]]
             for way in self._longer_ways(at_mm, shape.width)
@@ -311,7 +294,7 @@ class StepsOfError:
 
     def _longer_ways(self, at_mm: float, width: float) -> list[float]:
         """Ways in mm about a place that take at least two positions on either side off the levels of a step there."""
-        at = self._positions.mean(axis=1)
+        at = self.positions.mean(axis=1)
         after = int(np.clip(np.searchsorted(at, at_mm), 1, len(at) - 1))
         gap = at[after] - at[after - 1]
         around = at[min(after + 1, len(at) - 1)] - at[max(after - 2, 0)]
@@ -319,7 +302,7 @@ class StepsOfError:
 
     def _choice(self) -> float:
         """The logarithm of the number of places and widths."""
-        return float(np.log(len(self._gaps) * len(self._widths)))
+        return float(np.log(len(self.gaps) * len(self._widths)))
 
     def _price(self, count: int, others: Sequence[ChainCandidate]) -> float:
         """What so many steps and their choice take from the score."""
@@ -362,7 +345,7 @@ class StepsOfError:
                 self._are_apart(np.column_stack([np.tile(rest, (len(near), 1)), near]), width)
             ].tolist()
             if len(near) > 1:
-                remaining = self._left_with(near, rest, width, others)
+                remaining = self.left_with(near, rest, width, others)
                 # The middle of those that say the same: between two positions the readings are.
                 alike = np.flatnonzero(remaining <= remaining.min() * (1.0 + 1e-9))
                 best[index] = near[int(alike[len(alike) // 2])]
@@ -385,7 +368,7 @@ class StepsOfError:
             del worthy[least]
         return worthy
 
-    def _left_with(
+    def left_with(
         self,
         near: Sequence[float],
         rest: Sequence[float],
@@ -404,73 +387,6 @@ class StepsOfError:
         onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)
         return np.asarray(residual @ residual - onto**2)
 
-    def between(self, shape: Step, others: Sequence[ChainCandidate]) -> tuple[Between, ...]:
-        """The readings between which each step of a shape lies beside others: all at which it would not be 3.84 (twice
-        the logarithm of a likelihood ratio) less likely than where it says most.
-
-        A step at once lies in gaps between positions, in those next to it at least. Positions tell the place of one
-        over a width also where they are within it.
-        """
-        intervals = []
-        for index, at_mm in enumerate(shape.readings):
-            rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-            around = nearest_readings(self._readings, at_mm, shape.width)
-            if shape.width:
-                low, high = self._likely(at_mm, rest, shape.width, around, others)
-                intervals.append(Between(low - shape.width / 2.0, high + shape.width / 2.0, shape.width))
-                continue
-            excess = self._excess([*map(float, self._middles), at_mm], rest, shape.width, others)
-            ends = self._gaps[excess[:-1] < LIMIT]
-            intervals.append(
-                Between(float(ends.min(initial=around.low)), float(ends.max(initial=around.high)))
-            )
-        return tuple(intervals)
-
-    def _excess(
-        self, places: Sequence[float], rest: Sequence[float], width: float, others: Sequence[ChainCandidate]
-    ) -> Array:
-        """Twice the logarithm of the likelihood ratio (k,) of a step at each of some places to the best of them."""
-        freedom = self.scene.remainders.beside(others).degrees_of_freedom
-        remaining = self._left_with(places, rest, width, others)
-        return np.asarray(freedom * np.log(remaining / remaining.min()))
-
-    def _likely(
-        self,
-        at_mm: float,
-        rest: Sequence[float],
-        width: float,
-        around: Between,
-        others: Sequence[ChainCandidate],
-    ) -> tuple[float, float]:
-        """From where to where in mm the middle of a step over a width may lie; ``around`` are the nearest readings
-        outside of it."""
-        first, last = float(self._positions[0, 0]), float(self._positions[-1, 1])
-        low, high = max(around.low - width, first), min(around.high + width, last)
-        places = np.union1d([*np.linspace(low, high, PLACES_OVER_WIDTH), at_mm], self._middles)
-        for _ in range(2):
-            excess = self._excess(places.tolist(), rest, width, others)
-            able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
-            low, high = places[max(able[0] - 1, 0)], places[min(able[-1] + 1, len(places) - 1)]
-            within = float(places[able[0]]), float(places[able[-1]])
-            places = np.union1d(np.linspace(low, high, PLACES_OVER_WIDTH), [at_mm])
-        return within
-
-
-def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
-    """The nearest readings in mm before and after the width over which a step at a place goes; the end of the width
-    where none was ``measured``. A step at a position itself has those of its neighbours: half of it is there."""
-    begin, end = at_mm - width / 2.0, at_mm + width / 2.0
-    if not width:
-        measured = np.sort(measured)
-        first = np.flatnonzero(np.diff(measured, prepend=-np.inf) > SAME_POSITION)
-        for position in np.split(measured, first[1:]):
-            if position[0] <= at_mm <= position[-1] and np.ptp(position) < 2.0 * SAME_POSITION:
-                measured = measured[(measured < position[0]) | (measured > position[-1])]
-    below, above = measured[measured <= begin], measured[measured >= end]
-    low = float(below.max()) if below.size else begin
-    high = float(above.min()) if above.size else end
-    return Between(low, high, width)
-
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
     """The steps of the error of which a candidate is a shape; None where it turns or is none of an axis."""
@@ -478,12 +394,3 @@ def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
     if not isinstance(effect, ChainEffect) or effect.joint.turns:
         return None
     return StepsOfError(scene, effect)
-
-
-def steps_between(
-    scene: ChainScene, candidate: ChainCandidate, others: Sequence[ChainCandidate]
-) -> tuple[Between, ...]:
-    """The readings between which each step of an effect lies beside others; none where it has none."""
-    steps = steps_of(scene, candidate)
-    shape = None if steps is None else steps.effect.shape
-    return steps.between(shape, others) if steps is not None and isinstance(shape, Step) else ()

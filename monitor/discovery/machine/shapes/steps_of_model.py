@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.shapes.scale_steps import Between, nearest_readings, steps_between
+from monitor.discovery.machine.shapes.step_places import Between, nearest_readings, steps_between
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
