@@ -25,15 +25,16 @@ Scanned = Callable[[ChainScene, Sequence[ChainCandidate]], ChainScan]
 def with_those_beside_steps(
     scene: ChainScene, result: ChainScan, scanned: Scanned
 ) -> tuple[ChainScene, ChainScan]:
-    """The findings with what a scan finds beside the steps among them, and the steps where they say most beside it."""
+    """The findings with the steps among them where they say most beside the others, and with what a scan finds beside
+    them."""
     for _ in range(MOST_TURNS):
-        selected = result.candidates
-        if not any(map(has_steps, selected)):
+        if not any(map(has_steps, result.candidates)):
             break
-        further = scanned(scene, selected)
-        if {each.family for each in further.candidates} <= {each.family for each in selected}:
+        scene, result = _with_steps_anew(scene, result)
+        further = scanned(scene, result.candidates)
+        if {each.family for each in further.candidates} <= {each.family for each in result.candidates}:
             break
-        scene, result = _with_steps_anew(scene, further)
+        result = further
     return scene, result
 
 

@@ -268,14 +268,15 @@ class StepsOfError:
     def _are_sharp(
         self, steps: ChainCandidate, companions: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
     ) -> bool:
-        """Whether the steps beside companions say more than with a longer way in place of any of them, at a price for
-        every place, width and companion but the first: together these follow any smooth curve about as well as a free
-        shape does."""
+        """Whether no longer way in place of any of the steps, beside companions, is likelier: of one step alone beyond
+        doubt. Several places, a width and companions together follow any smooth curve about as well as a free shape
+        does: of them a longer way has to be less likely, at a price for all of them but the first."""
         effect = steps.effect
         assert isinstance(effect, ChainEffect)
         assert isinstance(effect.shape, Step)
         count = len(effect.shape.readings) + (effect.shape.width > 0.0) + len(companions)
-        return self.sharpness(steps, [*others, *companions]) > (count - 1) * LIMIT
+        least = (count - 1) * LIMIT if count > 1 else -LIMIT
+        return self.sharpness(steps, [*others, *companions]) > least
 
     def sharpness(self, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
         """By how much, in twice the logarithm of a likelihood ratio, steps say more beside others than with a longer
