@@ -144,8 +144,8 @@ class WorkPointsElsewhere(Sentence):
             ]
         )
         return (
-            f"The work points come out elsewhere than work_point_mm says: that of {points}: check the signs, units and "
-            "columns of the axes, and the points in campaign.toml, before any number"
+            f"The work points come out elsewhere than work_point_mm says, that of {points}. Check the signs, units and "
+            "columns of the axes, and the points in campaign.toml, before you use any number."
         )
 
 

@@ -16,6 +16,7 @@ import pypdf
 import pytest
 
 from monitor.cli import main
+from monitor.documents import from_document, to_document
 from monitor.exceptions import DataError, InputError, RefusedResultError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
@@ -440,7 +441,10 @@ def test_a_work_point_that_the_readings_put_elsewhere() -> None:
             explain(db, ExplainRequest("r-test")).explanation,
         )
     for answer in answers:
-        said = f"that of setup r-test by {ground.size:.3g} mm: check the signs, units and columns of the axes"
+        # Stored answers and those of a server are read back, with the sentence as text.
+        said_again = from_document(type(answer), to_document(answer)).work_points_elsewhere
+        assert str(said_again) == str(answer.work_points_elsewhere)
+        said = f"that of setup r-test by {ground.size:.3g} mm. Check the signs, units and columns of the axes"
         assert said in str(answer.work_points_elsewhere)
     _, comparison, explanation = answers
     assert comparison.comparison.verdict == explanation.comparison.verdict == "something is missing"

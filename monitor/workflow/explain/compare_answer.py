@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from monitor.documents import INLINED, OMITTED
+from monitor.documents import INLINED, OMITTED, Said
 from monitor.records import Verdict
-from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise, LikelyMistake
 from monitor.workflow.instruments.answer import AgainstOthers, Disagreement, RunsWithTime
@@ -155,5 +154,5 @@ class CompareAnswer:
     likely_mistakes: tuple[LikelyMistake, ...] | None = field(default=None, metadata=OMITTED)
     run_with_time: tuple[RunsWithTime, ...] | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
-    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

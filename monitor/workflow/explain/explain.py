@@ -129,7 +129,7 @@ def explained(
     is_explained = comparison.verdict is Verdict.EXPLAINED
     final = explanation.final
     displaced = elsewhere_under(final.problem, final.solution)
-    if (beside is not None or displaced is not None) and is_explained:
+    if beside is not None and is_explained:
         # As `compare` judges: the residual of many rows hides what one setup of few says against all others.
         comparison = replace(comparison, verdict=Verdict.SOMETHING_IS_MISSING)
         explanation = replace(explanation, comparison=comparison)
@@ -144,7 +144,14 @@ def explained(
     if beside is not None and (is_explained or len(beside.suspects) == 1):
         answer = replace(answer, against_others=beside)
     if displaced is not None:
-        answer = replace(answer, work_points_elsewhere=displaced, answer=f"{displaced}. {answer.answer}")
+        # That the readings fit with the points there is no machine explained, though no effect is missing.
+        unexplained = replace(answer.comparison, verdict=Verdict.SOMETHING_IS_MISSING)
+        answer = replace(
+            answer,
+            comparison=unexplained,
+            work_points_elsewhere=displaced,
+            answer=f"{displaced} With them there: {answer.answer[0].lower()}{answer.answer[1:]}",
+        )
     return answer
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import INLINED, OMITTED, named
+from monitor.documents import INLINED, OMITTED, Said, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.reporting.run_left_out import RunLeftOut
-from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
@@ -336,7 +335,7 @@ class MachineExplanation:
     unlike_runs: tuple[UnlikeRun, ...] = ()
     added_together: tuple[str, ...] = ()
     against_others: AgainstOthers | None = field(default=None, metadata=OMITTED)
-    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
     rate: float | None = field(default=None, metadata=OMITTED)
     runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
 

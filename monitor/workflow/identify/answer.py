@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import INLINED, OMITTED
+from monitor.documents import INLINED, OMITTED, Said
 from monitor.effects.shapes import REVERSAL_VALUE, has_reversal_value
 from monitor.methods.chain.identification import AsStated, TakenUp
 from monitor.records import FrameOfReference
 from monitor.reporting.refused import RefusedParameters
-from monitor.reporting.run_notes import WorkPointsElsewhere
 from monitor.workflow.plan.test_answer import TestAnswer
 
 
@@ -151,7 +150,7 @@ class IdentifyAnswer:
     file_doubts: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     not_seen: tuple[RefusedParameters, ...] | None = field(default=None, metadata=OMITTED)
     seen_by: Mapping[str, TestAnswer] | None = field(default=None, metadata=OMITTED)
-    work_points_elsewhere: WorkPointsElsewhere | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
