@@ -2,7 +2,7 @@
 
 Whether so long a wave repeats nobody has seen. It is told where it alone is its error: where it says as much at the
 price of its pitch as a free shape or several powers, and no shape says more beside it. A cycle whose best pitch is the
-longest that was sought is none, whatever it says: of longer ones it would say more.
+longest that was sought is none where a longer one would say more.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from monitor.discovery.machine.shapes.free_parts import (
     priced,
     whole_basis,
 )
-from monitor.discovery.machine.shapes.refine import AT_END, NAMED_TO, refine
+from monitor.discovery.machine.shapes.refine import AT_END, LIMIT, NAMED_TO, refine
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle
 from monitor.discovery.machine.shapes.slight_shapes import p_value_of_all
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -50,6 +50,8 @@ FEWEST_POSITIONS = 8
 LEVEL = 0.01
 # A pitch within this part of half of the travel is the end of its range, to the tolerance of the search.
 AT_HALF = 2e-3
+# From where longer pitches are tried, in halves of the travel.
+JUST_LONGER = 1.02
 
 
 def long_wave(
@@ -151,11 +153,27 @@ def without_longest(scene: ChainScene, result: ChainScan) -> tuple[ChainScene, C
 
 
 def is_clipped(scene: ChainScene, cycle: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
-    """Whether a candidate is a cycle whose pitch was sought and is best, beside others, at half of the travel."""
+    """Whether a candidate is a cycle whose pitch was sought and is best, beside others, at half of the travel, where a
+    longer one says more."""
     effect = cycle.effect
     if cycle.variant.tries == 1 or not is_cycle(cycle) or not isinstance(effect, ChainEffect):
         return False
     if not isinstance(effect.driver, Always) or effect.term.stage != MOTION:
         return False
-    longest = longest_pitch(pitch_limits(scene.fit.problem.context)[effect.joint.name][1])
-    return abs(_pitch(refine(scene, [*others, cycle], len(others)).candidate) / longest - 1.0) < AT_HALF
+    context = scene.fit.problem.context
+    travel = pitch_limits(context)[effect.joint.name][1]
+    longest = longest_pitch(travel)
+    best = refine(scene, [*others, cycle], len(others)).candidate
+    if abs(_pitch(best) / longest - 1.0) > AT_HALF:
+        return False
+    text = f"{error_of(cycle)}:cyclic{JUST_LONGER * longest:.6g}mm"
+    longer = scene_of(
+        scene.fit, [replace(cycle.variant, effect=parse_effect(text, context.chain))]
+    ).candidates
+    if not longer[0].visible:
+        return True
+    long = refine(scene, [*others, longer[0]], len(others)).candidate
+    if is_at_longest(long, travel / BEND_PERIODS):
+        return True
+    (of_long,), (of_best,) = (weigh_beside(scene, [each], others) for each in (long, best))
+    return of_long.likelihood - of_best.likelihood > LIMIT
