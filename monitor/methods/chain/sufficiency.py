@@ -35,7 +35,7 @@ def refuse_exact_fits(problem: ChainProblem, solution: Solution) -> None:
         int(np.isfinite(problem.sigma[problem.context.run == run]).sum()) + calibrated for run in problem.runs
     ]
     exact = {
-        int(run): of_run
+        int(run): of_run - calibrated
         for run, of_run, rank in zip(problem.runs, numbers, solution.rank, strict=True)
         if of_run <= rank
     }
