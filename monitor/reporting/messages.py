@@ -331,11 +331,18 @@ def limits_of_others(machine_type: str, limits: Sequence[str], hint: str) -> str
     )
 
 
-def not_identified_by_model(machine: str, campaigns: Sequence[str]) -> str:
-    """Return which campaigns a trend leaves out, and how to have them."""
+def not_identified_by_model(machine: str, campaigns: Sequence[str], refused: Mapping[str, str]) -> str:
+    """Return which campaigns a trend leaves out, and how to have them; of those ``refused``, why `identify` refuses."""
+    open_ones = [campaign for campaign in campaigns if campaign not in refused]
+    ways = [f"type `monitor identify {open_ones[0]}`"] if open_ones else []
+    ways += [
+        f"`identify` refuses {'it' if len(campaigns) == 1 else campaign}: {refused[campaign]}"
+        for campaign in campaigns
+        if campaign in refused
+    ]
     return (
-        f"not identified by the model that {machine} is followed by, and left out: {', '.join(campaigns)}; type "
-        f"`monitor identify {campaigns[0]}`"
+        f"not identified by the model that {machine} is followed by, and left out: {', '.join(campaigns)}; "
+        f"{'; '.join(ways)}"
     )
 
 

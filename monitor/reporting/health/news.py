@@ -218,7 +218,7 @@ class NextCheck(Sentence):
 
 _CHECKS: Mapping[CheckKind, str] = {
     CheckKind.ALARM: "now",
-    CheckKind.NOT_EVALUATED: "now: the last run could not be evaluated",
+    CheckKind.NOT_EVALUATED: "now: what was measured last could not be evaluated",
     CheckKind.NO_RUN_THIS_WEEK: "now: no run this week",
     CheckKind.NO_RUN_YET: "now: no run yet",
     CheckKind.FIRST_RUN: "its first run",

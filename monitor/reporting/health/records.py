@@ -48,7 +48,7 @@ STATES: dict[State, str] = {
     State.OUT_OF_TOLERANCE: "a parameter or the volumetric error is more likely beyond its tolerance than within it",
     State.MAY_BE_OUT_OF_TOLERANCE: "the probability that a parameter or the volumetric error is beyond its tolerance "
     "exceeds the stated limit",
-    State.NOT_EVALUATED: "measured, but its last run could not be evaluated: nothing is known of its tolerances",
+    State.NOT_EVALUATED: "what was measured last could not be evaluated: nothing is known of its tolerances",
     State.CHANGED: "a parameter or an artefact changed this week",
     State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing",
     State.DRIFTS: "a parameter without a tolerance drifts, or follows a season that the history is too short to "

@@ -51,20 +51,26 @@ class RunNamed(Sentence):
 
 @dataclass(frozen=True)
 class RunsNamed(Sentence):
-    """The ``count`` runs of a campaign that were compared, first and last; ``later`` ones began after the week."""
+    """The ``count`` runs of a campaign that were compared, first and last; ``later`` ones began after the week, and the
+    numbers ``left_out`` are of runs that were broken off, say."""
 
     campaign: str
     count: int
     later: int
     first: datetime
     last: datetime
+    left_out: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         first, last = f"{self.first:%Y-%m-%d}", f"{self.last:%Y-%m-%d}"
         days = first if first == last else f"{first} to {last}"
-        if self.later:
-            every = self.count + self.later
-            return f"{self.count} of {every} runs of {self.campaign}, {days}; the others began after the week"
+        if self.later or self.left_out:
+            every = self.count + self.later + len(self.left_out)
+            numbers = ", ".join(map(str, self.left_out))
+            which = "run" if len(self.left_out) == 1 else "runs"
+            without = f", without {which} {numbers}" if self.left_out else ""
+            others = "; the others began after the week" if self.later else ""
+            return f"{self.count} of {every} runs of {self.campaign}{without}, {days}{others}"
         return f"{'the one run' if self.count == 1 else f'all {self.count} runs'} of {self.campaign}, {days}"
 
 

@@ -21,7 +21,7 @@ from monitor.reporting.health.records import (
     ParameterHealth,
     RefusedImport,
 )
-from monitor.reporting.health.sentences import BadPoint, ScatteringBall
+from monitor.reporting.health.sentences import BadPoint, ScatteringBall, StepFailed
 from monitor.reporting.health.settling import ParameterSettled
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
@@ -188,7 +188,8 @@ def data_quality(
     refused_imports: tuple[RefusedImport, ...],
     remarks: Sequence[Said],
 ) -> DataQuality:
-    """What the data of the week's ``runs`` are worth; without a result, what depends on it is empty."""
+    """What the data of the week's ``runs`` are worth; without a result, what depends on it is empty. The remarks begin
+    with what was refused: the first of them says why a machine is not evaluated."""
     campaigns = sorted({run.campaign for run in runs})
     counts = {name: probing_counts(db, name) for name in campaigns}
     noticed = [note for name in campaigns for note in campaign_notes(db, name)]
@@ -203,6 +204,6 @@ def data_quality(
         if stated is None
         else tuple((", ".join(group.parameters), group.why) for group in stated.refused),
         blind_spots=() if explanation is None else explanation.blind_spots,
-        remarks=(*noticed, *remarks),
+        remarks=tuple(sorted((*noticed, *remarks), key=lambda said: not isinstance(said, StepFailed))),
         refused_imports=refused_imports,
     )

@@ -30,9 +30,17 @@ def model_health(
     if explanation is None:
         return None
     comparison = explanation.comparison
+    left_out = tuple(each.run for each in explanation.runs_left_out or ())
     return ModelHealth(
         campaign=comparison.campaign,
-        runs=RunsNamed(comparison.campaign, span.count, span.later, span.first, span.last),
+        runs=RunsNamed(
+            comparison.campaign,
+            span.count - len(left_out),
+            span.later,
+            span.first,
+            span.last,
+            left_out,
+        ),
         model=comparison.model,
         verdict=comparison.verdict.value,
         answer=explanation.answer,

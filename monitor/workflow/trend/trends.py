@@ -66,7 +66,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     Raises NotFoundError for a machine or parameter that is not there, InputError for dates that cannot be.
     """
     request = request.at_machine(db)
-    history = _history(db, request)
+    history, refused = _history(db, request)
     events = machine_events(db, request.machine)
     # Read before anything is computed: the file is let go of when nothing was asked for a moment.
     refers_to = parameter_frames(db, request.machine, history.parameters)
@@ -75,7 +75,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     if is_stored and not db.is_lake:
         latest = latest_text(db, "trend", method=WHOLE, machine=request.machine)
     past = machine_past(history, splitting_events(events)) if len(history.run) else {}
-    answer = _answer(db, request, history, events, past, refers_to)
+    answer = _answer(db, request, history, events, past, refers_to, refused)
     if past and is_stored:
         save_analysis(
             db, "trend", to_document(answer), method=WHOLE, machine=request.machine, seed=SEED, repeated=False,
@@ -93,10 +93,10 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
     return replace(answer, figures=trend_figures(answer, past, request.figures))
 
 
-def _history(db: Database, request: TrendRequest) -> MachineHistory:
+def _history(db: Database, request: TrendRequest) -> tuple[MachineHistory, dict[str, str]]:
     """The history of a machine, of all parameters: what one of them changed by is told with what all of them show, and
     with the same probability, whoever asks for it alone. Campaigns not yet identified are identified first where the
-    database may be written.
+    database may be written; with what `identify` says of those that it refuses, by name.
 
     While none is identified by the newest version of a method's own model, that of the newest which one is.
     """
@@ -115,6 +115,7 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
 
     by = followed_by(db, machine)
     history, is_new = read(by), False
+    refused: dict[str, str] = {}
     if not db.read_only and history.unidentified:
         # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
         from monitor.workflow.identify.identify import identify
@@ -124,9 +125,9 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
             try:
                 identify(db, IdentifyRequest(campaign, request.model))
                 is_new = True
-            except DataError:
+            except DataError as refusal:
                 # A campaign that cannot be identified does not keep the others from being followed.
-                continue
+                refused[campaign] = str(refusal)
     numbered = numbered_by(db, machine)
     if is_new or numbered != by:
         history = read(numbered)
@@ -137,7 +138,7 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
         raise NotFoundError(
             f"machine {machine} has no parameter {request.parameter!r}; {hint}it has {', '.join(every) or 'none yet'}"
         )
-    return history
+    return history, refused
 
 
 def _answer(
@@ -147,6 +148,7 @@ def _answer(
     events: list[MachineEvent],
     every: Mapping[str, ParameterPast],
     refers_to: Mapping[str, str],
+    refused: Mapping[str, str],
 ) -> TrendAnswer:
     """The answer from the history and the past of all parameters, about those that were asked for."""
     asked = request.parameter
@@ -167,7 +169,7 @@ def _answer(
         notes=(
             *map(str, same_hours(history)),
             *_simulated(db, history),
-            *_not_followed(history),
+            *_not_followed(history, refused),
             *_of_older_version(db, request),
             *_limits_of_type(db, history, past if request.parameter is None else None),
             *_refuted(refuted),
@@ -253,11 +255,11 @@ def _calibrations(history: MachineHistory) -> Iterator[str]:
         )
 
 
-def _not_followed(history: MachineHistory) -> list[str]:
+def _not_followed(history: MachineHistory, refused: Mapping[str, str]) -> list[str]:
     """What is lacking, because it is not identified under the model that the machine is followed by."""
     if not history.unidentified:
         return []
-    return [messages.not_identified_by_model(history.machine, history.unidentified)]
+    return [messages.not_identified_by_model(history.machine, history.unidentified, refused)]
 
 
 def _of_older_version(db: Database, request: TrendRequest) -> list[str]:

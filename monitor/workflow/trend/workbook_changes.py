@@ -86,4 +86,4 @@ def _why_none(past: dict[str, ParameterPast]) -> str:
 
 
 def _not_identified(history: MachineHistory) -> str:
-    return messages.not_identified_by_model(history.machine, history.unidentified)
+    return messages.not_identified_by_model(history.machine, history.unidentified, {})
