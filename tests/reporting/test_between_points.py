@@ -71,11 +71,11 @@ def test_a_certificate_and_its_digital_form_say_where_a_step_may_lie(
 
 
 OVER = {
-    "en": "EXX:step(12), a step of 6.2 µm over 20 mm, has its middle somewhere between 18.8 mm and 29.6 mm of X, as "
-    "far as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a "
+    "en": "EXX:step(12), a step of 6.2 µm over some 20 mm, has its middle somewhere between 18.8 mm and 29.6 mm of X, "
+    "as far as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a "
     "workpiece's zero is set between; no U contains that.",
-    "de": "EXX:step(12), eine Stufe von 6,2 µm über 20 mm, hat ihre Mitte irgendwo zwischen 18,8 mm und 29,6 mm von X, "
-    "soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und alle "
+    "de": "EXX:step(12), eine Stufe von 6,2 µm über etwa 20 mm, hat ihre Mitte irgendwo zwischen 18,8 mm und 29,6 mm "
+    "von X, soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und alle "
     "Punkte, wenn der Nullpunkt eines Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
 }
 
@@ -85,12 +85,13 @@ def test_of_a_step_over_a_width_it_is_said_where_its_middle_may_lie(
     make_record: Callable[..., CertificateRecord], language: str
 ) -> None:
     (plain,) = make_record(language=language, maps=1).volumetric
-    over = replace(STEP, width_mm=20.0)
+    over = replace(STEP, width_mm=20.0, middle_mm=(18.78, 29.58), error=3.3)
     printed = printed_map(replace(plain, step_places=(over,)), texts_of(language)).explained
     assert printed.endswith(OVER[language])
-    assert "over 20 mm, has its middle somewhere between 18.78 and 29.58 mm of X" in str(over)
-    # What is known no better than the width may be off by the whole step.
-    assert replace(STEP, width_mm=4.0).error == STEP.size
+    assert "over some 20 mm, has its middle somewhere between 18.78 and 29.58 mm of X" in str(over)
+    # Of what is known to the readings around it alone points may err by the whole step.
+    alone = replace(STEP, width_mm=4.0)
+    assert (alone.most, alone.middle) == (STEP.size, (STEP.low_mm, STEP.high_mm))
 
 
 @pytest.mark.parametrize("language", ["en", "de"])

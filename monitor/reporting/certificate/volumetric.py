@@ -101,7 +101,7 @@ def _place_of(step: StepPlace, texts: Texts) -> str:
     """Where a step may lie, and what follows."""
     over = "_over" if step.width_mm else ""
     between = "_zero_between" if step.zero_between else ""
-    first, last = step.middle_mm
+    first, last = step.middle
     return texts(
         f"page.map_step{over}{between}",
         parameter=step.parameter,
@@ -112,7 +112,7 @@ def _place_of(step: StepPlace, texts: Texts) -> str:
         last=_tenths(last, texts),
         low=_tenths(step.low_mm, texts),
         high=_tenths(step.high_mm, texts),
-        error=_tenths(step.error, texts),
+        error=_tenths(step.most, texts),
         axis=step.axis,
     )
 

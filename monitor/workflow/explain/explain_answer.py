@@ -63,14 +63,15 @@ class CurvePoint:
 @dataclass(frozen=True)
 class StepBetween:
     """A step of an error: its ``value`` towards higher readings with its standard uncertainty, and the readings of the
-    axis between which it lies; no data say where between them. ``width_mm`` is the way over which it goes, None for a
-    step at once: its middle lies half of that within."""
+    axis between which it lies; no data say where between them. ``width_mm`` is the way over which it goes where it
+    says most, None for a step at once: its middle lies within ``middle_mm``."""
 
     value: float
     u: float
     low_mm: float
     high_mm: float
     width_mm: float | None = field(default=None, metadata=OMITTED)
+    middle_mm: tuple[float, float] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

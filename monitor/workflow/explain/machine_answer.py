@@ -185,7 +185,14 @@ def _steps_between(effect: ChainMissing) -> tuple[StepBetween, ...] | None:
     sizes = coefficients(effect).values()
     return (
         tuple(
-            StepBetween(size.value, size.u, between.low, between.high, between.width or None)
+            StepBetween(
+                size.value,
+                size.u,
+                between.low,
+                between.high,
+                between.width or None,
+                between.middle if between.width else None,
+            )
             for size, between in zip(sizes, effect.steps, strict=False)
         )
         or None

@@ -79,6 +79,8 @@ def step_places(mapped: VolumetricMap) -> tuple[StepPlace, ...]:
                         unit=unit.name,
                         zero_between=zero is not None and low < zero < high,
                         width_mm=between.width or None,
+                        middle_mm=between.middle if between.width else None,
+                        error=unit.to_display(size * between.part) if between.width else None,
                     )
                 )
     return tuple(places)

@@ -388,6 +388,35 @@ class StepsOfError:
         onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)
         return np.asarray(residual @ residual - onto**2)
 
+    def left_with_ways(
+        self,
+        begins: Array,
+        ends: Array,
+        rest: Sequence[float],
+        width: float,
+        others: Sequence[ChainCandidate],
+    ) -> Array:
+        """What is left (b, e) of the residual with a step that begins and ends at each of some readings, beside steps
+        over a width at ``rest`` and others; infinite where the end is not behind the beginning.
+
+        An even way is the difference of two kinks, so that the data have to see the kinks alone.
+        """
+        basis, residual = self._beside(rest, width, others)
+        kinks, where = np.unique(np.concatenate([begins, ends]), return_inverse=True)
+        bent = np.abs(self._reading[:, None] - kinks) / 2.0
+        seen = columns_of(self.scene.fit, [ChainBasis(self.effect.term, kink[:, None]) for kink in bent.T])
+        columns = without(
+            self.scene.remainders.beside(others).basis, np.array([kink.columns[0] for kink in seen]).T
+        )
+        columns = without(basis, columns)
+        begin, end = where[: len(begins)], where[len(begins) :]
+        products, onto = columns.T @ columns, columns.T @ residual
+        squares = np.diag(products)
+        squared = squares[begin][:, None] + squares[end] - 2.0 * products[np.ix_(begin, end)]
+        is_way = (ends > begins[:, None]) & (squared > 0.0)
+        explained = (onto[begin][:, None] - onto[end]) ** 2 / np.where(is_way, squared, 1.0)
+        return np.where(is_way, residual @ residual - explained, np.inf)
+
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
     """The steps of the error of which a candidate is a shape; None where it turns or is none of an axis."""

@@ -9,28 +9,35 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.refine import LIMIT
-from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
+from monitor.discovery.machine.shapes.scale_steps import POSITIONS_BEYOND, StepsOfError, steps_of
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.effects.shapes import Step
 from monitor.records import Array
 
-# So many places about a step over a width, from the nearest positions outside of it and one width further, and so many
-# again among those where it may lie.
-PLACES_OVER_WIDTH = 97
+# So many readings each at which a step over a width may begin and end are tried, then so many again among those that
+# are likely; from end to end it goes over so many times the width that was told at most.
+ENDS_OVER_WIDTH = 65
+MOST_WIDTHS = 4.0
 
 
 @dataclass(frozen=True)
 class Between:
-    """The readings in mm between which a step lies, with the way ``width`` over which it goes."""
+    """The readings in mm between which a step lies with all of its way, which is ``width`` long where it says most.
+
+    ``middles`` are those between which its middle may lie, None where nothing but the readings is known. Points between
+    may err by ``part`` of its size.
+    """
 
     low: float
     high: float
     width: float = 0.0
+    middles: tuple[float, float] | None = None
+    part: float = 1.0
 
     @property
     def middle(self) -> tuple[float, float]:
         """From where to where in mm the middle of the step may lie."""
-        return self.low + self.width / 2.0, self.high - self.width / 2.0
+        return self.middles or (self.low, self.high)
 
 
 def steps_between(
@@ -48,16 +55,15 @@ def places_of_steps(
     """The readings between which each step of a shape lies beside others: all at which it would not be 3.84 (twice
     the logarithm of a likelihood ratio) less likely than where it says most.
 
-    A step at once lies in gaps between positions, in those next to it at least. Positions tell the place of one
-    over a width also where they are within it.
+    A step at once lies in gaps between positions, in those next to it at least. Of one over a width any reading may be
+    where it begins and where it ends: positions within the width tell both, and the width is known no better.
     """
     intervals = []
     for index, at_mm in enumerate(shape.readings):
         rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
         around = nearest_readings(steps.readings, at_mm, shape.width)
         if shape.width:
-            low, high = _likely(steps, at_mm, rest, shape.width, around, others)
-            intervals.append(Between(low - shape.width / 2.0, high + shape.width / 2.0, shape.width))
+            intervals.append(_over_any_width(steps, at_mm, rest, around, others))
             continue
         excess = _excess(steps, [*map(float, steps.middles), at_mm], rest, shape.width, others)
         ends = steps.gaps[excess[:-1] < LIMIT]
@@ -78,26 +84,58 @@ def _excess(
     return np.asarray(freedom * np.log(remaining / remaining.min()))
 
 
-def _likely(
+def _over_any_width(
     steps: StepsOfError,
     at_mm: float,
     rest: Sequence[float],
-    width: float,
     around: Between,
     others: Sequence[ChainCandidate],
-) -> tuple[float, float]:
-    """From where to where in mm the middle of a step over a width may lie; ``around`` are the nearest readings
-    outside of it."""
-    first, last = float(steps.positions[0, 0]), float(steps.positions[-1, 1])
-    low, high = max(around.low - width, first), min(around.high + width, last)
-    places = np.union1d([*np.linspace(low, high, PLACES_OVER_WIDTH), at_mm], steps.middles)
+) -> Between:
+    """Where a step over a width may begin and end; ``around`` are the nearest readings outside of the told one."""
+    width = around.width
+    told = at_mm - width / 2.0, at_mm + width / 2.0
+    reach = (MOST_WIDTHS - 1.0) * width
+    # At the level beyond either end stand positions enough, and no end is among those of its neighbours.
+    levels = steps.positions.mean(axis=1)[[POSITIONS_BEYOND - 1, -POSITIONS_BEYOND]]
+    before = [place + width / 2.0 for place in rest if place < at_mm]
+    after = [place - width / 2.0 for place in rest if place > at_mm]
+    low = min(max(around.low - reach, levels[0], *before), told[0])
+    high = max(min(around.high + reach, levels[1], *after), told[1])
+    begins = ends = np.linspace(low, high, ENDS_OVER_WIDTH)
+    freedom = steps.scene.remainders.beside(others).degrees_of_freedom
     for _ in range(2):
-        excess = _excess(steps, places.tolist(), rest, width, others)
-        able = np.flatnonzero((excess < LIMIT) | (places == at_mm))
-        low, high = places[max(able[0] - 1, 0)], places[min(able[-1] + 1, len(places) - 1)]
-        within = float(places[able[0]]), float(places[able[-1]])
-        places = np.union1d(np.linspace(low, high, PLACES_OVER_WIDTH), [at_mm])
-    return within
+        begins, ends = np.union1d(begins, told[0]), np.union1d(ends, told[1])
+        remaining = steps.left_with_ways(begins, ends, rest, width, others)
+        way = ends - begins[:, None]
+        remaining[way > MOST_WIDTHS * width] = np.inf
+        able = freedom * np.log(remaining / remaining.min()) < LIMIT
+        able[begins == told[0], ends == told[1]] = True
+        begin, end = np.nonzero(able)
+        likely = begins[begin], ends[end]
+        begins, ends = _about(begins, begin), _about(ends, end)
+    middles = np.mean(likely, axis=0)
+    return Between(
+        float(min(likely[0].min(), around.low)),
+        float(max(likely[1].max(), around.high)),
+        width,
+        (float(middles.min()), float(middles.max())),
+        _apart(likely, told),
+    )
+
+
+def _about(readings: Array, able: Array) -> Array:
+    """Readings from the neighbour before the first of some to that after the last."""
+    low, high = max(int(able.min()) - 1, 0), min(int(able.max()) + 1, len(readings) - 1)
+    return np.linspace(readings[low], readings[high], ENDS_OVER_WIDTH)
+
+
+def _apart(ways: tuple[Array, Array], told: tuple[float, float]) -> float:
+    """How far a way from 0 to 1 from one of the ``told`` ends to the other is at most from those between others."""
+    begins, ends = ways
+    at = np.stack([begins, ends, *(np.full_like(begins, end) for end in told)])
+    of_way = np.clip((at - begins) / (ends - begins), 0.0, 1.0)
+    of_told = np.clip((at - told[0]) / (told[1] - told[0]), 0.0, 1.0)
+    return float(np.abs(of_way - of_told).max())
 
 
 def nearest_readings(measured: Array, at_mm: float, width: float) -> Between:
