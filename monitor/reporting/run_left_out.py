@@ -16,6 +16,6 @@ class RunLeftOut:
     def __str__(self) -> str:
         return (
             f"Run {self.run} is left out: its {self.readings} readings determine as many unknowns of the model, and "
-            "nothing is left over to judge it by. Every other question refuses the campaign until its rows are taken out "
-            "and the campaign is imported again; do that before you add an effect."
+            "nothing is left over to judge it by. Every other question refuses the campaign until its rows are taken "
+            "out and the campaign is imported again; do that before you add an effect."
         )
