@@ -13,6 +13,7 @@ from monitor.reporting import messages
 from monitor.reporting.curve_finding import correlation
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import doubt_sentence
+from monitor.reporting.run_coefficient import run_of
 from monitor.workflow.history.refuted import REFUTED_P
 from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
@@ -61,7 +62,7 @@ def _added(answer: IdentifyAnswer) -> None:
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
-            f"{estimate.unit} in all runs"
+            f"{estimate.unit}{' in all runs' if run_of(name) is None else ''}"
         )
         if answer.reversal_values is not None and name in answer.reversal_values:
             output.say(f"   {reversal_words(answer.reversal_values[name])}")

@@ -16,6 +16,7 @@ from monitor.reporting.certificate.volumetric import printed_map
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.certificate.words import answer
 from monitor.reporting.refused import why_refused
+from monitor.reporting.run_coefficient import run_of
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
@@ -65,8 +66,13 @@ def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, 
         say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
         say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
         return
-    key = "page.effects_joint" if effect.joint else "page.effects_explained"
-    explained = texts(key, effects=effect.name, runs=effect.runs, days=effect.days)
+    alone = "page.effects_explained" if run_of(effect.name) is None else "page.effects_of_run"
+    explained = texts(
+        "page.effects_joint" if effect.joint else alone,
+        effects=effect.name,
+        runs=effect.runs,
+        days=effect.days,
+    )
     if effect.outside is not None:
         explained += " " + texts(f"page.outside_{effect.outside.value}")
     if effect.lies is not None:

@@ -10,6 +10,7 @@ from markupsafe import Markup, escape
 from monitor.reporting.certificate.model_effect import Lies, ModelEffect
 from monitor.reporting.certificate.tables import Number, aligned
 from monitor.reporting.numbers import round_result, round_to_place, round_uncertainty
+from monitor.reporting.run_coefficient import run_of
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
@@ -62,8 +63,12 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
         sentences.append(
             texts.markup("page.effects_joint", effects=names, runs=joint[0].runs, days=joint[0].days)
         )
-    if alone:
-        sentences.append(texts.markup("page.effects_explained", runs=alone[0].runs, days=alone[0].days))
+    of_all = [effect for effect in alone if run_of(effect.name) is None]
+    of_run = [effect.name for effect in alone if run_of(effect.name) is not None]
+    if of_all:
+        sentences.append(texts.markup("page.effects_explained", runs=of_all[0].runs, days=of_all[0].days))
+    if of_run:
+        sentences.append(texts.markup("page.effects_of_run", effects=", ".join(of_run)))
     outside = {effect.outside for effect in effects if effect.outside is not None}
     sentences += [texts.markup(f"page.outside_{reason.value}") for reason in sorted(outside)]
     sentences += [

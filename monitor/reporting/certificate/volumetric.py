@@ -67,7 +67,7 @@ def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:
     """What the numbers mean, and of which region they are."""
     sign = texts.decimal_sign
     return texts(
-        "page.map_explained",
+        "page.map_explained_one_pose" if volumetric.poses == 1 else "page.map_explained",
         points=volumetric.points,
         each=volumetric.each,
         poses=volumetric.poses,

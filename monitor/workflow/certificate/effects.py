@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,13 @@ from monitor.effects.shapes import Step
 from monitor.methods import campaign_method
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import Lies, ModelEffect
+from monitor.reporting.run_coefficient import run_of
 from monitor.store import Database, MachineHistory, machine_history
 from monitor.workflow.identify.answer import Estimate, reversal_value
+from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
+from monitor.workflow.volumetric.between_points import LEAST_STEP
 
 
 def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect, ...] | None:
@@ -25,36 +28,54 @@ def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect,
 
     Those among the results have their value from there. Of another the value is the mean of what the runs of the
     campaign say, each by itself; its u is the largest of what the noise of the readings, the scatter of the runs and
-    that of the days' means leave of such a mean. One of a campaign that is not identified under the model is named
-    without a value, and so is a coefficient of which nothing is known beside others of the same effect.
+    that of the days' means leave of such a mean. Of an effect that has a coefficient a run it is that of the run
+    itself, as `identify` gives it. One of a campaign that is not identified under the model is named without a value,
+    and so is a coefficient of which nothing is known beside others of the same effect.
     """
     names_of = _coefficients(evaluated)
     if not names_of:
         return None
     joint = _joint(evaluated)
+    alone = _alone(db, evaluated, names_of, joint)
     outside = evaluated.answer.effects_outside
+    places = _places(evaluated)
+    return tuple(
+        replace(effect, lies=places.get(effect.name))
+        # The map says nothing of a smaller step either.
+        if effect.value is not None and abs(effect.value) >= LEAST_STEP
+        else effect
+        for effect in (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
+    )
+
+
+def _alone(
+    db: Database,
+    evaluated: StatedUncertainty,
+    names_of: Mapping[str, Sequence[str]],
+    joint: Collection[str],
+) -> list[ModelEffect]:
+    """The coefficients of effects, by their text, that are no results."""
     others = {text: [name for name in names if name not in joint] for text, names in names_of.items()}
-    values = _from_history(db, evaluated, [name for names in others.values() for name in names])
+    every = [name for names in others.values() for name in names]
+    values = _from_history(db, evaluated, every) | _of_the_run(evaluated, every)
     alone: list[ModelEffect] = []
     for text, names in others.items():
         stated = [values[name] for name in names if name in values]
         unstated = [name for name in names if name not in values]
         # An effect of which nothing is known is named as a whole.
         whole = len(unstated) == len(names_of[text])
-        alone += [*stated, *(ModelEffect(name) for name in ([text] if whole else unstated))]
-    stated_effects = (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
-    places = _places(evaluated)
-    return tuple(
-        replace(effect, lies=places.get(effect.name)) if effect.value is not None else effect
-        for effect in stated_effects
-    )
+        alone += [*stated, *map(ModelEffect, [text] if whole else unstated)]
+    return alone
 
 
 def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
-    """The names of the coefficients of every effect that all runs share, by its text; an effect on what did not measure
-    in this campaign by its text alone."""
+    """The names of the coefficients of every effect that all runs share, by its text, without those of other runs; an
+    effect on what did not measure in this campaign by its text alone."""
     problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
-    names = {added.effect.text: added.names() for added in problem.shared}
+    names = {
+        added.effect.text: tuple(name for name in added.names() if run_of(name) in (None, evaluated.run))
+        for added in problem.shared
+    }
     return {**names, **{text: (text,) for text in problem.left_out if text not in names}}
 
 
@@ -94,6 +115,20 @@ def _from_history(db: Database, evaluated: StatedUncertainty, names: Sequence[st
     history = history.part(history.campaign == campaign.name)
     values = {name: _effect(history, name) for name in names if name in history.parameters}
     return {name: effect for name, effect in values.items() if effect is not None}
+
+
+def _of_the_run(evaluated: StatedUncertainty, names: Sequence[str]) -> dict[str, ModelEffect]:
+    """The coefficients that are of the run alone."""
+    of_run = [name for name in names if run_of(name) is not None]
+    if not of_run:
+        return {}
+    identification, _ = identified(evaluated.campaign, evaluated.model)
+    added = machine_answer(evaluated.campaign, identification).added
+    return {
+        name: _stated(name, estimate, 1, 1)
+        for name in of_run
+        if isinstance(estimate := added.get(name), Estimate)
+    }
 
 
 def _joint(evaluated: StatedUncertainty) -> dict[str, ModelEffect]:

@@ -8,6 +8,7 @@ from monitor.exceptions import InputError
 from monitor.machine import Chain
 from monitor.records import Array
 from monitor.reporting.refused import RefusedParameters
+from monitor.reporting.run_coefficient import run_of
 from monitor.reporting.svg.map_slices import Slice, slices_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import label
@@ -34,7 +35,9 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
     p = evaluated.answer.p
     k = error.factor(p)
     by_parameter = {
-        name: _um(value) for name, value in error.budget(error.worst).items() if np.isfinite(value)
+        name: _um(value)
+        for name, value in error.budget(error.worst).items()
+        if np.isfinite(value) and run_of(name) in (None, evaluated.run)
     }
     return VolumetricAnswer(
         campaign=evaluated.campaign.name,
@@ -52,7 +55,11 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
             points=len(error.lengths),
         ),
         datum=None if error.datum is None else _at(chain, error.datum),
-        parameters=tuple(name for name in error.names if name not in mapped.left_out),
+        parameters=tuple(
+            name
+            for name in error.names
+            if name not in mapped.left_out and run_of(name) in (None, evaluated.run)
+        ),
         left_out=tuple(_left_out(name, refused) for name, refused in mapped.left_out.items()),
         worst=_point(mapped, error.worst, k, by_parameter),
         mean=_length(*error.mean, k),

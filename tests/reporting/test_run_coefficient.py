@@ -1,0 +1,47 @@
+"""What is of one run alone is said to be, and what was left out is not counted."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import pytest
+
+from monitor.reporting.certificate.model_effect import ModelEffect
+from monitor.reporting.certificate.model_effects import printed_effects
+from monitor.reporting.health.sentences import RunsNamed
+from monitor.reporting.messages import not_identified_by_model
+from monitor.reporting.run_coefficient import run_of
+from monitor.reporting.texts import texts_of
+
+DAY = datetime(2026, 3, 2, 8)
+
+
+@pytest.mark.parametrize(
+    ("name", "run"),
+    [("EXX:reversal@each_run.run2", 2), ("EZB:compliance@load_each_run.run10", 10), ("EXX:reversal", None)],
+)
+def test_the_name_of_a_coefficient_says_its_run(name: str, run: int | None) -> None:
+    assert run_of(name) == run
+
+
+@pytest.mark.parametrize(("language", "said"), [("en", "those of this run"), ("de", "die dieses Laufs")])
+def test_a_coefficient_of_the_run_is_no_mean_of_runs(language: str, said: str) -> None:
+    """Was: no value of it is stored."""
+    effect = ModelEffect("EXX:reversal@each_run.run2", "µm", 0.05, 0.22, 1, 1)
+    printed = printed_effects((effect,), texts_of(language))
+    assert printed is not None
+    assert said in printed.explained
+    assert not printed.unknown
+
+
+def test_a_run_left_out_is_not_among_those_compared() -> None:
+    """Was: all 5 runs of bo."""
+    assert str(RunsNamed("bo", 4, 0, DAY, DAY, (4,))) == "4 of 5 runs of bo, without run 4, 2026-03-02"
+    assert str(RunsNamed("bo", 5, 0, DAY, DAY)) == "all 5 runs of bo, 2026-03-02"
+
+
+def test_trend_names_no_command_that_refuses() -> None:
+    assert not_identified_by_model("M", ["bo"], {"bo": "few"}).endswith("bo; `identify` refuses it: few")
+    assert not_identified_by_model("M", ["a", "bo"], {"bo": "few"}).endswith(
+        "a, bo; type `monitor identify a`; `identify` refuses bo: few"
+    )
