@@ -74,8 +74,9 @@ def test_a_free_shape_of_a_step_alone_is_told_by_its_place(virtual_campaigns):
     assert steps_instead(scene, hat, []) == []
 
 
-def test_a_step_over_a_width_is_known_by_the_positions_within_it(virtual_campaigns):
-    """Half of the width on either side was said, whatever the positions told."""
+@pytest.mark.parametrize("told", [60.0, 30.0])
+def test_a_step_over_a_width_is_known_by_the_positions_within_it(virtual_campaigns, told):
+    """Its width was taken as known: the middle was too sure, and the ends of a wider way lay outside."""
 
     def ramp(q, travel, now):
         return np.clip((q - 20.0) / 60.0, -0.5, 0.5)
@@ -83,13 +84,15 @@ def test_a_step_over_a_width_is_known_by_the_positions_within_it(virtual_campaig
     hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=ramp)
     campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=2)
     ((between,),) = steps_of_model(
-        fit(problem_of(campaign, Model("grown", added=("EXX:step60mm(20)",))))
+        fit(problem_of(campaign, Model("grown", added=(f"EXX:step{told:g}mm(20)",))))
     ).values()
     first, last = between.middle
-    assert between.width == 60.0
+    assert between.width == told
     assert first <= 20.0 <= last
     assert between.low <= -10.0
     assert between.high >= 50.0
+    # So far the true way lies off the told one at the ends of that.
+    assert between.part >= (1.0 - told / 60.0) / 2.0
     # At the next position on either side of the ramp the middle could lie 20 mm off.
     assert last - first < 20.0
 

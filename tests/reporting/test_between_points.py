@@ -75,8 +75,8 @@ OVER = {
     "as far as the readings tell: points between 8.8 mm and 39.6 mm may err by up to 3.3 µm, and all points where a "
     "workpiece's zero is set between; no U contains that.",
     "de": "EXX:step(12), eine Stufe von 6,2 µm über etwa 20 mm, hat ihre Mitte irgendwo zwischen 18,8 mm und 29,6 mm "
-    "von X, soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und alle "
-    "Punkte, wenn der Nullpunkt eines Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
+    "von X, soweit die Messwerte es zeigen: Punkte zwischen 8,8 mm und 39,6 mm können um bis zu 3,3 µm abweichen, und "
+    "alle Punkte, wenn der Nullpunkt eines Werkstücks dazwischen gesetzt wird; keine Messunsicherheit U enthält das.",
 }
 
 

@@ -61,6 +61,8 @@ WIDTHS_APART = 4.0
 # together follow any curve.
 BENDS: tuple[tuple[str, ...], ...] = ((), ("poly2",), ("poly2", "poly3"))
 POSITIONS_OF_BENDS = 12
+# The square of a difference that is smaller, as part of the squares of the two, is rounding.
+ROUNDED = 1e-11
 # So many numbers of columns are remembered of an error, 32 MB.
 MOST_NUMBERS = 4_000_000
 
@@ -404,16 +406,21 @@ class StepsOfError:
         basis, residual = self._beside(rest, width, others)
         kinks, where = np.unique(np.concatenate([begins, ends]), return_inverse=True)
         bent = np.abs(self._reading[:, None] - kinks) / 2.0
-        seen = columns_of(self.scene.fit, [ChainBasis(self.effect.term, kink[:, None]) for kink in bent.T])
+        columns_of_kinks = columns_of(
+            self.scene.fit, [ChainBasis(self.effect.term, kink[:, None]) for kink in bent.T]
+        )
         columns = without(
-            self.scene.remainders.beside(others).basis, np.array([kink.columns[0] for kink in seen]).T
+            self.scene.remainders.beside(others).basis,
+            np.array([kink.columns[0] for kink in columns_of_kinks]).T,
         )
         columns = without(basis, columns)
         begin, end = where[: len(begins)], where[len(begins) :]
         products, onto = columns.T @ columns, columns.T @ residual
         squares = np.diag(products)
         squared = squares[begin][:, None] + squares[end] - 2.0 * products[np.ix_(begin, end)]
-        is_way = (ends > begins[:, None]) & (squared > 0.0)
+        # Less is rounding: the data do not see the way.
+        least = ROUNDED * (squares[begin][:, None] + squares[end])
+        is_way = (ends > begins[:, None]) & (squared > least)
         explained = (onto[begin][:, None] - onto[end]) ** 2 / np.where(is_way, squared, 1.0)
         return np.where(is_way, residual @ residual - explained, np.inf)
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.refine import LIMIT
@@ -93,23 +94,27 @@ def _over_any_width(
 ) -> Between:
     """Where a step over a width may begin and end; ``around`` are the nearest readings outside of the told one."""
     width = around.width
-    told = at_mm - width / 2.0, at_mm + width / 2.0
+    told_ends = at_mm - width / 2.0, at_mm + width / 2.0
     reach = (MOST_WIDTHS - 1.0) * width
     # At the level beyond either end stand positions enough, and no end is among those of its neighbours.
-    levels = steps.positions.mean(axis=1)[[POSITIONS_BEYOND - 1, -POSITIONS_BEYOND]]
-    before = [place + width / 2.0 for place in rest if place < at_mm]
-    after = [place - width / 2.0 for place in rest if place > at_mm]
-    low = min(max(around.low - reach, levels[0], *before), told[0])
-    high = max(min(around.high + reach, levels[1], *after), told[1])
+    positions = steps.positions.mean(axis=1)
+    beyond = min(POSITIONS_BEYOND, len(positions))
+    levels = positions[beyond - 1], positions[-beyond]
+    before = [other_mm + width / 2.0 for other_mm in rest if other_mm < at_mm]
+    after = [other_mm - width / 2.0 for other_mm in rest if other_mm > at_mm]
+    low = min(max(around.low - reach, levels[0], *before), told_ends[0])
+    high = max(min(around.high + reach, levels[1], *after), told_ends[1])
     begins = ends = np.linspace(low, high, ENDS_OVER_WIDTH)
     freedom = steps.scene.remainders.beside(others).degrees_of_freedom
     for _ in range(2):
-        begins, ends = np.union1d(begins, told[0]), np.union1d(ends, told[1])
+        begins, ends = np.union1d(begins, told_ends[0]), np.union1d(ends, told_ends[1])
         remaining = steps.left_with_ways(begins, ends, rest, width, others)
         way = ends - begins[:, None]
         remaining[way > MOST_WIDTHS * width] = np.inf
+        if not np.isfinite(remaining.min()):
+            return around
         able = freedom * np.log(remaining / remaining.min()) < LIMIT
-        able[begins == told[0], ends == told[1]] = True
+        able[begins == told_ends[0], ends == told_ends[1]] = True
         begin, end = np.nonzero(able)
         likely = begins[begin], ends[end]
         begins, ends = _about(begins, begin), _about(ends, end)
@@ -119,22 +124,22 @@ def _over_any_width(
         float(max(likely[1].max(), around.high)),
         width,
         (float(middles.min()), float(middles.max())),
-        _apart(likely, told),
+        _apart(likely, told_ends),
     )
 
 
-def _about(readings: Array, able: Array) -> Array:
+def _about(readings: Array, able: npt.NDArray[np.intp]) -> Array:
     """Readings from the neighbour before the first of some to that after the last."""
     low, high = max(int(able.min()) - 1, 0), min(int(able.max()) + 1, len(readings) - 1)
     return np.linspace(readings[low], readings[high], ENDS_OVER_WIDTH)
 
 
-def _apart(ways: tuple[Array, Array], told: tuple[float, float]) -> float:
-    """How far a way from 0 to 1 from one of the ``told`` ends to the other is at most from those between others."""
+def _apart(ways: tuple[Array, Array], told_ends: tuple[float, float]) -> float:
+    """How far a way from 0 to 1 from one of the ``told_ends`` to the other is at most from those between others."""
     begins, ends = ways
-    at = np.stack([begins, ends, *(np.full_like(begins, end) for end in told)])
+    at = np.stack([begins, ends, *(np.full_like(begins, end) for end in told_ends)])
     of_way = np.clip((at - begins) / (ends - begins), 0.0, 1.0)
-    of_told = np.clip((at - told[0]) / (told[1] - told[0]), 0.0, 1.0)
+    of_told = np.clip((at - told_ends[0]) / (told_ends[1] - told_ends[0]), 0.0, 1.0)
     return float(np.abs(of_way - of_told).max())
 
 
