@@ -25,7 +25,7 @@ _RADIANS = {MICRORADIAN.name: MICRORADIAN.factor, "arcsec": math.pi / 648_000.0,
 IN_UNIT = frozenset(
     {
         *("value", "u", "estimate", "expanded", "expanded_cautious", "u_independent_rows"),
-        *("size", "limit", "tolerance", "tolerances", "differences", "values"),
+        *("size", "error", "limit", "tolerance", "tolerances", "differences", "values"),
         *("amplitude", "coefficient", "interval", "per_hour"),
         *("mean", "u_all", "u_pooled", "u_by_day", "mean_by_day", "sd", "sd_all", "sd_pooled", "centre"),
         *("between", "between_interval", "within", "within_interval", "u_run_on_a_day_of_its_own"),

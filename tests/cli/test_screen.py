@@ -42,7 +42,7 @@ OTHER = frozenset(
             "level",
             "times",
             "work_point_mm",
-            *("pitch_mm", "spacing_mm", "low_mm", "high_mm"),
+            *("pitch_mm", "spacing_mm", "step_mm", "width_mm", "middle_mm", "low_mm", "high_mm"),
             "axes_by_pose",
         ),
         *("p", "f", "bic", "bic_before", "bic_after", "degrees_of_freedom", "pure_error_degrees_of_freedom"),
