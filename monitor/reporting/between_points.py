@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
 
+#: A smaller step, in µm or µrad, is printed as none: points between do not err by it.
+LEAST_STEP = 0.05
+
 
 @dataclass(frozen=True)
 class BetweenPoints:

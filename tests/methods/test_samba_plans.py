@@ -110,7 +110,7 @@ def test_too_few_readings(simulated: Callable[..., Any]) -> None:
     campaign = simulated(1)[1]
     rows = campaign.probings.sequence >= 9
     few, fewer = rows & (campaign.probings.sequence <= 18), rows & (campaign.probings.sequence <= 16)
-    with pytest.raises(DataError, match="the 25 readings of run 1 determine as many unknowns of the model"):
+    with pytest.raises(DataError, match="the 24 readings of run 1 determine as many unknowns of the model"):
         samba.identify(replace(campaign, probings=campaign.probings.rows(fewer)))
     (run,) = samba.identify(replace(campaign, probings=campaign.probings.rows(few))).runs
     # 31 readings and 34 names, of which two touches a ball determine 27.

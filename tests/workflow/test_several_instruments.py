@@ -75,7 +75,7 @@ def test_a_temperature_at_which_each_instrument_measured_alone_is_not_decided(db
         (LASER, 19, 19), (BAR, 23, 23),
     ]  # fmt: skip
     assert all(wave.not_decided is not None for wave in cycles(series)[0])
-    answer = _answer(db, TrendRequest("M", parameter="EXX"), machine, [], machine_past(machine, []), {})
+    answer = _answer(db, TrendRequest("M", parameter="EXX"), machine, [], machine_past(machine, []), {}, {})
     (sentence,) = [line for line in dependences(answer) if "whether it goes with ambient" in line]
     assert sentence.startswith("EXX: whether it goes with ambient_degC: the data cannot decide: measured by")
     assert sentence.endswith("°C, would decide")
@@ -192,7 +192,7 @@ def test_the_page_says_what_instruments_leave_undecided_and_follows_no_such_temp
         letters, of_letters(letters, 0, 3), of_letters(letters, 7, 20), of_letters(letters, 19, 23)
     )
     request = TrendRequest("M", parameter="EXX")
-    answer = _answer(db, request, machine, [], machine_past(machine, []), {})
+    answer = _answer(db, request, machine, [], machine_past(machine, []), {}, {})
     template = _environment().get_template("goes_with.html")
     said = template.render(statement=answer.parameters["EXX"], trend=answer)
     follows, _, undecided = said.partition("<dt>Not decided</dt>")

@@ -13,14 +13,13 @@ from monitor.effects import ChainEffect
 from monitor.effects.shapes import Step
 from monitor.methods import campaign_method
 from monitor.records import Array
+from monitor.reporting.between_points import LEAST_STEP
 from monitor.reporting.certificate.model_effect import Lies, ModelEffect
 from monitor.reporting.run_coefficient import run_of
 from monitor.store import Database, MachineHistory, machine_history
 from monitor.workflow.identify.answer import Estimate, reversal_value
-from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
-from monitor.workflow.volumetric.between_points import LEAST_STEP
 
 
 def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect, ...] | None:
@@ -122,6 +121,9 @@ def _of_the_run(evaluated: StatedUncertainty, names: Sequence[str]) -> dict[str,
     of_run = [name for name in names if run_of(name) is not None]
     if not of_run:
         return {}
+    # Loaded here, as above.
+    from monitor.workflow.identify.machine import identified, machine_answer
+
     identification, _ = identified(evaluated.campaign, evaluated.model)
     added = machine_answer(evaluated.campaign, identification).added
     return {

@@ -12,7 +12,7 @@ from monitor.effects.shapes import Step
 from monitor.effects.shapes.cyclic import Cyclic
 from monitor.effects.shapes.sawtooth import Sawtooth
 from monitor.records import Array
-from monitor.reporting.between_points import BetweenPoints, StepPlace
+from monitor.reporting.between_points import LEAST_STEP, BetweenPoints, StepPlace
 from monitor.uncertainty.geometric_errors import GeometricErrors, joint_errors
 from monitor.uncertainty.volumetric import middle
 from monitor.units import Unit
@@ -22,8 +22,6 @@ from monitor.workflow.volumetric.error_map import VolumetricMap
 POINTS_A_PERIOD = 8
 #: Points of the line on which the size of an error is looked for: more than any period has that is told.
 POINTS_OF_LINE = 4001
-#: A smaller step, in µm or µrad, is printed as none: points between do not err by it.
-LEAST_STEP = 0.05
 
 
 def between_points(mapped: VolumetricMap) -> tuple[BetweenPoints, ...]:
