@@ -76,6 +76,7 @@ def _same_alone(problem):
     alone = sensitivity_of(run)
     index = int(np.flatnonzero(fitted.problem.runs == RUN)[0])
     determined = alone.determined
+    assert determined.any()
     np.testing.assert_allclose(
         alone.unknowns[determined], fitted.solution.local[index][determined], rtol=0.0, atol=2e-8
     )
