@@ -106,6 +106,20 @@ def test_a_wrong_unit_is_refused(simulated: Callable[..., Any]) -> None:
         samba.identify(replace(campaign, probings=replace(campaign.probings, readings=readings)))
 
 
+def test_another_bar_in_half_of_the_runs_is_refused(simulated: Callable[..., Any]) -> None:
+    """Was: EXX = -14 830 um/m of the second of two runs, and `explain` said "explained"."""
+    campaign = simulated(5, days=1, runs=2)[1]
+    readings = dict(campaign.probings.readings)
+    second = campaign.probings.run == 2
+    first_ball, other_ball = (second & (campaign.probings.target == ball) for ball in ("S1", "S2"))
+    for axis in "XYZ":
+        of_axis = readings[axis].copy()
+        of_axis[other_ball] += 0.015 * (of_axis[other_ball] - of_axis[first_ball])
+        readings[axis] = of_axis
+    with pytest.raises(DataError, match=r"run 2: E.. comes out at -0.0148 mm/mm.* the length of the bar"):
+        samba.identify(replace(campaign, probings=replace(campaign.probings, readings=readings)))
+
+
 def test_too_few_readings(simulated: Callable[..., Any]) -> None:
     campaign = simulated(1)[1]
     rows = campaign.probings.sequence >= 9

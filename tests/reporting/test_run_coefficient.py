@@ -18,7 +18,14 @@ DAY = datetime(2026, 3, 2, 8)
 
 @pytest.mark.parametrize(
     ("name", "run"),
-    [("EXX:reversal@each_run.run2", 2), ("EZB:compliance@load_each_run.run10", 10), ("EXX:reversal", None)],
+    [
+        ("EXX:reversal@each_run.run2", 2),
+        ("EZB:compliance@load_each_run.run10", 10),
+        ("EXX:reversal", None),
+        # Was: of all runs, so that a certificate stated those of the others.
+        ("EBB:harmonic2@each_run.cos.run1", 1),
+        ("EXX:step(20,60)@each_run.60mm.run3", 3),
+    ],
 )
 def test_the_name_of_a_coefficient_says_its_run(name: str, run: int | None) -> None:
     assert run_of(name) == run

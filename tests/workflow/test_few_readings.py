@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import shutil
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ import monitor
 from monitor.exceptions import TooFewReadingsError
 from monitor.methods.instruments.method import problem_of
 from monitor.readers import read_campaign
+from monitor.workflow.health.model import model_health
+from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.mistaken_columns import with_mistake
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -105,6 +108,10 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
     assert (left_out.run, left_out.readings) == (5, 9)
     assert told.answer == f"{whole.answer} {left_out}"
     assert replace(told, answer=whole.answer, runs_left_out=None) == whole
+    starts = {run: datetime(2026, 3, run) for run in range(1, 6)}
+    health = model_health(told, None, Span(starts, 0, None), set())
+    assert health is not None
+    assert (health.runs.count, health.runs.first, health.runs.last) == (4, starts[1], starts[4])
 
 
 def test_rows_are_removed_from_the_files_that_there_are(tmp_path: Path) -> None:

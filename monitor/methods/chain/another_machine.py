@@ -40,8 +40,9 @@ def refuse_another_machine(problem: MeasuredChain, solution: Solution, limited: 
     too_large = np.abs(errors) > np.where(free, problem.largest_error, LARGEST_GAIN)
     u = np.sqrt(np.diagonal(solution.local_covariance, axis1=-2, axis2=-1)[:, columns])
     certain = free & gains & (np.abs(errors) - CERTAIN * u > problem.largest_gain)
-    # A bar of another length is one in all runs; of one run of several a reading may be wrong, and is sought.
-    too_large |= certain & (certain.mean(axis=0) > 0.5)
+    # A bar of another length is one in all runs; of one run of several a reading may be wrong, and is sought. Of two
+    # halves neither tells which is wrong.
+    too_large |= certain & (certain.mean(axis=0) >= 0.5)
     if too_large.any():
         run, which = np.unravel_index(int((np.abs(errors) * too_large).argmax()), errors.shape)
         largest, error = limited[int(which)], float(errors[run, which])

@@ -59,7 +59,9 @@ def routes() -> APIRouter:
         compare, explanation = answers.compare, answers.explanation
         missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
         residuals, steps = answers.residuals, answers.steps
-        label = model if compare is None else compare.comparison.model
+        # Runs may be left out of an explanation for which nothing is compared.
+        answered = compare or explanation
+        label = model if answered is None else answered.comparison.model
         versions = ask(user, "models").models
         current = _version(versions, label)
         return page(

@@ -31,14 +31,15 @@ def model_health(
         return None
     comparison = explanation.comparison
     left_out = tuple(each.run for each in explanation.runs_left_out or ())
+    compared = [start for run, start in span.starts.items() if run not in left_out]
     return ModelHealth(
         campaign=comparison.campaign,
         runs=RunsNamed(
             comparison.campaign,
-            span.count - len(left_out),
+            len(compared),
             span.later,
-            span.first,
-            span.last,
+            min(compared),
+            max(compared),
             left_out,
         ),
         model=comparison.model,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -14,16 +14,19 @@ from monitor.workflow.history.runs import possible_campaigns
 
 @dataclass(frozen=True)
 class Span:
-    """The runs of a campaign up to the week's end: how many, the local starts of the first and the last of them.
+    """The runs of a campaign up to the week's end: their local ``starts`` by number, in the order of time.
 
     ``later`` began after it; ``before`` is then the week's end, else None: the campaign is whole.
     """
 
-    count: int
-    first: datetime
-    last: datetime
+    starts: Mapping[int, datetime]
     later: int
     before: datetime | None
+
+    @property
+    def first(self) -> datetime:
+        """The local start of the first of them."""
+        return min(self.starts.values())
 
 
 def past_runs(
@@ -41,7 +44,7 @@ def first_run(runs: Sequence[RecordedRun], campaigns: tuple[str, ...]) -> Record
 
 def campaign_span(runs: Sequence[RecordedRun], campaign: str, week: Week) -> Span:
     """The runs of a campaign up to the week's end, of which there is at least one."""
-    starts = [run.local_start for run in runs if run.campaign == campaign]
-    before = [start for start in starts if start < week.ends]
+    starts = {run.run: run.local_start for run in runs if run.campaign == campaign}
+    before = {run: start for run, start in starts.items() if start < week.ends}
     later = len(starts) - len(before)
-    return Span(len(before), min(starts), max(before), later, week.ends if later else None)
+    return Span(before, later, week.ends if later else None)
