@@ -16,9 +16,11 @@ import pytest
 
 from monitor.readers import doubts, read_campaign
 from monitor.readers.doubts.axes_doubts import mistaken_axes
+from monitor.readers.doubts.doubts import result_doubts
 from monitor.readers.doubts.unit_doubts import runs_in_units
 from monitor.records import Campaign
 from monitor.workflow.intake.gross_doubts import gross_doubts
+from tests.discovery.laser_along_x import laser_along_x
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 Change = Callable[[float], float]
@@ -219,6 +221,20 @@ def test_one_run_in_inches_is_said_as_that_and_no_reading_of_it_is_called_wrong(
     assert gross_doubts(campaign) == ()
     (odd,) = runs_in_units(campaign)
     assert odd.ratio == pytest.approx(1.0 / 25.4, rel=1e-3)
+
+
+@pytest.mark.parametrize(("divided_by", "named"), [(1.0, []), (25.4, [3])])
+def test_a_run_that_was_broken_off_is_none_in_another_unit(
+    tmp_path: Path, divided_by: float, named: list[int]
+) -> None:
+    """Was: "ten times too small" by the import of a run that ended at 50 of 500 mm, and no certificate of any run;
+    `explain` and `identify` named no run in inches that has few rows."""
+    whole = [50.0 * number for number in range(11)]
+    few = [position / divided_by for position in (whole[:2] if divided_by == 1.0 else whole[::4] + whole[-1:])]
+    campaign, _ = laser_along_x(tmp_path / "laser", [whole, whole, few], lambda x: 0.0, 1)
+    assert [odd.run for odd in runs_in_units(campaign)] == named
+    told = [doubt for doubt in result_doubts(campaign) if doubt.startswith("run 3: x_mm spans")]
+    assert len(told) == len(named)
 
 
 def test_a_whole_file_in_inches_makes_no_row_a_gross_reading(altered: Callable[..., Path]) -> None:

@@ -7,7 +7,7 @@ have, and the angles at which people index. What a fit has to see is told by `id
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from itertools import chain, pairwise
 
@@ -87,17 +87,10 @@ def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             radians(campaign),
             _places(campaign),
             exchanged_columns(campaign),
-            # A run that was broken off spans less in any unit, which the import says of its number of rows.
-            _units_of_runs(campaign, _broken_off(campaign)),
+            _units_of_runs(campaign),
             _length_of_bar(campaign),
         )
     )
-
-
-def _broken_off(campaign: Campaign) -> Collection[int]:
-    """The runs with less than half of the rows of the middle one."""
-    runs, counts = np.unique(campaign.probings.run, return_counts=True)
-    return set(runs[counts < np.median(counts) / 2.0].tolist())
 
 
 def _short_runs(campaign: Campaign) -> Iterator[str]:
@@ -206,11 +199,9 @@ def exchanged_columns(campaign: Campaign) -> Iterator[str]:
     )
 
 
-def _units_of_runs(campaign: Campaign, but_for: Collection[int] = ()) -> Iterator[str]:
-    """Single runs in another unit than the others, but for some."""
+def _units_of_runs(campaign: Campaign) -> Iterator[str]:
+    """Single runs in another unit than the others."""
     for odd in runs_in_units(campaign):
-        if odd.run in but_for:
-            continue
         yield (
             f"run {odd.run}: {and_of(list(odd.columns))} {'span' if len(odd.columns) > 1 else 'spans'} {odd.ratio:.4g} "
             f"times the span in the other runs, as if {'they were' if len(odd.columns) > 1 else 'it was'} "

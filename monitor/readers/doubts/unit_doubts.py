@@ -26,6 +26,8 @@ ZERO_RAD = 1e-4
 TELLING_SHARE = 0.2
 #: Spans of one plan repeat to some hundredths of a millimetre on millimetres and more, a run broken off covers less.
 SPAN_TOLERANCE = 0.005
+#: Positions of one plan repeat to a smaller part of its span; of a run that was broken off nearly all are in it.
+SAME_PLACE, MOST_AMONG = 1e-3, 0.9
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def _share_off(steps: Array, nominal: Array, scale: Array, slack: float) -> floa
 
 def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:
     """The runs whose lengths look as if they were in another unit than those of the other runs, by what each column
-    spans; of two runs the one that a unit explains."""
+    spans; of two runs the one that a unit explains. A run that was broken off has few rows, where others have theirs."""
     probings = campaign.probings
     columns = {
         f"{axis.lower()}_mm": values
@@ -142,8 +144,11 @@ def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:
         name: np.array([np.ptp(values[probings.run == run]) for run in runs])
         for name, values in columns.items()
     }
+    rows = np.array([int(np.sum(probings.run == run)) for run in runs])
     odd: list[RunInUnit] = []
     for index, run in enumerate(runs.tolist()):
+        is_short = rows[index] < np.median(rows) / 2.0
+        of_run = probings.run == run
         by_unit: dict[Unit, list[str]] = {}
         ratios: dict[Unit, float] = {}
         for name, of_runs in spans.items():
@@ -152,9 +157,19 @@ def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:
                 continue
             ratio = float(of_runs[index]) / usual
             (unit,) = mistaken_for_mm(ratio, SPAN_TOLERANCE)[:1] or (None,)
-            if unit is not None:
-                by_unit.setdefault(unit, []).append(name)
-                ratios[unit] = ratio
+            if unit is None or (is_short and _is_among(columns[name][of_run], columns[name][~of_run], usual)):
+                continue
+            by_unit.setdefault(unit, []).append(name)
+            ratios[unit] = ratio
         odd += [RunInUnit(run, tuple(sorted(names)), ratios[unit], unit) for unit, names in by_unit.items()]
     # More than half of the runs are not the odd ones.
     return tuple(odd) if len({entry.run for entry in odd}) <= len(runs) / 2 else ()
+
+
+def _is_among(values: Array, others: Array, span: float) -> bool:
+    """Whether nearly all values are among those of others, to a part of a ``span``: in another unit few are."""
+    others = np.unique(others)
+    before = np.clip(np.searchsorted(others, values) - 1, 0, len(others) - 1)
+    after = np.minimum(before + 1, len(others) - 1)
+    nearest = np.minimum(np.abs(values - others[before]), np.abs(values - others[after]))
+    return bool(np.mean(nearest <= SAME_PLACE * span) >= MOST_AMONG)
