@@ -230,7 +230,9 @@ def test_a_run_that_was_broken_off_is_none_in_another_unit(
     """Was: "ten times too small" by the import of a run that ended at 50 of 500 mm, and no certificate of any run;
     `explain` and `identify` named no run in inches that has few rows."""
     whole = [50.0 * number for number in range(11)]
-    few = [position / divided_by for position in (whole[:2] if divided_by == 1.0 else whole[::4] + whole[-1:])]
+    few = [
+        position / divided_by for position in (whole[:2] if divided_by == 1.0 else whole[::4] + whole[-1:])
+    ]
     campaign, _ = laser_along_x(tmp_path / "laser", [whole, whole, few], lambda x: 0.0, 1)
     assert [odd.run for odd in runs_in_units(campaign)] == named
     told = [doubt for doubt in result_doubts(campaign) if doubt.startswith("run 3: x_mm spans")]

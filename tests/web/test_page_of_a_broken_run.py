@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +15,7 @@ from tests.discovery.laser_along_x import laser_along_x
 
 
 @pytest.mark.slow
-def test_what_is_found_can_be_added_to_the_model(tmp_path: Path, serve) -> None:
+def test_what_is_found_can_be_added_to_the_model(tmp_path: Path, serve: Callable[[Path, bool], Any]) -> None:
     """Was: "every campaign of ,", and a form that lacks 'to'."""
     positions = [50.0 * number for number in range(11)]
     folder = tmp_path / "broken"

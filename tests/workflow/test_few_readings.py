@@ -15,6 +15,7 @@ import monitor
 from monitor.exceptions import TooFewReadingsError
 from monitor.methods.instruments.method import problem_of
 from monitor.readers import read_campaign
+from monitor.reporting.health.sentences import RunsNamed
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.mistaken_columns import with_mistake
@@ -111,6 +112,7 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
     starts = {run: datetime(2026, 3, run) for run in range(1, 6)}
     health = model_health(told, None, Span(starts, 0, None), set())
     assert health is not None
+    assert isinstance(health.runs, RunsNamed)
     assert (health.runs.count, health.runs.first, health.runs.last) == (4, starts[1], starts[4])
 
 

@@ -129,47 +129,53 @@ def _share_off(steps: Array, nominal: Array, scale: Array, slack: float) -> floa
 
 def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:
     """The runs whose lengths look as if they were in another unit than those of the other runs, by what each column
-    spans; of two runs the one that a unit explains. A run that was broken off has few rows, where others have theirs."""
-    probings = campaign.probings
-    columns = {
-        f"{axis.lower()}_mm": values
-        for axis, values in probings.readings.items()
-        if campaign.machine.is_linear(axis)
-    }
-    columns |= {name: values for name, values in probings.channels.items() if name.startswith("tracker_")}
-    runs = np.unique(probings.run)
+    spans; of two runs the one that a unit explains. One that was broken off has few rows, where others have theirs."""
+    probings, columns = campaign.probings, _columns_of_lengths(campaign)
+    runs, rows = np.unique(probings.run, return_counts=True)
     if len(runs) < 2 or not columns:
         return ()
     spans = {
         name: np.array([np.ptp(values[probings.run == run]) for run in runs])
         for name, values in columns.items()
     }
-    rows = np.array([int(np.sum(probings.run == run)) for run in runs])
     odd: list[RunInUnit] = []
     for index, run in enumerate(runs.tolist()):
-        is_short = rows[index] < np.median(rows) / 2.0
-        of_run = probings.run == run
+        names = list(columns)
+        if rows[index] < np.median(rows) / 2.0:
+            names = [name for name in names if not _is_among_others(columns[name], probings.run == run)]
         by_unit: dict[Unit, list[str]] = {}
         ratios: dict[Unit, float] = {}
-        for name, of_runs in spans.items():
-            usual = float(np.median(np.delete(of_runs, index)))
+        for name in names:
+            usual = float(np.median(np.delete(spans[name], index)))
             if usual <= 0.0:
                 continue
-            ratio = float(of_runs[index]) / usual
+            ratio = float(spans[name][index]) / usual
             (unit,) = mistaken_for_mm(ratio, SPAN_TOLERANCE)[:1] or (None,)
-            if unit is None or (is_short and _is_among(columns[name][of_run], columns[name][~of_run], usual)):
-                continue
-            by_unit.setdefault(unit, []).append(name)
-            ratios[unit] = ratio
+            if unit is not None:
+                by_unit.setdefault(unit, []).append(name)
+                ratios[unit] = ratio
         odd += [RunInUnit(run, tuple(sorted(names)), ratios[unit], unit) for unit, names in by_unit.items()]
     # More than half of the runs are not the odd ones.
     return tuple(odd) if len({entry.run for entry in odd}) <= len(runs) / 2 else ()
 
 
-def _is_among(values: Array, others: Array, span: float) -> bool:
-    """Whether nearly all values are among those of others, to a part of a ``span``: in another unit few are."""
-    others = np.unique(others)
-    before = np.clip(np.searchsorted(others, values) - 1, 0, len(others) - 1)
+def _columns_of_lengths(campaign: Campaign) -> dict[str, Array]:
+    """The readings of linear axes and of a tracker, by the names of their columns."""
+    probings = campaign.probings
+    columns = {
+        f"{axis.lower()}_mm": values
+        for axis, values in probings.readings.items()
+        if campaign.machine.is_linear(axis)
+    }
+    return columns | {
+        name: values for name, values in probings.channels.items() if name.startswith("tracker_")
+    }
+
+
+def _is_among_others(values: Array, of_run: npt.NDArray[np.bool_]) -> bool:
+    """Whether nearly all values of a run are among those of the others: in another unit few are."""
+    others = np.unique(values[~of_run])
+    before = np.clip(np.searchsorted(others, values[of_run]) - 1, 0, len(others) - 1)
     after = np.minimum(before + 1, len(others) - 1)
-    nearest = np.minimum(np.abs(values - others[before]), np.abs(values - others[after]))
-    return bool(np.mean(nearest <= SAME_PLACE * span) >= MOST_AMONG)
+    nearest = np.minimum(np.abs(values[of_run] - others[before]), np.abs(values[of_run] - others[after]))
+    return bool(np.mean(nearest <= SAME_PLACE * np.ptp(others)) >= MOST_AMONG)
