@@ -36,7 +36,7 @@ def named(trial: ModuleType, effect: str):
 
 
 @pytest.mark.parametrize("perfect", [False, True])
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.all_seeds)])
 def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
     told = trial.explained(trial.rotary(np.random.default_rng(seed), 4, perfect=perfect))
     assert trial.groups(told) == []
@@ -44,7 +44,12 @@ def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [100, 102, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (103, 104, 105, 106))]
+    "seed",
+    [
+        100,
+        pytest.param(102, marks=pytest.mark.slow),
+        *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (103, 104, 105, 106)),
+    ],
 )
 def test_a_tool_that_goes_astray_while_it_touches_is_no_effect(trial, seed):
     """A drift of X shows in the touches along X alone; held against those before it, whatever their direction, it was
@@ -63,7 +68,7 @@ def test_modules_that_deviate_alike_in_every_run_are_no_effect(trial, thorough):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.all_seeds)])
 def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
     """Was: EZZ:cyclic5mm of 0.8 mm and reversals of 0.3 to 0.4 mm beside what is hidden, out of the touches' noise."""
     campaign = trial.rotary(np.random.default_rng([seed, 9]), 6, named(trial, "EYZ:poly1"), perfect=True)

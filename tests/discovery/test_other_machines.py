@@ -40,7 +40,7 @@ def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
 
 
 @pytest.mark.parametrize(
-    "seed", [90000, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (90001, 90002))]
+    "seed", [90000, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (90001, 90002))]
 )
 def test_an_axis_that_stands_still_does_not_sell_its_noise(virtual_campaigns, explained, seed):
     """Along a single rotary table's axis nothing moves: cos(2 pi y / 16 mm) of the readings is then their noise in

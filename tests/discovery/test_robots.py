@@ -40,7 +40,7 @@ def names(told: Explanation) -> list[set[str]]:
     return [{one.effect, *(rival.effect for rival in one.rivals)} for one in told.missing]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.all_seeds)])
 def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
     told = explained(robots, tmp_path, seed, robots.Hidden(), fixed_every=30)
     assert told.missing == ()
@@ -48,7 +48,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
     assert told.comparison.verdict is Verdict.EXPLAINED
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.all_seeds)])
 def test_one_joint_that_gives_way(robots, tmp_path, seed):
     told = explained(robots, tmp_path, seed, robots.Hidden(compliance={"J2": 2e-4}))
     (found,) = told.missing
