@@ -154,6 +154,7 @@ def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns
     assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
 
 
+@pytest.mark.slow
 def test_what_a_recorded_column_follows_is_not_said_to_vary(virtual_campaigns, explained):
     sim = simulator()
     campaign, _ = virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1@x_axis_degC", peak_um=8.0)])

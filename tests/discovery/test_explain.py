@@ -23,10 +23,10 @@ def names(found):
     [
         ("EYY:cyclic16mm", {"direction": (1.0, -0.4)}),
         ("EB0C@run_time", {}),
-        ("artefact:expansion@run_time", {}),
-        ("EZC:const@gravity", {"direction": (1.0, 0.5, 0.2)}),
         ("stem:gravity", {"targets": ("3",)}),
         # Of their kinds the labelled campaigns and other tests have one each.
+        pytest.param("artefact:expansion@run_time", {}, marks=pytest.mark.slow),
+        pytest.param("EZC:const@gravity", {"direction": (1.0, 0.5, 0.2)}, marks=pytest.mark.slow),
         pytest.param("EXX:poly2", {}, marks=pytest.mark.slow),
         pytest.param("EBZ:poly3", {}, marks=pytest.mark.slow),
         pytest.param("EXC:harmonic3", {"direction": (0.3, 1.0)}, marks=pytest.mark.slow),
@@ -111,7 +111,10 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
         {"days": 1, "runs_per_day": 1},
         {"noise_um": 0.5, "stated_um": 1.0, "days": 2},
         {"with_channels": False, "days": 2},
-        {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50), "days": 2},
+        pytest.param(
+            {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50), "days": 2},
+            marks=pytest.mark.slow,
+        ),
         pytest.param({"cold": True, "noise_um": 0.7}, marks=pytest.mark.slow),
         pytest.param({"days": 1, "runs_per_day": 2}, marks=pytest.mark.slow),
         pytest.param({"days": 3, "runs_per_day": 1}, marks=pytest.mark.slow),
@@ -153,7 +156,9 @@ def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaig
     assert abs(found.amplitude) == pytest.approx(0.1, rel=3e-3)
 
 
-@pytest.mark.parametrize("chosen", [(3, 5, 9, 12), (2,), pytest.param((4, 5), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "chosen", [(2,), *(pytest.param(runs, marks=pytest.mark.slow) for runs in ((3, 5, 9, 12), (4, 5)))]
+)
 def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns, explained, chosen):
     sim = simulator()
     campaign, _ = virtual_campaigns.virtual(

@@ -80,7 +80,11 @@ def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
 
 
 @pytest.mark.parametrize(
-    "effect", ["ECC:harmonic1", "EZZ:poly2", pytest.param("EAC:harmonic2", marks=pytest.mark.slow)]
+    "effect",
+    [
+        "ECC:harmonic1",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("EZZ:poly2", "EAC:harmonic2")),
+    ],
 )
 def test_hidden_effects_of_8_um_are_found(trial, effect):
     (group,) = trial.groups(trial.explained(trial.rotary(np.random.default_rng(5), 4, named(trial, effect))))
