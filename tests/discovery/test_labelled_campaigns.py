@@ -65,6 +65,7 @@ def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     within_the_floor(found)
 
 
+@pytest.mark.slow
 def test_reversal_of_x_is_half_the_reversal_error(example):
     answer = example("hidden-reversal-x")
     nothing_else(answer)

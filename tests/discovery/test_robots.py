@@ -116,6 +116,7 @@ def test_a_gear_of_unknown_ratio(robots, tmp_path):
     assert abs(found.amplitude - 1e-4) < 5.0 * found.u
 
 
+@pytest.mark.slow
 def test_a_drifting_tracker_and_a_joint_with_play(robots, tmp_path):
     hidden = robots.Hidden(reversal={"J1": 8e-5}, drift_mm=(0.1, -0.2, 0.05))
     told = explained(robots, tmp_path, 8, hidden, fixed_every=15)
