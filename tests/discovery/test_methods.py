@@ -93,7 +93,11 @@ def test_hidden_effects_of_8_um_are_found(trial, effect):
 
 @pytest.mark.parametrize(
     ("lobes", "beside"),
-    [(3, None), *(pytest.param(lobes, "ECC:harmonic1", marks=pytest.mark.slow) for lobes in (2, 3))],
+    [
+        (3, None),
+        pytest.param(2, "ECC:harmonic1", marks=pytest.mark.slow),
+        pytest.param(3, "ECC:harmonic1", marks=pytest.mark.all_seeds),
+    ],
 )
 def test_lobes_of_the_probe_are_no_play_of_the_machine(trial, lobes, beside):
     """An oval pre-travel was told EYY:reversal, EXX:reversal and EXX:cyclic5.0157mm (radius of ball and tip)."""
