@@ -145,6 +145,7 @@ def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(
     assert "did you mean 'EB0C'?" in note
 
 
+@pytest.mark.slow
 def test_a_limit_of_an_axis_that_the_machine_has_not_is_said_beside_those_that_hold(
     typed: Any, db: Path
 ) -> None:

@@ -212,6 +212,7 @@ def test_a_monte_carlo_on_a_terminal_shows_how_far_it_is(terminal: Any, filled: 
     assert "Monte Carlo" in seen
 
 
+@pytest.mark.slow
 def test_the_bar_of_what_is_told_behind_each_piece_is_full_at_the_end(terminal: Any, filled: Path) -> None:
     seen = without_codes(terminal("--db", filled, "identify", columns=120))
     counted = [

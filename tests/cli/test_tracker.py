@@ -79,6 +79,7 @@ def test_effects_of_robots_are_in_the_catalogue(typed: Any, robot: Path) -> None
     assert "tracker:turn@run_time" in {one["effect"] for one in told["effects"]}
 
 
+@pytest.mark.slow
 def test_a_rehearsed_robot_tells_what_it_hides(typed: Any, tmp_path: Path) -> None:
     made = typed("simulate", "arm", "--robot", "--effect", "EBJ3:harmonic2", "--peak", "150", "--seed", "3")
     assert "arm: 1 run of 1500 probings; EBJ3:harmonic2 with a peak of 150 µm is hidden" in made.out

@@ -83,7 +83,7 @@ def test_a_smooth_bend_stays_a_polynomial(seed: int, tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("seed", [101, 104, 109])
+@pytest.mark.parametrize("seed", [109, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (101, 104))])
 def test_cycles_whose_period_nothing_determines_are_no_findings(seed: int, tmp_path: Path) -> None:
     """The law of a thermistor is an exponential, and next to one in what is left; was: cycles such as 100 ± 1432 and
     40 ± 1031 °C beside it, each undetermined beside the other."""

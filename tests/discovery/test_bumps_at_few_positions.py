@@ -57,7 +57,7 @@ def part_of_70(folder: Path, seed: int, error: Callable[[float], float]) -> Path
     return CHAIN.write(folder, SETUP, rows)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.all_seeds)])
 def test_a_bump_is_no_two_leads_that_look_long_at_its_positions(tmp_path: Path, seed: int) -> None:
     """Leads of 20 mm (7.5 um) and of 5 mm (6.4 um) were told, which are waves of 266 and 232 mm at 93 mm a step."""
     (missing,) = found_in(part_of_70(tmp_path / "part", seed, bump)).missing
@@ -65,7 +65,7 @@ def test_a_bump_is_no_two_leads_that_look_long_at_its_positions(tmp_path: Path, 
     assert 1e3 * missing.peak == pytest.approx(6.0, abs=1.0)
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.all_seeds)])
 def test_a_wave_of_fewer_than_two_periods_is_a_free_shape(tmp_path: Path, seed: int) -> None:
     """A cycle of 317 mm was told of 558 mm of travel: whether that repeats nobody can say. Without it two leads would
     be, of 14 and 10 um, which take each other back."""
@@ -117,7 +117,7 @@ def tracked_machine_with_a_bump(folder: Path, seed: int) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (1, 2))])
 def test_a_bump_is_no_wave_with_powers(tmp_path: Path, seed: int) -> None:
     """A cycle of 224 mm with a cube and a parabola was told: its pitch was sought, and came back as if known."""
     (missing,) = found_in(tracked_machine_with_a_bump(tmp_path / "machine", seed)).missing

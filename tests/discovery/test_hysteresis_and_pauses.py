@@ -64,7 +64,7 @@ def after_a_pause(tau_s):
     return curve
 
 
-@pytest.mark.parametrize(("axis", "width"), [("X", 40.0), ("Y", 70.0)])
+@pytest.mark.parametrize(("axis", "width"), [("X", 40.0), pytest.param("Y", 70.0, marks=pytest.mark.slow)])
 def test_a_drive_that_is_wound_up_is_named_with_its_width(virtual_campaigns, explained, seeds, axis, width):
     """Width within a fifth, as 1 um of noise and a plan of 62 touches allow; the size within 1 um of the hidden 8."""
     for seed in seeds(20, 1):
@@ -83,7 +83,7 @@ def test_a_drive_that_is_wound_up_is_named_with_its_width(virtual_campaigns, exp
 @pytest.mark.slow
 def test_growth_after_every_pause_is_named_with_its_time_constant(virtual_campaigns, explained, seeds):
     """Before, it was an error of the table in eight parts of a free shape, and its size was nowhere."""
-    for seed in seeds(20, 2):
+    for seed in seeds(20, 1):
         hidden = simulator().Effect("EZC1:curve", peak_um=8.0, curve=after_a_pause(600.0))
         campaign, _ = virtual_campaigns.virtual(62000 + seed, [hidden], days=2)
         (named,) = explained(campaign).missing

@@ -26,7 +26,7 @@ def nothing_else(answer):
     assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
 
 
-@pytest.mark.parametrize("name", ["nothing-hidden", "cold-cold"])
+@pytest.mark.parametrize("name", ["nothing-hidden", pytest.param("cold-cold", marks=pytest.mark.slow)])
 def test_where_nothing_is_missing_the_answer_is_nothing(example, name):
     answer = example(name)
     assert answer.missing == ()
@@ -51,6 +51,7 @@ def test_spindle_growth_with_its_time_constant(example):
     within_the_floor(found)
 
 
+@pytest.mark.slow
 def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     answer = example("hidden-b-indexing")
     nothing_else(answer)
@@ -64,6 +65,7 @@ def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     within_the_floor(found)
 
 
+@pytest.mark.slow
 def test_reversal_of_x_is_half_the_reversal_error(example):
     answer = example("hidden-reversal-x")
     nothing_else(answer)

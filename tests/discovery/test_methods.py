@@ -36,7 +36,7 @@ def named(trial: ModuleType, effect: str):
 
 
 @pytest.mark.parametrize("perfect", [False, True])
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.all_seeds)])
 def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
     told = trial.explained(trial.rotary(np.random.default_rng(seed), 4, perfect=perfect))
     assert trial.groups(told) == []
@@ -44,7 +44,12 @@ def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [100, 102, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (103, 104, 105, 106))]
+    "seed",
+    [
+        100,
+        pytest.param(102, marks=pytest.mark.slow),
+        *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (103, 104, 105, 106)),
+    ],
 )
 def test_a_tool_that_goes_astray_while_it_touches_is_no_effect(trial, seed):
     """A drift of X shows in the touches along X alone; held against those before it, whatever their direction, it was
@@ -63,7 +68,7 @@ def test_modules_that_deviate_alike_in_every_run_are_no_effect(trial, thorough):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.all_seeds)])
 def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
     """Was: EZZ:cyclic5mm of 0.8 mm and reversals of 0.3 to 0.4 mm beside what is hidden, out of the touches' noise."""
     campaign = trial.rotary(np.random.default_rng([seed, 9]), 6, named(trial, "EYZ:poly1"), perfect=True)
@@ -75,7 +80,11 @@ def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
 
 
 @pytest.mark.parametrize(
-    "effect", ["ECC:harmonic1", "EZZ:poly2", pytest.param("EAC:harmonic2", marks=pytest.mark.slow)]
+    "effect",
+    [
+        "ECC:harmonic1",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("EZZ:poly2", "EAC:harmonic2")),
+    ],
 )
 def test_hidden_effects_of_8_um_are_found(trial, effect):
     (group,) = trial.groups(trial.explained(trial.rotary(np.random.default_rng(5), 4, named(trial, effect))))
@@ -84,7 +93,11 @@ def test_hidden_effects_of_8_um_are_found(trial, effect):
 
 @pytest.mark.parametrize(
     ("lobes", "beside"),
-    [(3, None), *(pytest.param(lobes, "ECC:harmonic1", marks=pytest.mark.slow) for lobes in (2, 3))],
+    [
+        (3, None),
+        pytest.param(2, "ECC:harmonic1", marks=pytest.mark.slow),
+        pytest.param(3, "ECC:harmonic1", marks=pytest.mark.all_seeds),
+    ],
 )
 def test_lobes_of_the_probe_are_no_play_of_the_machine(trial, lobes, beside):
     """An oval pre-travel was told EYY:reversal, EXX:reversal and EXX:cyclic5.0157mm (radius of ball and tip)."""

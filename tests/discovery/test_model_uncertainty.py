@@ -64,6 +64,7 @@ def test_intervals_of_k_2_hold_where_an_effect_is_hidden(hidden):
     assert 0.93 < np.mean(added) < 0.99
 
 
+@pytest.mark.slow
 def test_taken_as_more_noise_the_line_would_be_far_too_small(hidden):
     # The reason of the module: a mean square of lack of fit, spread as white noise, misses what the fit absorbed.
     distances = []

@@ -29,7 +29,8 @@ def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, m
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
-@pytest.mark.parametrize("machine", ["fork head", pytest.param("one rotary table", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("machine", ["fork head", "one rotary table"])
 def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
     sim = simulator()
     hidden = ("EXX:reversal", "EZZ:poly2" if machine == "one rotary table" else "EYX:poly3")
@@ -40,7 +41,7 @@ def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
 
 
 @pytest.mark.parametrize(
-    "seed", [90000, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (90001, 90002))]
+    "seed", [90000, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (90001, 90002))]
 )
 def test_an_axis_that_stands_still_does_not_sell_its_noise(virtual_campaigns, explained, seed):
     """Along a single rotary table's axis nothing moves: cos(2 pi y / 16 mm) of the readings is then their noise in

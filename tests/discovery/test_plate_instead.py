@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,9 @@ def test_two_axes_that_grow_alike_are_the_part(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [101, 104, 105])
+@pytest.mark.parametrize(
+    "seed", [101, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (104, 105))]
+)
 def test_two_axes_of_which_one_grows_twice_as_much_are_told(tmp_path: Path, seed: int) -> None:
     """A plate held at Y = 169 mm or 203 mm was told, about its middle, or as following another clock."""
     per_kelvin = np.array([12e-6, 24e-6])
@@ -94,7 +97,9 @@ def test_two_axes_of_which_one_grows_twice_as_much_are_told(tmp_path: Path, seed
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [700, 701, 702])
+@pytest.mark.parametrize(
+    "seed", [700, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (701, 702))]
+)
 def test_screws_that_are_held_elsewhere_than_at_zero_are_two_axes(tmp_path: Path, seed: int) -> None:
     """Were: a plate held at Y = 868 mm beside a growth of Y, or two plates; a screw shifts its axis besides."""
     found = explained(
@@ -108,10 +113,11 @@ def test_screws_that_are_held_elsewhere_than_at_zero_are_two_axes(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_axes_that_grow_each_by_its_own_stay(tmp_path: Path) -> None:
+def test_axes_that_grow_each_by_its_own_stay(tmp_path: Path, seeds: Callable[[int, int], range]) -> None:
     """A screw of X alone, and two of which one grows three times as much, are no part: 17 of 20 were right."""
     right = 0
-    for seed in range(10):
+    parts = seeds(10, 3)
+    for seed in parts:
         for per_kelvin, names in (
             (np.array([11.5e-6, 0.0]), {"EXX:poly1"}),
             (np.array([12e-6, 36e-6]), {"EXX:poly1", "EYY:poly1"}),
@@ -119,7 +125,7 @@ def test_axes_that_grow_each_by_its_own_stay(tmp_path: Path) -> None:
             folder = tmp_path / f"{seed}-{len(names)}"
             found = explained(campaign_of(folder, 10 + seed, 2, per_kelvin, (0.0, 0.0))).missing
             right += {effect.effect.partition("@")[0] for effect in found} == names
-    assert right >= 16
+    assert right >= 0.8 * 2 * len(parts)
 
 
 def test_a_part_grows_about_where_it_is_held(tmp_path: Path) -> None:

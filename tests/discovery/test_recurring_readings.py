@@ -6,7 +6,7 @@ Simulated with numpy; errors are of the readings themselves, so that no effect o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -124,10 +124,13 @@ def test_a_single_row_is_a_bad_point_and_nothing_is_missing(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_rates_of_bad_points_and_of_readings_that_recur(tmp_path: Path) -> None:
+def test_rates_of_bad_points_and_of_readings_that_recur(
+    tmp_path: Path, seeds: Callable[[int, int], range]
+) -> None:
     """Of 40 plates each: two single rows of 8 um named, and nothing in noise alone."""
     named = alarms = 0
-    for seed in range(40):
+    plates = seeds(40, 10)
+    for seed in plates:
         rng = np.random.default_rng(1000 + seed)
         off = [(int(ball), run) for ball, run in zip(rng.choice(36, 2, replace=False), (1, 3), strict=True)]
         found = explained(tmp_path / f"single-{seed}", seed, off)
@@ -135,5 +138,5 @@ def test_rates_of_bad_points_and_of_readings_that_recur(tmp_path: Path) -> None:
         named += rows == sorted((run, ball) for ball, run in off) and not found.recurring
         empty = explained(tmp_path / f"empty-{seed}", 500 + seed, [])
         alarms += bool(empty.missing or empty.suspect or empty.recurring)
-    assert named >= 36
-    assert alarms <= 2
+    assert named >= 0.9 * len(plates)
+    assert alarms <= len(plates) / 20

@@ -40,7 +40,7 @@ def names(told: Explanation) -> list[set[str]]:
     return [{one.effect, *(rival.effect for rival in one.rivals)} for one in told.missing]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.all_seeds)])
 def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
     told = explained(robots, tmp_path, seed, robots.Hidden(), fixed_every=30)
     assert told.missing == ()
@@ -48,7 +48,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
     assert told.comparison.verdict is Verdict.EXPLAINED
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.all_seeds)])
 def test_one_joint_that_gives_way(robots, tmp_path, seed):
     told = explained(robots, tmp_path, seed, robots.Hidden(compliance={"J2": 2e-4}))
     (found,) = told.missing
@@ -116,6 +116,7 @@ def test_a_gear_of_unknown_ratio(robots, tmp_path):
     assert abs(found.amplitude - 1e-4) < 5.0 * found.u
 
 
+@pytest.mark.slow
 def test_a_drifting_tracker_and_a_joint_with_play(robots, tmp_path):
     hidden = robots.Hidden(reversal={"J1": 8e-5}, drift_mm=(0.1, -0.2, 0.05))
     told = explained(robots, tmp_path, 8, hidden, fixed_every=15)

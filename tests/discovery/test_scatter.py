@@ -79,6 +79,7 @@ def test_an_explanation_names_the_ball_alone(virtual_campaigns, explained):
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
+@pytest.mark.slow
 def test_a_ball_that_shakes_hides_no_effect(virtual_campaigns, explained):
     sim = simulator()
     campaign, told = virtual_campaigns.virtual(9500, [sim.Effect("EYX:poly2", peak_um=6.0)], days=2)

@@ -76,6 +76,7 @@ def test_poses_tell_harmonics_of_the_spindle_apart_where_quarters_do_not(
     assert "EXC1:harmonic3" not in names(after)
 
 
+@pytest.mark.slow
 def test_nothing_is_offered_where_no_pose_can(virtual_campaigns, explained, campaign_with):
     """Run-out of a table in X and in Y differ by what its location error takes up, at any pose."""
     sim = simulator()

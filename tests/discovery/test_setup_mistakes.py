@@ -63,7 +63,10 @@ def _spoilt(campaign: Campaign, setup: str, change: dict[str, tuple[str, float]]
             "the signs of dx_um, dy_um, dz_um were the other way round",
         ),
         ("bar-zx", {"reading_um": ("reading_um", 1e-3)}, "reading_um was in mm"),
-        ("r-test", {"dx_um": ("dy_um", 1.0), "dy_um": ("dx_um", 1.0)}, "the columns dx_um and dy_um were exchanged"),
+        pytest.param(
+            "r-test", {"dx_um": ("dy_um", 1.0), "dy_um": ("dx_um", 1.0)}, "the columns dx_um and dy_um were exchanged",
+            marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_what_is_wrong_in_one_setup_is_said_in_its_name(

@@ -23,7 +23,7 @@ def test_growth_that_one_first_run_shows_is_named_and_no_ball(virtual_campaigns,
     held against the effect, and two balls and a point of that run were called loose and bad."""
     sim = simulator()
     loose = []
-    for seed in seeds(12, 2):
+    for seed in seeds(12, 1):
         hidden = sim.Effect("EZC1:curve", peak_um=10.0, curve=growth)
         campaign, _ = virtual_campaigns.virtual(61000 + seed, [hidden], days=1)
         told = explained(campaign)

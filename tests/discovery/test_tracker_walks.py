@@ -86,7 +86,9 @@ def test_readings_of_a_pose_share_one_part_of_the_noise() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [202, 229, 239])
+@pytest.mark.parametrize(
+    "seed", [202, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (229, 239))]
+)
 def test_a_tracker_that_walks_is_no_drift(trial: ModuleType, seed: int) -> None:
     """Each was told as a warm-up or an even drift of the tracker."""
     assert trial.told(seed, "walks", 2)[0] == []

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from monitor.discovery import explain
 from monitor.methods.tracker.method import METHOD
@@ -34,6 +35,7 @@ def named(folder: Path, seed: int, moved: str) -> list[str]:
     return [finding.effect for finding in told.missing]
 
 
+@pytest.mark.slow
 def test_a_tracker_that_walks_is_no_drift_of_the_robot(tmp_path: Path) -> None:
     """Seed 8 was told EX0J1@warmup when three of twenty such robots were, then a drift of the tracker; it is noise."""
     for seed in (8, 14):

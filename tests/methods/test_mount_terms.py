@@ -96,7 +96,13 @@ TERMS: dict[str, tuple[dict[str, float], list[float]]] = {
 }
 
 
-@pytest.mark.parametrize("effect", TERMS)
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "fork:DEC@gravity",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in TERMS if "fork" not in name),
+    ],
+)
 def test_a_term_of_an_equatorial_mount_is_found_with_its_size(effect: str, tmp_path: Path) -> None:
     """HA turns through 170 degrees, DEC through 120: parts of a turn, over which no flexure or refraction is a function
     of one axis alone. One of three nights may show one false effect: a scan has a false alarm in a hundred."""

@@ -72,17 +72,25 @@ def asked(tree: ast.AST, names: dict[str, str]) -> Iterator[tuple[int, str]]:
 def breaches(package: Path) -> list[str]:
     """Every place that asks for a method's name, as ``file:line: name``."""
     sources = {path: path.read_text(encoding="utf-8") for path in sorted(package.rglob("*.py"))}
-    trees = {path: ast.parse(source) for path, source in sources.items()}
+    names_of_methods = set(methods())
+    spelt = re.compile(rf"\.NAME\b|[\"'](?:{'|'.join(map(re.escape, sorted(names_of_methods)))})[\"']")
+    trees = {path: ast.parse(source) for path, source in sources.items() if spelt.search(source)}
     modules = {
         ".".join(path.relative_to(package.parent).with_suffix("").parts): constants(tree)
         for path, tree in trees.items()
     }
-    names_of_methods = set(methods())
-    spelt = re.compile(rf"\.NAME\b|[\"'](?:{'|'.join(map(re.escape, sorted(names_of_methods)))})[\"']")
+    # Of the others those that import a constant which is a method's name.
+    stand_for = {
+        name for names in modules.values() for name, text in names.items() if text in names_of_methods
+    }
+    imported = re.compile(rf"\b(?:{'|'.join(map(re.escape, sorted(stand_for)))})\b")
     faults = []
-    for path, tree in trees.items():
+    for path, source in sources.items():
+        if path not in trees and not (stand_for and imported.search(source)):
+            continue
+        tree = trees.get(path) or ast.parse(source)
         names = bound(tree, modules)
-        if not spelt.search(sources[path]) and names_of_methods.isdisjoint(names.values()):
+        if path not in trees and names_of_methods.isdisjoint(names.values()):
             continue
         file = path.relative_to(package).as_posix()
         for line, text in asked(tree, names):

@@ -143,7 +143,12 @@ def by_run(runs: int, count: int, size: float) -> Figure:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(
-    ("runs", "count"), [(1, 1), (200, 13), pytest.param(20, 51, marks=pytest.mark.all_seeds)]
+    ("runs", "count"),
+    [
+        (1, 1),
+        pytest.param(200, 13, marks=pytest.mark.slow),
+        pytest.param(20, 51, marks=pytest.mark.all_seeds),
+    ],
 )
 def test_parameters_by_run(runs: int, count: int, size: float) -> None:
     assert faults(by_run(runs, count, size)) == []

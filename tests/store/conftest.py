@@ -41,7 +41,7 @@ PRINTED_DEGREES = np.array([-60.0, -235.123456, 0.1, 29.9998, 359.99999, 123.456
 PRINTED_MM = np.array([191.060674, -72.530157, 0.1, 26.519621, 1e-6, -0.3])
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_campaign() -> Callable[..., Campaign]:
     """A factory of campaigns of two runs with three touches each."""
 

@@ -206,8 +206,25 @@ def _touched_at(db: Database, degrees: np.ndarray) -> None:
         )
 
 
-@pytest.mark.parametrize("weeks", [12, 40, 70])
-@pytest.mark.parametrize("source", ["runs", "touches", "one run without"])
+@pytest.mark.parametrize(
+    ("source", "weeks"),
+    [
+        ("runs", 12),
+        ("touches", 40),
+        ("one run without", 70),
+        *(
+            pytest.param(source, weeks, marks=pytest.mark.slow)
+            for source, weeks in (
+                ("runs", 40),
+                ("runs", 70),
+                ("touches", 12),
+                ("touches", 70),
+                ("one run without", 12),
+                ("one run without", 40),
+            )
+        ),
+    ],
+)
 def test_fleet_and_page_fit_the_same_temperature_beside_the_line(
     tmp_path: Path, weeks: int, source: str
 ) -> None:

@@ -84,6 +84,15 @@ PASSING = (
 )
 
 
+@pytest.fixture(scope="module")
+def ulm(tmp_path_factory: pytest.TempPathFactory, make_campaign: Make) -> Path:
+    """A database of one campaign, of which nothing is ever published."""
+    path = tmp_path_factory.mktemp("ulm") / "Ulm.duckdb"
+    with Database(path) as db:
+        import_campaign(db, make_campaign("week 1"))
+    return path
+
+
 @pytest.mark.parametrize(
     ("message", "tries"),
     [
@@ -94,11 +103,9 @@ PASSING = (
     ids=lambda value: re.sub(r"[^a-z]+", "-", value[-40:].lower()) if isinstance(value, str) else None,
 )
 def test_what_can_not_heal_is_said_at_once(
-    tmp_path: Path, make_campaign: Make, monkeypatch: pytest.MonkeyPatch, message: str, tries: int
+    ulm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, tries: int
 ) -> None:
     """A wrong password was tried for 104 s."""
-    with Database(tmp_path / "Ulm.duckdb") as db:
-        import_campaign(db, make_campaign("week 1"))
     calls: list[str] = []
 
     def attach(connection: object, address: str, *options: str) -> None:
@@ -106,10 +113,12 @@ def test_what_can_not_heal_is_said_at_once(
         raise StoreError(f"Unable to connect to Postgres at host=h: {message}")
 
     monkeypatch.setattr(publication, "attach", attach)
+    # Loading the extensions takes longer than all the rest.
+    monkeypatch.setattr(publication, "connection_with_extensions", duckdb.connect)
     monkeypatch.setattr(publication, "_TRIES", 4)
     monkeypatch.setattr(publication, "_TRIES_OF_UNSURE", 3)
     monkeypatch.setattr(publication.time, "sleep", lambda seconds: None)
-    with SharedDatabase(tmp_path / "Ulm.duckdb") as db, pytest.raises(StoreError, match="Unable to connect"):
+    with SharedDatabase(ulm) as db, pytest.raises(StoreError, match="Unable to connect"):
         publish(db, f"ducklake:{tmp_path}/lake.ducklake", files=tmp_path / "files")
     assert len(calls) == tries
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -334,15 +334,20 @@ def longest_pitch(travel: float) -> float:
 
 def pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
     """The shortest and the longest pitch in mm that the positions of every linear axis can show."""
-    series = _series(context)
-    return {
-        joint.name: (
-            _shortest_of(context.positions[:, index], series),
-            float(np.ptp(context.positions[:, index])),
-        )
-        for index, joint in enumerate(context.chain.joints)
-        if joint.kind == "linear"
-    }
+    limits = {}
+    for index, joint in enumerate(context.chain.joints):
+        if joint.kind == "linear":
+            # A search asks for them some twenty times.
+            shortest, travel = context.remembered(
+                _pitch_limits_of, index, partial(_pitch_limits_of, context, index)
+            )
+            limits[joint.name] = float(shortest), float(travel)
+    return limits
+
+
+def _pitch_limits_of(context: Context, index: int) -> Array:
+    positions = context.positions[:, index]
+    return np.array([_shortest_of(positions, _series(context)), np.ptp(positions)])
 
 
 def _series(context: Context) -> list[npt.NDArray[np.int64]]:
@@ -370,7 +375,7 @@ def _shortest_pitch(positions: Array) -> float:
     ordered = np.sort(positions)
     # Touches of one nominal place scatter by less than a step of the grid.
     stops = np.split(ordered, np.flatnonzero(np.diff(ordered) > SHORTEST_PITCH_MM / 2.0) + 1)
-    if max(float(np.ptp(stop)) for stop in stops) > GRID_TOLERANCE_MM:
+    if max(float(stop[-1] - stop[0]) for stop in stops) > GRID_TOLERANCE_MM:
         return 0.0
     if len(stops) < FEWEST_POSITIONS:
         return float("inf")
