@@ -217,7 +217,7 @@ class Fit:
         whitening = None if correlation is None else Whitening(self._layouts[correlation.frame], correlation)
         other = replace(self, whitening=whitening)
         # What the noise does not change is computed once for all correlations.
-        vars(other).update({name: known for name, known in vars(self).items() if name not in OF_NOISE})
+        vars(other).update({name: value for name, value in vars(self).items() if name not in OF_NOISE})
         return other
 
     @cached_property
