@@ -10,11 +10,8 @@ import pytest
 import scipy
 
 from monitor.discovery import fit
-from monitor.discovery.machine.evidence.noise_doubt import (
-    MOST_CORRELATIONS,
-    SMALLEST_WEIGHT,
-    NoiseDoubt,
-)
+from monitor.discovery.machine.evidence.noise_doubt import NoiseDoubt
+from monitor.discovery.machine.fit import MOST_CORRELATIONS, SMALLEST_WEIGHT
 from monitor.discovery.machine.noise.correlation import GRID, Correlation, NoiseDesign
 from monitor.discovery.machine.noise.rows import Rows
 from monitor.discovery.machine.noise.whitening import Whitening

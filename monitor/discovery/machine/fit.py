@@ -22,6 +22,13 @@ from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.chain.sufficiency import refuse_exact_fits
 from monitor.records import Array
 
+#: What of a fit the correlation of its noise changes.
+OF_NOISE = frozenset({"whitening", "nuisance", "nuisance_by_rows", "white", "in_likely_noise"})
+#: So many correlations hold nearly all of the weight; where hundreds share it their p-values are alike.
+MOST_CORRELATIONS = 24
+#: Below this part of the largest weight a correlation says nothing: the smallest p-value that is asked for is 1e-5.
+SMALLEST_WEIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Nuisance:
@@ -207,9 +214,21 @@ class Fit:
 
     def with_correlation(self, correlation: Correlation | None) -> Fit:
         """The fit with the noise of neighbours correlated as said."""
-        if correlation is None:
-            return replace(self, whitening=None)
-        return replace(self, whitening=Whitening(self._layouts[correlation.frame], correlation))
+        whitening = None if correlation is None else Whitening(self._layouts[correlation.frame], correlation)
+        other = replace(self, whitening=whitening)
+        # What the noise does not change is computed once for all correlations.
+        vars(other).update({name: value for name, value in vars(self).items() if name not in OF_NOISE})
+        return other
+
+    @cached_property
+    def in_likely_noise(self) -> list[tuple[float, Fit]]:
+        """The weight of every correlation that the residuals allow, and the fit with it."""
+        stated = None if self.whitening is None else self.whitening.correlation
+        likelihoods = self.noise_design_under(stated, whole=False).likelihoods(self.solution.last.residual)
+        best = sorted(likelihoods, key=lambda each: -each[1])[:MOST_CORRELATIONS]
+        likely = [each for each in best if each[1] >= SMALLEST_WEIGHT * best[0][1]]
+        total = sum(weight for _, weight in likely)
+        return [(weight / total, self.with_correlation(correlation)) for correlation, weight in likely]
 
     @cached_property
     def degrees_of_freedom(self) -> int:

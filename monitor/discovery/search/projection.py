@@ -21,6 +21,8 @@ def orthonormal_by(columns: Array) -> tuple[Array, Array]:
         return columns, np.zeros((0, 0))
     gram = columns.T @ columns
     scale = np.sqrt(np.diagonal(gram))
+    if len(scale) == 1 and scale[0] > 0.0:
+        return columns / scale, 1.0 / scale[:, None]
     scale = np.where(scale == 0, 1.0, scale)
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     keep = values > RELATIVE_RANK * max(float(values.max()), 1.0)

@@ -9,7 +9,6 @@ would have it (the posterior predictive p-value of Meng, Ann. Statist. 22 (1994)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 import scipy
@@ -17,13 +16,9 @@ import scipy
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.scene_columns import columns_of
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.records import Array
-
-# So many correlations hold nearly all of the weight; where hundreds share it their p-values are alike.
-MOST_CORRELATIONS = 24
-# Below this part of the largest weight a correlation says nothing: the smallest p-value that is asked for is 1e-5.
-SMALLEST_WEIGHT = 1e-3
 
 
 class NoiseDoubt:
@@ -31,33 +26,32 @@ class NoiseDoubt:
 
     def __init__(self, scene: ChainScene) -> None:
         self._scene = scene
-
-    @cached_property
-    def _fits(self) -> list[tuple[float, Fit]]:
-        """The weight of every correlation that the residuals allow, and the fit with it."""
-        fit = self._scene.fit
-        stated = None if fit.whitening is None else fit.whitening.correlation
-        design = fit.noise_design_under(stated, whole=False)
-        likelihoods = design.likelihoods(fit.solution.last.residual)
-        best = sorted(likelihoods, key=lambda each: -each[1])[:MOST_CORRELATIONS]
-        likely = [each for each in best if each[1] >= SMALLEST_WEIGHT * best[0][1]]
-        total = sum(weight for _, weight in likely)
-        return [(weight / total, fit.with_correlation(correlation)) for correlation, weight in likely]
+        self._columns: Memory[list[Array]] = Memory()
 
     def p_value(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
         """Return the mean p-value of an effect beside others over the correlations, its searched values not counted."""
-        return float(sum(weight * _p_value(fit, others, candidate) for weight, fit in self._fits))
+        noises = self._scene.fit.in_likely_noise
+        designs = zip(*map(self._columns_of, (*others, candidate)), strict=True)
+        return sum(
+            weight * _p_value(fit, *columns) for (weight, fit), columns in zip(noises, designs, strict=True)
+        )
+
+    def _columns_of(self, candidate: ChainCandidate) -> list[Array]:
+        """The columns (M, k) of an effect under each correlation: what is selected stands beside many."""
+        noises = self._scene.fit.in_likely_noise
+        return self._columns.answer(
+            (), candidate, lambda: [columns_of(fit, [candidate.basis])[0].columns.T for _, fit in noises]
+        )
 
 
-def _p_value(fit: Fit, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
-    """The p-value of F of an effect beside others under the noise of a fit."""
-    designs = [each.columns.T for each in columns_of(fit, [effect.basis for effect in (*others, candidate)])]
-    basis = orthonormal(np.concatenate([fit.nuisance.shared, *designs[:-1]], axis=1))
+def _p_value(fit: Fit, *columns: Array) -> float:
+    """The p-value of F of the last columns beside the others under the noise of a fit."""
+    basis = orthonormal(np.concatenate([fit.nuisance.shared, *columns[:-1]], axis=1))
     residual: Array = without(basis, fit.white.reshape(-1, 1))[:, 0]
-    columns = orthonormal(without(basis, designs[-1]))
-    rank = columns.shape[1]
+    tested = orthonormal(without(basis, columns[-1]))
+    rank = tested.shape[1]
     freedom = fit.degrees_of_freedom + fit.nuisance.shared_rank - basis.shape[1] - rank
-    explained = float(np.sum((columns.T @ residual) ** 2))
+    explained = float(np.sum((tested.T @ residual) ** 2))
     rest = float(residual @ residual) - explained
     if rank == 0 or freedom < 1 or rest <= 0.0:
         return 1.0

@@ -199,17 +199,11 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     one."""
     rows = _rows_of(campaign, doubted.setups)
     is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
-    part = _part(campaign, rows)
-    measured = measured_columns(part)
-    # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
-    of_units = [*unit_mistakes(measured, 1.0)]
-    of_readings = of_units
-    if not doubted.is_still:
-        frames = _mistaken_frames(part, doubted.setups)
-        of_readings = [*reading_mistakes(part), *all_signs(measured), *of_units, *frames]
-    # The axes of several setups of one instrument are those of the machine, which all others move too.
-    of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
+    of_readings, of_axes = _trials(_part(campaign, rows), doubted)
     count = len(of_readings) + len(of_axes)
+    if _by_chance(doubted, 0.0, count, is_quiet=doubted.is_quiet) >= BY_CHANCE:
+        # It contradicts by so little that even who agrees in full, with a mistake undone, may do so by chance.
+        return []
     total = first.sum_of_squares
     of_one_step = total - FORESEEN * doubted.excess, OF_AXES * total
     for trials, limit in zip((of_readings, of_axes), of_one_step, strict=True):
@@ -229,6 +223,20 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         if cures:
             return cures
     return []
+
+
+def _trials(part: Campaign, doubted: _Doubted) -> tuple[list[Trial], list[Trial]]:
+    """The mistakes that are tried in the rows of who is doubted: of its readings, and of the axes."""
+    measured = measured_columns(part)
+    # Readings in a smaller unit would be next to nothing once that is undone, which contradicts nothing.
+    of_units = [*unit_mistakes(measured, 1.0)]
+    of_readings = of_units
+    if not doubted.is_still:
+        frames = _mistaken_frames(part, doubted.setups)
+        of_readings = [*reading_mistakes(part), *all_signs(measured), *of_units, *frames]
+    # The axes of several setups of one instrument are those of the machine, which all others move too.
+    of_axes = [] if doubted.is_still or len(doubted.setups) > 1 else [*_mistaken_axes(part)]
+    return of_readings, of_axes
 
 
 def _contradicts_itself(alone: Campaign, problem_of: Maker, run: int) -> bool:
@@ -271,8 +279,15 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
         return is_in_order and (contrast is None or contrast.p > DOUBTFUL)
     if contrast is None or contrast.directions < doubted.directions:
         return False
-    count_of_quiet = count * QUIETS if doubted.is_quiet and is_in_order else count
-    return count_of_quiet * (max(contrast.size, 1.0) / doubted.size) ** doubted.directions < BY_CHANCE
+    return _by_chance(doubted, contrast.size, count, is_quiet=doubted.is_quiet and is_in_order) < BY_CHANCE
+
+
+def _by_chance(doubted: _Doubted, size: float, count: int, *, is_quiet: bool) -> float:
+    """How often chance brings one of so many mistakes undone to contradict others by no more than a ``size``; 0 where
+    who is doubted contradicts itself alone, or is still."""
+    if not doubted.directions or doubted.is_still:
+        return 0.0
+    return count * (QUIETS if is_quiet else 1.0) * (max(size, 1.0) / doubted.size) ** doubted.directions
 
 
 def _explains(free: int, recorded: float, undone: float) -> bool:

@@ -20,7 +20,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.candidate import Variant
-from monitor.discovery.search.evidence import weigh
+from monitor.discovery.search.evidence import weigh_in
 from monitor.discovery.search.missing import Searched
 from monitor.discovery.search.plausible import is_determined
 from monitor.discovery.search.projection import orthonormal, without
@@ -167,14 +167,15 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if searched is None:
         return Refined(candidate, None, np.zeros((len(scene.residual), 0)))
     variant = searched.variant
-    others = scene.columns(except_for(selected, index))
+    others = except_for(selected, index)
+    beside = scene.remainders.beside(others)
 
     def at(value: float) -> ChainCandidate:
         return scene_of(scene.fit, [variant(value)]).candidates[0]
 
     def badness(logarithm: float) -> float:
         trial = at(float(np.exp(logarithm)))
-        (evidence,) = weigh([trial], scene.residual, others, scene.degrees_of_freedom)
+        (evidence,) = weigh_in(beside, [trial])
         return -evidence.explained
 
     value = float(np.exp(_best_logarithm(badness, searched)))
@@ -183,7 +184,7 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     step = min(STEP, STEP_OF_WIDTH * searched.width)
     high, low = at(value * (1.0 + step)), at(value * (1.0 - step))
     slope = ((high.columns - low.columns) @ estimate / (2.0 * step * value))[:, None]
-    u = _uncertainty(scene, refined, slope, others)
+    u = _uncertainty(scene, refined, slope, scene.columns(others))
     likely = searched.likely(value)
     if likely is not None and abs(likely - value) < 2.0 * u:
         value, refined = likely, at(likely)
