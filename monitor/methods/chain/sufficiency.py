@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Joint
 from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
+
+
+@dataclass(frozen=True)
+class OpenUnknowns:
+    """How many unknowns of a run its plan leaves open: ``told`` less than a step can rest on, and of these those that a
+    fit takes for determined all the same (``for_a_fit``): it turns small readings into metres there."""
+
+    told: int
+    for_a_fit: int
 
 
 def still_joints(problem: ChainProblem, run: int, *kinds: str) -> list[Joint]:
@@ -52,17 +61,16 @@ def readings_of_runs(problem: ChainProblem) -> dict[int, int]:
     }
 
 
-def open_at_start(problem: ChainProblem) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """How many unknowns of a run each run's plan leaves open at the first guess (R,), and how many of these it does
-    not leave open either, for a fit: by small angles of a plan, which a step turns into metres (R,)."""
+def open_at_start(problem: ChainProblem) -> list[OpenUnknowns]:
+    """What the plan of each run leaves open, by the derivatives at the first guess."""
     begin, common = problem.start, problem.common_start
     of_runs = (problem.condensed if problem.is_in_parts else problem.linearise)(begin, common).local
     scale = np.linalg.norm(of_runs, axis=1, keepdims=True)
     singular = np.linalg.svd(of_runs / np.where(scale == 0.0, 1.0, scale), compute_uv=False)
-    unknowns = of_runs.shape[-1]
-    relative = singular / singular.max(axis=-1, keepdims=True)
-    told, for_a_fit = ((relative > limit).sum(axis=-1) for limit in (COMMON_RANK_TOLERANCE, RANK_TOLERANCE))
-    return unknowns - told, for_a_fit - told
+    relative = singular / np.where(singular[:, :1] == 0.0, 1.0, singular[:, :1])
+    told, for_a_fit = ((relative > limit).sum(axis=1) for limit in (COMMON_RANK_TOLERANCE, RANK_TOLERANCE))
+    unknowns = of_runs.shape[2]
+    return [OpenUnknowns(unknowns - int(a), int(b) - int(a)) for a, b in zip(told, for_a_fit, strict=True)]
 
 
 def _refuse(whose: str, numbers: int, without: Mapping[int, int]) -> NoReturn:

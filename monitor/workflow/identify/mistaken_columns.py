@@ -21,7 +21,7 @@ from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
 from monitor.row_files import rows_in, runs_in
-from monitor.workflow.identify.poor_runs import refusal_of_poor_runs
+from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs
 from monitor.workflow.tool_frames import tool_frames
 
 
@@ -46,8 +46,9 @@ def with_mistake(
     Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
     it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
     that would let the readings fit, which takes up to half a minute, and as long again without rows of zeros, which are
-    named too where that is enough; where no change is and the plan of a run leaves unknowns open, that it does; else what the import noticed of the columns is said. Where the
-    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
+    named too where that is enough. Where no change is, runs are named whose plan leaves unknowns open, else what the
+    import noticed of the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought.
+    Of very many rows a part is tried.
     """
     if isinstance(refusal, TooFewReadingsError):
         return _with_files(refusal, campaign)
@@ -76,14 +77,17 @@ def with_mistake(
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
+    alike: tuple[str, ...] = ()
     if not any(mistake.enough for mistake in mistakes) and "First look at" not in str(refusal):
         poor = refusal_of_poor_runs(campaign, problem_of)
         if poor is not None:
             return _with_files(poor, campaign)
+        if not mistakes:
+            alike = hardly_told(campaign, problem_of)
     said = (
         (*named, mistake_sentence(mistakes_found(mistakes)))
         if mistakes
-        else column_doubts(campaign, tool_frames(campaign))
+        else (*alike, *column_doubts(campaign, tool_frames(campaign)))
     )
     return _with_sentences(refusal, said) if said else refusal
 
