@@ -38,12 +38,12 @@ def joint_region_lacks(needed: int, fewest: float) -> str:
 
 def region_for_others(others: Sequence[str]) -> str:
     """Return for which other times there is a region as it is, for the end of a refusal; empty where for none."""
-    words = {
+    by_time = {
         "run": "`--holds-for run` (the run itself)",
         "day": "`--holds-for day` (the day of the run)",
         "campaign": "`--holds-for campaign` (other days too)",
     }
-    listed = " or ".join(words[other] for other in others)
+    listed = " or ".join(by_time[other] for other in others)
     return f", unless it is to hold for another time: there is a region with {listed}" if others else ""
 
 

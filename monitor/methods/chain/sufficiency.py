@@ -16,10 +16,10 @@ from monitor.methods.chain.problem import ChainProblem
 
 @dataclass(frozen=True)
 class OpenUnknowns:
-    """How many unknowns of a run its plan leaves open: ``told`` less than a step can rest on, and of these those that a
+    """How many unknowns of a run its plan leaves open: ``count`` in all, and of these those that a
     fit takes for determined all the same (``for_a_fit``): it turns small readings into metres there."""
 
-    told: int
+    count: int
     for_a_fit: int
 
 
@@ -68,9 +68,13 @@ def open_at_start(problem: ChainProblem) -> list[OpenUnknowns]:
     scale = np.linalg.norm(of_runs, axis=1, keepdims=True)
     singular = np.linalg.svd(of_runs / np.where(scale == 0.0, 1.0, scale), compute_uv=False)
     relative = singular / np.where(singular[:, :1] == 0.0, 1.0, singular[:, :1])
-    told, for_a_fit = ((relative > limit).sum(axis=1) for limit in (COMMON_RANK_TOLERANCE, RANK_TOLERANCE))
+    determined, for_a_fit = (
+        (relative > limit).sum(axis=1) for limit in (COMMON_RANK_TOLERANCE, RANK_TOLERANCE)
+    )
     unknowns = of_runs.shape[2]
-    return [OpenUnknowns(unknowns - int(a), int(b) - int(a)) for a, b in zip(told, for_a_fit, strict=True)]
+    return [
+        OpenUnknowns(unknowns - int(a), int(b) - int(a)) for a, b in zip(determined, for_a_fit, strict=True)
+    ]
 
 
 def _refuse(whose: str, numbers: int, without: Mapping[int, int]) -> NoReturn:

@@ -15,7 +15,12 @@ from monitor.store import Database, StoredModel
 from monitor.workflow.certificate.files import HashedFile, font_hashes
 from monitor.workflow.certificate.inputs import CertificateInputs, RunInputs
 from monitor.workflow.certificate.orders import Measured
-from monitor.workflow.certificate.results import StoredMonteCarlo, bounds_a_region, stored_monte_carlo
+from monitor.workflow.certificate.results import (
+    StoredMonteCarlo,
+    bounds_a_region,
+    no_region,
+    stored_monte_carlo,
+)
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty.request import Asked, UncertaintyRequest
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -69,10 +74,18 @@ def _evaluated(
     return StatedUncertainty(campaign, model, statement(evaluate(db, request)))
 
 
-def times_with_a_region(
+def refuse_without_region(
+    db: Database, campaign: Campaign, model: StoredModel, runs: Sequence[CertifiedRun], asked: Asked
+) -> None:
+    """Raise DataError where a run bounds no region that can be certified, naming the times for which all runs do."""
+    for run in runs:
+        if not bounds_a_region(run.evaluated):
+            raise no_region(run.evaluated, _times_with_a_region(db, campaign, model, runs, asked))
+
+
+def _times_with_a_region(
     db: Database, campaign: Campaign, model: StoredModel, runs: Sequence[CertifiedRun], asked: Asked
 ) -> tuple[HoldsFor, ...]:
-    """Return for which other times than was ``asked`` all of the runs bound a region that can be certified."""
     return tuple(
         time
         for time in HoldsFor

@@ -63,6 +63,16 @@ def with_mistake(
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
         return _with_sentences(refusal, exchanged)
+    return _with_changes(refusal, campaign, problem_of, blank)
+
+
+def _with_changes(
+    refusal: DataError,
+    campaign: Campaign,
+    problem_of: Callable[[Campaign], ChainProblem],
+    blank: Collection[tuple[int, int]],
+) -> DataError:
+    """The refusal with the changes that would let the readings fit; without one, with the runs whose plan is why."""
     # Loaded here: only readings that contradict the file need the search.
     from monitor.discovery import find_mistakes, only_misread
     from monitor.reporting.machine_finding import mistake_sentence
@@ -77,18 +87,15 @@ def with_mistake(
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
-    alike: tuple[str, ...] = ()
-    if not any(mistake.enough for mistake in mistakes) and "First look at" not in str(refusal):
+    names_no_reading = "First look at" not in str(refusal)
+    if names_no_reading and not any(mistake.enough for mistake in mistakes):
         poor = refusal_of_poor_runs(campaign, problem_of)
         if poor is not None:
             return _with_files(poor, campaign)
-        if not mistakes:
-            alike = hardly_told(campaign, problem_of)
-    said = (
-        (*named, mistake_sentence(mistakes_found(mistakes)))
-        if mistakes
-        else (*alike, *column_doubts(campaign, tool_frames(campaign)))
-    )
+    if mistakes:
+        return _with_sentences(refusal, (*named, mistake_sentence(mistakes_found(mistakes))))
+    alike = hardly_told(campaign, problem_of) if names_no_reading else ()
+    said = (*alike, *column_doubts(campaign, tool_frames(campaign)))
     return _with_sentences(refusal, said) if said else refusal
 
 

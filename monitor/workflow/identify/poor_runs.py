@@ -10,8 +10,8 @@ from monitor.exceptions import MonitorError, TooFewReadingsError
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.chain.sufficiency import OpenUnknowns, open_at_start, readings_of_runs
 from monitor.readers.doubts.unit_doubts import runs_in_units
-from monitor.readers.faults import and_of
 from monitor.records import Campaign
+from monitor.reporting.run_left_out import poor_runs_refused, poses_too_few
 from monitor.workflow.campaign_parts import without_runs
 
 
@@ -21,27 +21,18 @@ def refusal_of_poor_runs(
     """The refusal of a campaign that no machine of the file fits because of runs whose plan leaves unknowns open that
     other runs determine, by the derivatives at the first guess; None where it fits without them no better."""
     open_unknowns, readings = _at_start(campaign, problem_of)
-    fewest = min((each.told for each in open_unknowns), default=0)
+    fewest = min((each.count for each in open_unknowns), default=0)
     poor = {
-        run: each.told - fewest
+        run: each.count - fewest
         for run, each in zip(readings, open_unknowns, strict=True)
-        if each.told > fewest
+        if each.count > fewest
     }
     if not poor or {odd.run for odd in runs_in_units(campaign)} & set(poor):
         return None
     if not _fits(campaign, poor, problem_of):
         return None
-    each_of = [
-        f"the {readings[run]} readings of run {run} leave {count} unknown{'s' * (count > 1)} of the model open"
-        for run, count in poor.items()
-    ]
-    runs = f"run{'s' * (len(poor) > 1)} {and_of(list(map(str, poor)))}"
-    return TooFewReadingsError(
-        f"{and_of(each_of)} that the other runs determine: with {runs} no fit holds, without one does; "
-        f"measure the rest of the poses; or leave {runs} out",
-        {run: readings[run] for run in poor},
-        poor,
-    )
+    of_poor = {run: readings[run] for run in poor}
+    return TooFewReadingsError(poor_runs_refused(of_poor, poor), of_poor, poor)
 
 
 def hardly_told(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> tuple[str, ...]:
@@ -51,11 +42,7 @@ def hardly_told(campaign: Campaign, problem_of: Callable[[Campaign], ChainProble
     hardly = min((each.for_a_fit for each in open_unknowns), default=0)
     if hardly == 0:
         return ()
-    whose = f"run {next(iter(readings))}" if len(readings) == 1 else "every run"
-    return (
-        f"or the poses are too few: those of {whose} hardly tell {hardly} unknown{'s' * (hardly > 1)} of the model "
-        "from others; if the measurement was broken off, measure the rest",
-    )
+    return (poses_too_few(next(iter(readings)) if len(readings) == 1 else None, hardly),)
 
 
 def _at_start(
