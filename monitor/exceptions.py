@@ -63,12 +63,18 @@ class TooManyRowsError(DataError):
 class TooFewReadingsError(DataError):
     """Fewer readings than unknowns, or as many: any mistake of the readings would fit them, and none is looked for.
 
-    ``by_run`` are the readings of each run that has no more, where the campaign without these has more.
+    ``by_run`` are the readings of each run that has no more, where the campaign without these has more;
+    ``undetermined`` says of those that have more how many unknowns they leave open that other runs determine.
     """
 
-    def __init__(self, message: str, by_run: Mapping[int, int] | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        by_run: Mapping[int, int] | None = None,
+        undetermined: Mapping[int, int] | None = None,
+    ) -> None:
         super().__init__(message)
-        self.by_run = dict(by_run or {})
+        self.by_run, self.undetermined = dict(by_run or {}), dict(undetermined or {})
 
 
 class NotConvergedError(DataError):

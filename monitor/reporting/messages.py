@@ -36,6 +36,17 @@ def joint_region_lacks(needed: int, fewest: float) -> str:
     return f", at least {needed}, and have {fewest:.4g}: {runs} on days of repeated runs would do"
 
 
+def region_for_others(others: Sequence[str]) -> str:
+    """Return for which other times there is a region as it is, for the end of a refusal; empty where for none."""
+    by_time = {
+        "run": "`--holds-for run` (the run itself)",
+        "day": "`--holds-for day` (the day of the run)",
+        "campaign": "`--holds-for campaign` (other days too)",
+    }
+    listed = " or ".join(by_time[other] for other in others)
+    return f", unless it is to hold for another time: there is a region with {listed}" if others else ""
+
+
 def model_refuted(campaigns: Sequence[str], judged: int, model: str, p_value: float) -> str:
     """Return that the readings of campaigns, the latest last, refute its model, and what to type.
 

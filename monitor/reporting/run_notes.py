@@ -12,6 +12,9 @@ from monitor.documents import Sentence
 from monitor.reporting.messages import joined_by_and, simulated
 from monitor.units import MICROMETRE
 
+#: A number that a wrong reading moves by less than this many standard uncertainties is still one of its run.
+STILL_HELD = 1.0
+
 
 @dataclass(frozen=True)
 class AxisAt:
@@ -30,7 +33,8 @@ class GrossReadingNoted(Sentence):
     """A reading that is wrong beyond doubt: where it stands in the file; ``others`` may be the wrong one instead.
 
     ``is_along_surface``: the touch stands elsewhere on its surface than in the other runs. ``row`` says which row to
-    correct, by its file.
+    correct, by its file; ``moves`` by how many standard uncertainties it moves the number that it moves most, None
+    where that is not known.
     """
 
     run: int
@@ -43,6 +47,7 @@ class GrossReadingNoted(Sentence):
     others: tuple[int, ...]
     is_along_surface: bool = False
     row: str = "the row in probings.csv"
+    moves: float | None = None
 
     def __str__(self) -> str:
         stands = f" at {' '.join(map(str, self.pose))}" if self.pose else ""
@@ -50,11 +55,12 @@ class GrossReadingNoted(Sentence):
         size = f"{MICROMETRE.to_display(self.size):+.3g} µm" if small else f"{self.size:+.3g} mm"
         others = ", ".join(map(str, self.others))
         instead = f" (or sequence {others}: these readings cannot say which)" if others else ""
-        holds = (
-            "the other runs touched the surface elsewhere, and only a flat one hides that"
-            if self.is_along_surface
-            else "no number of this run holds"
-        )
+        holds = "no number of this run holds"
+        if self.is_along_surface:
+            holds = "the other runs touched the surface elsewhere, and only a flat one hides that"
+        elif self.moves is not None and self.moves < STILL_HELD:
+            moves = max(round(self.moves, 2), 0.01)
+            holds = f"it moves the geometric errors of this run by up to {moves:.2g} times the stated u"
         return (
             f"run {self.run}: sequence {self.sequence}, {self.target_word} {self.target}{stands}, is off by {size} in "
             f"{self.axis}{instead}: {holds}; correct or remove {self.row}, withdraw the campaign and import it again"

@@ -18,6 +18,7 @@ from monitor.methods.chain.parts import parts_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.readers.row_places import RowPlaces
+from monitor.workflow.campaign_parts import without_runs
 from monitor.workflow.identify.notes import gross_noted
 from monitor.workflow.intake.gross_doubts import gross_doubts
 
@@ -180,6 +181,24 @@ def test_the_sentence_says_run_row_ball_pose_and_size(virtual_campaigns):
     method = campaign_method(spoiled)
     (reading,) = method.identify(spoiled, Model("samba")).gross
     assert str(gross_noted(reading, method.nouns.target, RowPlaces(spoiled))) == sentence
+
+
+def test_a_reading_that_hardly_moves_its_run_is_said_to(virtual_campaigns):
+    """Was: "no number of this run holds" of one reading of 2.4 um, which moved them by 0.06 u."""
+    campaign = without_runs(virtual_campaigns.on_machine("trunnion", 5)[0], range(3, 21))
+    method = campaign_method(campaign)
+    right = method.identify(campaign).runs[1]
+    u = np.sqrt(np.diag(right.covariance))
+    for size in (0.015, 0.05):
+        spoiled = wrong.with_wrong_reading(campaign, int(second_run(campaign)[5]), "Y", size)
+        found = method.identify(spoiled)
+        (reading,) = found.gross
+        moved = float(np.nanmax(np.abs(found.runs[1].estimate - right.estimate) / u))
+        # The run's own noise of that reading is in what it is held against.
+        assert reading.moves == pytest.approx(moved, rel=0.3)
+        sentence = str(gross_noted(reading, method.nouns.target, RowPlaces(spoiled)))
+        held = f"it moves the geometric errors of this run by up to {reading.moves:.2g} times the stated u"
+        assert (held if reading.moves < 1.0 else "no number of this run holds") in sentence
 
 
 def test_identify_says_which_reading_of_a_touch_far_off_is_wrong_and_what_would_be_right():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -91,3 +94,27 @@ def test_a_setup_whose_rows_cannot_be_read_is_not_said_to_have_none(tmp_path: Pa
     with pytest.raises(CampaignError, match="'1:2' is not a number") as refused:
         read_campaign(tmp_path)
     assert {fault.file for fault in refused.value.faults} == {"probings.csv"}
+
+
+def test_a_setup_of_which_no_row_names_a_target_is_its_own(tmp_path: Path) -> None:
+    """Was: "'' is not a name" of a laser beside a plate, whose balls have names."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "four-instruments"
+    folder = shutil.copytree(example, tmp_path / "named")
+    rows = list(csv.DictReader((folder / "probings.csv").read_text(encoding="utf-8").splitlines()))
+
+    def with_targets(target: Callable[[int, str], str]) -> Campaign:
+        with (folder / "probings.csv").open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, [*rows[0], "target"])
+            writer.writeheader()
+            writer.writerows(
+                {**row, "target": target(number, row["setup"])} for number, row in enumerate(rows)
+            )
+        campaign = read_campaign(folder)
+        assert isinstance(campaign, Campaign)
+        return campaign
+
+    named = with_targets(lambda _, setup: setup)
+    empty = with_targets(lambda _, setup: "" if setup.startswith("laser") else setup)
+    assert empty.probings.target.tolist() == named.probings.target.tolist()
+    with pytest.raises(CampaignError, match=r"line 3, column target: '' is not a name"):
+        with_targets(lambda number, setup: "" if number == 1 else setup)

@@ -21,7 +21,7 @@ from scipy import stats
 
 from monitor.cli import main
 from monitor.documents import from_document, to_document
-from monitor.exceptions import InputError
+from monitor.exceptions import DataError, InputError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.page import _printed
 from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement
@@ -29,6 +29,7 @@ from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_campaign, load_certificate
+from monitor.workflow.campaign_parts import without_runs
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.certificate.issue import issue
@@ -347,3 +348,20 @@ def test_remake_says_when_the_stored_document_is_another(
         pass
     assert main(["--db", str(tmp_path / "empty.duckdb"), "certificate", "show", "--remake", "x.pdf"]) == 2
     assert "--remake needs the number" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_certificate_without_a_region_names_the_times_that_have_one(db: Database, tmp_path: Path) -> None:
+    """Was: only that more runs are needed, of 12 runs on three days."""
+    whole = replace(load_campaign(db, "limited"), name="three-days")
+    import_campaign(db, without_runs(whole, range(13, 21)))
+    asked = {"laboratory": LABORATORY, "out": tmp_path, "issued_on": DAY, "draft": True}
+    for time in (None, "day"):
+        with pytest.raises(
+            DataError,
+            match=r"too few for a joint region of 13 parameters: .* there is a region with `--holds-for run` \(the run "
+            r"itself\) or `--holds-for campaign` \(other days too\)$",
+        ):
+            issue(db, CertificateRequest("three-days", 12, holds_for=time, **asked))
+    for time in ("run", "campaign"):
+        assert issue(db, CertificateRequest("three-days", 12, holds_for=time, **asked)).file

@@ -10,15 +10,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 import monitor
 from monitor.exceptions import TooFewReadingsError
 from monitor.methods.instruments.method import problem_of
+from monitor.methods.samba.method import problem_of as samba_problem
 from monitor.readers import read_campaign
+from monitor.records import Campaign
 from monitor.reporting.health.sentences import RunsNamed
+from monitor.store import Database, import_campaign
+from monitor.workflow.campaign_parts import without_runs
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.explain.request import ExplainRequest
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.runs import Span
+from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.mistaken_columns import with_mistake
+from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs
+from monitor.workflow.identify.request import IdentifyRequest
+from tests.discovery.virtual import as_campaign
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUESTIONS = ("identify", "compare", "explain", "uncertainty", "predict", "map", "contributions")
@@ -126,3 +138,61 @@ def test_rows_are_removed_from_the_files_that_there_are(tmp_path: Path) -> None:
         "or leave runs 2, 3 out: remove their rows from [[runs]] of cmm.toml and 1.csv, 2.csv, "
         "withdraw the campaign and import it again"
     )
+
+
+@pytest.fixture(scope="module")
+def cut() -> Campaign:
+    """Two runs on a machine with a table and a head, of which the second ended after 30 of 58 touches: it has 90
+    readings and 34 unknowns, and its head never turned."""
+    sim = simulator()
+    poses = [{"A": 0, "B": 0, "C1": angle} for angle in (0, 90, 180, 270)]
+    poses += [{"A": angle, "B": 0, "C1": 0} for angle in (30, 60, 90, -45, -90)]
+    poses += [{"A": a, "B": b, "C1": 0} for a, b in ((0, 30), (0, 60), (0, -60), (45, 45), (-45, -45))]
+    plan = sim.indexed_plan("table and head", poses, bar_after=1, probe_uncertainty_um=1.0)
+    schedule = sim.working_days(np.random.default_rng(0), days=1, runs_per_day=2)
+    machine = sim.SimulatedMachine(
+        topology="w A Y b X Z B (C1) t",
+        signs=dict.fromkeys(("A", "Y", "X", "Z", "B", "C1"), 1.0),
+        terms={"EXX:poly1": 18e-6, "EYY:poly1": -12e-6},
+        effects=(),
+        tip_mm=(0.0, 0.0, -150.0),
+        down=(0.0, 0.0, -1.0),
+    )
+    told = sim.simulate(plan, machine, schedule, np.random.default_rng((0, 5)), noise_um=1.0)
+    campaign = as_campaign(plan, machine, schedule, told, keep=(told["run"] == 1) | (told["sequence"] <= 30))
+    return replace(campaign, probe=replace(campaign.probe, tip=(0.0, 0.0, -150.0)))
+
+
+def test_a_run_with_more_readings_than_unknowns_but_a_poor_plan_is_named(cut: Campaign) -> None:
+    """Was: "the readings contradict the machine file"."""
+    refusal = refusal_of_poor_runs(cut, samba_problem)
+    assert refusal is not None
+    assert (refusal.by_run, refusal.undetermined) == ({2: 90}, {2: 5})
+    assert str(with_mistake(refusal, cut, samba_problem)).endswith(
+        "or leave run 2 out: remove its rows from runs.csv and probings.csv, withdraw the campaign and import it again"
+    )
+    # A file that the whole runs contradict too is no matter of the short one.
+    turned = dict(cut.probings.readings) | {"A": -cut.probings.readings["A"]}
+    assert (
+        refusal_of_poor_runs(replace(cut, probings=replace(cut.probings, readings=turned)), samba_problem)
+        is None
+    )
+    assert refusal_of_poor_runs(without_runs(cut, [2]), samba_problem) is None
+    assert hardly_told(without_runs(cut, [2]), samba_problem) == ()
+    (alone,) = hardly_told(without_runs(cut, [1]), samba_problem)
+    assert "those of run 2 hardly tell 1 unknown of the model from others" in alone
+
+
+@pytest.mark.slow
+def test_explain_leaves_a_run_with_a_poor_plan_out(tmp_path: Path, cut: Campaign) -> None:
+    with Database(tmp_path / "m.duckdb", threads=1) as db:
+        import_campaign(db, cut)
+        with pytest.raises(
+            TooFewReadingsError, match="the 90 readings of run 2 leave 5 unknowns of the model"
+        ):
+            identify(db, IdentifyRequest("virtual"))
+        told = explain(db, ExplainRequest("virtual")).explanation
+    assert isinstance(told, MachineExplanation)
+    (left_out,) = told.runs_left_out or ()
+    assert (left_out.run, left_out.readings, left_out.undetermined) == (2, 90, 5)
+    assert "Run 2 is left out: its 90 readings leave 5 unknowns of the model open" in told.answer

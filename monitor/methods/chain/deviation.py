@@ -25,12 +25,15 @@ class Deviation:
 
     Of a touch that stands elsewhere on its surface the vector is the whole (3,), and no number measures it: infinite.
     ``others`` are rows of the same run that explain the same residual as well: the plan cannot say which it was.
+    ``moves`` says by how many standard uncertainties the row, or the worst of these, moves the geometric error that it
+    moves most, in the linear model of its run; None where the run's own unknowns follow it.
     """
 
     row: int
     vector: tuple[float, ...]
     chi_square: float
     others: tuple[int, ...] = ()
+    moves: float | None = None
 
 
 def plan_touches(problem: ChainProblem, posed: Sequence[int] | None = None) -> npt.NDArray[np.int64]:

@@ -70,7 +70,7 @@ class GrossReading:
 
     ``pose`` are the joints that the plan moved. ``others`` are the sequences
     of rows of the same run that may be wrong instead. ``is_along_surface``: the touch stands elsewhere on its surface
-    than in the other runs, which the numbers of its run show little of or nothing.
+    than in the other runs, which the numbers of its run show little of or nothing. ``moves`` is that of a deviation.
     """
 
     row: int
@@ -83,6 +83,7 @@ class GrossReading:
     chi_square: float
     others: tuple[int, ...]
     is_along_surface: bool = False
+    moves: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,10 +124,21 @@ class _Rows:
         return space_of_run(self.columns)
 
     @property
+    def step(self) -> Array:
+        """The step (p,) to the least-squares point, of which the first k are those of ``base``."""
+        return np.asarray(self.space.inverse @ (self.space.basis.T @ self.residual))
+
+    def moved_by(self, row: int) -> float:
+        """By how many standard uncertainties a row moves the one of ``base`` that it moves most."""
+        count = len(self.base)
+        u = np.sqrt(np.sum(self.space.inverse[:count] ** 2, axis=1))
+        shift = np.abs(self.step - self.without(row).step)[:count]
+        return float(np.max(shift / np.where(u > 0.0, u, np.inf), initial=0.0))
+
+    @property
     def is_plausible(self) -> bool:
         """Whether the linear fit is a machine: without a ball of its bar, a run fits gains of -1 perfectly."""
-        step = self.space.inverse @ (self.space.basis.T @ self.residual)
-        errors = (self.base - step[: len(self.base)])[self.is_limited]
+        errors = (self.base - self.step[: len(self.base)])[self.is_limited]
         return bool(np.abs(errors).max(initial=0.0) <= self.largest)
 
 
@@ -210,6 +222,7 @@ def _of_run(rows: _Rows, sigma: Array, tests: int) -> list[Deviation]:
                 vector=tuple(map(float, vector)),
                 chi_square=float(deletion.drop[worst]),
                 others=tuple(int(rows.index[row]) for row in alike),
+                moves=max(map(rows.moved_by, gross)) if considered is rows else None,
             )
         )
         rows = rows.without(worst)
@@ -314,7 +327,9 @@ def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviat
             columns=np.concatenate([columns, by_usual]),
         )
         readings += [
-            reading for reading in _of_run(held, sigma, len(problem.context)) if followed[reading.row]
+            replace(reading, moves=None)
+            for reading in _of_run(held, sigma, len(problem.context))
+            if followed[reading.row]
         ]
     return _of_few_runs(problem, readings)
 
@@ -392,6 +407,7 @@ def as_reading(problem: ChainProblem, by_error: Array, deviation: Deviation) -> 
         chi_square=deviation.chi_square,
         others=tuple(int(context.sequence[other]) for other in deviation.others),
         is_along_surface=len(deviation.vector) > len(problem.components),
+        moves=deviation.moves,
     )
 
 

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
 
 from monitor.exceptions import TooFewReadingsError
 from monitor.machine import Joint
-from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, RANK_TOLERANCE, Solution
 from monitor.methods.chain.problem import ChainProblem
+
+
+@dataclass(frozen=True)
+class OpenUnknowns:
+    """How many unknowns of a run its plan leaves open: ``count`` in all, and of these those that a
+    fit takes for determined all the same (``for_a_fit``): it turns small readings into metres there."""
+
+    count: int
+    for_a_fit: int
 
 
 def still_joints(problem: ChainProblem, run: int, *kinds: str) -> list[Joint]:
@@ -31,18 +41,40 @@ def refuse_exact_fits(problem: ChainProblem, solution: Solution) -> None:
     more, those that have not, such as one that was broken off, are all named: without them the others are answered.
     """
     calibrated = len(problem.extra_names)
-    numbers = [
-        int(np.isfinite(problem.sigma[problem.context.run == run]).sum()) + calibrated for run in problem.runs
-    ]
+    readings = readings_of_runs(problem)
+    numbers = [of_run + calibrated for of_run in readings.values()]
     exact = {
-        int(run): of_run - calibrated
-        for run, of_run, rank in zip(problem.runs, numbers, solution.rank, strict=True)
-        if of_run <= rank
+        run: of_run
+        for (run, of_run), rank in zip(readings.items(), solution.rank, strict=True)
+        if of_run + calibrated <= rank
     }
     for run, of_run in exact.items():
         _refuse(f"run {run}", of_run, exact if len(exact) < len(numbers) else {})
     if sum(numbers) <= int(solution.rank.sum() + solution.common_free.sum()):
         _refuse("the campaign", sum(numbers), {})
+
+
+def readings_of_runs(problem: ChainProblem) -> dict[int, int]:
+    """The numbers with weight that were read in each run, by its number."""
+    return {
+        int(run): int(np.isfinite(problem.sigma[problem.context.run == run]).sum()) for run in problem.runs
+    }
+
+
+def open_at_start(problem: ChainProblem) -> list[OpenUnknowns]:
+    """What the plan of each run leaves open, by the derivatives at the first guess."""
+    begin, common = problem.start, problem.common_start
+    of_runs = (problem.condensed if problem.is_in_parts else problem.linearise)(begin, common).local
+    scale = np.linalg.norm(of_runs, axis=1, keepdims=True)
+    singular = np.linalg.svd(of_runs / np.where(scale == 0.0, 1.0, scale), compute_uv=False)
+    relative = singular / np.where(singular[:, :1] == 0.0, 1.0, singular[:, :1])
+    determined, for_a_fit = (
+        (relative > limit).sum(axis=1) for limit in (COMMON_RANK_TOLERANCE, RANK_TOLERANCE)
+    )
+    unknowns = of_runs.shape[2]
+    return [
+        OpenUnknowns(unknowns - int(a), int(b) - int(a)) for a, b in zip(determined, for_a_fit, strict=True)
+    ]
 
 
 def _refuse(whose: str, numbers: int, without: Mapping[int, int]) -> NoReturn:

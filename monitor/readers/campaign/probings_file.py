@@ -127,8 +127,8 @@ def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> Probin
     readings, channels = _cells(table, taken, named, expected, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None
     sequence = wholes(table, "sequence", faults) if "sequence" in table.columns else None
-    known_target = _known_targets(table, expected.targets, faults)
     setup, target = _setups(table, expected, faults)
+    known_target = _known_targets(table, target, expected.targets, faults)
     if "run" not in table.columns:
         return None
     run = wholes(table, "run", faults)
@@ -152,7 +152,8 @@ def _setups(
 ) -> tuple[npt.NDArray[np.float64], Sequence[str]]:
     """Return the number of each row's setup (n,), 0 where there is none of its name, and the targets of the rows.
 
-    A row that names no target is a reading of its setup; methods without setups have one that nobody names.
+    A row that names no target is a reading of its setup, whose other rows name none either: else it was forgotten.
+    Methods without setups have one that nobody names.
     """
     targets = table.columns.get("target", ())
     if not expected.allowed.needs_setups or expected.setups is None:
@@ -164,7 +165,13 @@ def _setups(
         lines = [line for line, other in zip(table.lines, cells, strict=True) if other == cell]
         message = f"there is no setup {quoted(cell)}; the setups are {one_of(names)}"
         faults.add(FILE, lines[0], SETUP, message + _and_more(lines))
-    return number, targets or cells
+    if not targets:
+        return number, cells
+    with_targets = {cell for cell, target in zip(cells, targets, strict=True) if target}
+    return number, [
+        target if target or cell in with_targets else cell
+        for cell, target in zip(cells, targets, strict=True)
+    ]
 
 
 def _cells(
@@ -218,9 +225,13 @@ def _within(table: CsvTable, column: str, stroke: tuple[float, float] | None, fa
     return Numbers(cells.values, cells.good & ~outside)
 
 
-def _known_targets(table: CsvTable, targets: Sequence[str] | None, faults: Faults) -> Mask:
-    """Return which rows name a target that there is; a name that is unknown is reported once, with its lines."""
-    cells = table.columns.get("target", ())
+def _known_targets(
+    table: CsvTable, cells: Sequence[str], targets: Sequence[str] | None, faults: Faults
+) -> Mask:
+    """Return which rows name a target that there is, in ``cells``; a name that is unknown is reported once, with its
+    lines."""
+    if "target" not in table.columns:
+        return np.ones(len(table), dtype=np.bool_)
     wrong = {
         cell for cell in set(cells) if not _is_name(cell) or (targets is not None and cell not in targets)
     }

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from monitor import __version__
+from monitor.exceptions import DataError
 from monitor.records import Campaign
+from monitor.reporting.budget import HoldsFor
 from monitor.reporting.pdf.beside import engine_versions
 from monitor.store import Database, StoredModel
 from monitor.workflow.certificate.files import HashedFile, font_hashes
 from monitor.workflow.certificate.inputs import CertificateInputs, RunInputs
 from monitor.workflow.certificate.orders import Measured
-from monitor.workflow.certificate.results import StoredMonteCarlo, stored_monte_carlo
+from monitor.workflow.certificate.results import (
+    StoredMonteCarlo,
+    bounds_a_region,
+    no_region,
+    stored_monte_carlo,
+)
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty.request import Asked, UncertaintyRequest
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -65,6 +72,34 @@ def _evaluated(
         holds_for=asked.holds_for,
     )  # fmt: skip
     return StatedUncertainty(campaign, model, statement(evaluate(db, request)))
+
+
+def refuse_without_region(
+    db: Database, campaign: Campaign, model: StoredModel, runs: Sequence[CertifiedRun], asked: Asked
+) -> None:
+    """Raise DataError where a run bounds no region that can be certified, naming the times for which all runs do."""
+    for run in runs:
+        if not bounds_a_region(run.evaluated):
+            raise no_region(run.evaluated, _times_with_a_region(db, campaign, model, runs, asked))
+
+
+def _times_with_a_region(
+    db: Database, campaign: Campaign, model: StoredModel, runs: Sequence[CertifiedRun], asked: Asked
+) -> tuple[HoldsFor, ...]:
+    return tuple(
+        time
+        for time in HoldsFor
+        if time is not asked.holds_for
+        and all(_bounds(db, campaign, model, run, replace(asked, holds_for=time)) for run in runs)
+    )
+
+
+def _bounds(db: Database, campaign: Campaign, model: StoredModel, run: CertifiedRun, asked: Asked) -> bool:
+    try:
+        return bounds_a_region(_evaluated(db, campaign, model, run.measured.run, asked))
+    except DataError:
+        # The runs are too few for that time altogether.
+        return False
 
 
 def inputs_of(runs: Sequence[CertifiedRun], asked: Asked, fonts: Sequence[Path]) -> CertificateInputs:

@@ -31,7 +31,12 @@ from monitor.store import (
     save_certificate,
 )
 from monitor.workflow.certificate.answer import CertificateFileAnswer, CertificateState
-from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
+from monitor.workflow.certificate.certified import (
+    CertifiedRun,
+    certified_run,
+    inputs_of,
+    refuse_without_region,
+)
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.effects import effects_of
 from monitor.workflow.certificate.files import finish_left, keep_issued, path_of, prepared, publish
@@ -81,6 +86,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
     accepted, refused = judged_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)
+    refuse_without_region(db, campaign, model, runs, request.asked)
     inputs = inputs_of(runs, request.asked, request.fonts)
     effects = [effects_of(db, run.evaluated) for run in runs]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from monitor.reporting.certificate.results import (
 )
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.frames import referred
-from monitor.reporting.messages import joint_region_lacks
+from monitor.reporting.messages import joint_region_lacks, region_for_others
 from monitor.reporting.numbers import decimal_of, round_to_place, round_uncertainty, written_factor
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -111,14 +112,8 @@ def results_of(
     which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where the method cannot be
     certified, DataError where there are too few runs for any joint region.
     """
-    # Few days bound no ellipsoid, but the intervals over the campaign, which are stated without it.
-    over_campaign = evaluated.answer.holds_for is HoldsFor.CAMPAIGN and np.isfinite(evaluated.k_q)
-    if not (np.isfinite(evaluated.k_p) or over_campaign):
-        raise DataError(
-            f"the runs behind the covariance of the readings are too few for a joint region of "
-            f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters"
-            f"{_lacking(evaluated)}; a certificate needs more repeated runs"
-        )
+    if not bounds_a_region(evaluated):
+        raise no_region(evaluated)
     answer = evaluated.answer
     estimate, covariance = evaluated.estimate, evaluated.covariance
     factors = CoverageFactors(
@@ -156,6 +151,22 @@ def results_of(
             budget=_budget(answer),
         ),
         texts,
+    )
+
+
+def bounds_a_region(evaluated: StatedUncertainty) -> bool:
+    """Whether there are runs enough for a region that can be certified."""
+    # Few days bound no ellipsoid, but the intervals over the campaign, which are stated without it.
+    over_campaign = evaluated.answer.holds_for is HoldsFor.CAMPAIGN and np.isfinite(evaluated.k_q)
+    return bool(np.isfinite(evaluated.k_p)) or bool(over_campaign)
+
+
+def no_region(evaluated: StatedUncertainty, others: Sequence[HoldsFor] = ()) -> DataError:
+    """The refusal of a result without a region, naming ``others``: the times for which there is one."""
+    return DataError(
+        f"the runs behind the covariance of the readings are too few for a joint region of "
+        f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters"
+        f"{_lacking(evaluated)}; a certificate needs more repeated runs{region_for_others(others)}"
     )
 
 

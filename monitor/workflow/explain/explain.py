@@ -181,21 +181,25 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
 
 
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:
-    left_out: tuple[RunLeftOut, ...] = ()
-    try:
-        # A search that has not the memory is refused before minutes of fitting.
-        first = first_fit(campaign, model, TIMES_OF_SEARCH)
-    except TooFewReadingsError as refusal:
-        if not refusal.by_run:
-            raise
-        left_out = tuple(RunLeftOut(run, readings) for run, readings in refusal.by_run.items())
-        campaign = without_runs(campaign, refusal.by_run)
-        first = first_fit(campaign, model, TIMES_OF_SEARCH)
+    left_out: list[RunLeftOut] = []
+    first: RobustFit | None = None
+    while first is None:
+        try:
+            # A search that has not the memory is refused before minutes of fitting.
+            first = first_fit(campaign, model, TIMES_OF_SEARCH)
+        except TooFewReadingsError as refusal:
+            if not refusal.by_run:
+                raise
+            left_out += [
+                RunLeftOut(run, readings, refusal.undetermined.get(run))
+                for run, readings in refusal.by_run.items()
+            ]
+            campaign = without_runs(campaign, refusal.by_run)
     explanation = explanation_of(campaign, model, first, rate)
     answer = explained(explanation, campaign, model, rate)
     if left_out:
         sentences = " ".join((answer.answer, *map(str, left_out)))
-        answer = replace(answer, answer=sentences, runs_left_out=left_out)
+        answer = replace(answer, answer=sentences, runs_left_out=tuple(left_out))
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.

@@ -21,6 +21,7 @@ from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
 from monitor.row_files import rows_in, runs_in
+from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs
 from monitor.workflow.tool_frames import tool_frames
 
 
@@ -45,8 +46,9 @@ def with_mistake(
     Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
     it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
     that would let the readings fit, which takes up to half a minute, and as long again without rows of zeros, which are
-    named too where that is enough; where no change is, what else the import noticed of the columns is said. Where the
-    refusal names the one setup that is wrong, nothing else is sought. Of very many rows a part is tried.
+    named too where that is enough. Where no change is, runs are named whose plan leaves unknowns open, else what the
+    import noticed of the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought.
+    Of very many rows a part is tried.
     """
     if isinstance(refusal, TooFewReadingsError):
         return _with_files(refusal, campaign)
@@ -61,6 +63,16 @@ def with_mistake(
     exchanged = tuple(exchanged_columns(campaign))
     if exchanged:
         return _with_sentences(refusal, exchanged)
+    return _with_changes(refusal, campaign, problem_of, blank)
+
+
+def _with_changes(
+    refusal: DataError,
+    campaign: Campaign,
+    problem_of: Callable[[Campaign], ChainProblem],
+    blank: Collection[tuple[int, int]],
+) -> DataError:
+    """The refusal with the changes that would let the readings fit; without one, with the runs whose plan is why."""
     # Loaded here: only readings that contradict the file need the search.
     from monitor.discovery import find_mistakes, only_misread
     from monitor.reporting.machine_finding import mistake_sentence
@@ -75,11 +87,15 @@ def with_mistake(
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
-    said = (
-        (*named, mistake_sentence(mistakes_found(mistakes)))
-        if mistakes
-        else column_doubts(campaign, tool_frames(campaign))
-    )
+    names_no_reading = "First look at" not in str(refusal)
+    if names_no_reading and not any(mistake.enough for mistake in mistakes):
+        poor = refusal_of_poor_runs(campaign, problem_of)
+        if poor is not None:
+            return _with_files(poor, campaign)
+    if mistakes:
+        return _with_sentences(refusal, (*named, mistake_sentence(mistakes_found(mistakes))))
+    alike = hardly_told(campaign, problem_of) if names_no_reading else ()
+    said = (*alike, *column_doubts(campaign, tool_frames(campaign)))
     return _with_sentences(refusal, said) if said else refusal
 
 
@@ -92,6 +108,7 @@ def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:
     return TooFewReadingsError(
         f"{refusal}: remove {its} rows from {' and '.join(files)}, withdraw the campaign and import it again",
         refusal.by_run,
+        refusal.undetermined,
     )
 
 

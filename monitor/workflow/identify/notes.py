@@ -76,6 +76,7 @@ def gross_noted(reading: GrossReading, target_word: str, places: RowPlaces) -> G
     return GrossReadingNoted(
         reading.run, reading.sequence, target_word, reading.target, pose, reading.size, reading.axis,
         tuple(reading.others), reading.is_along_surface, places.row(reading.run, reading.sequence),
+        reading.moves,
     )  # fmt: skip
 
 

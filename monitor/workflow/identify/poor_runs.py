@@ -1,0 +1,68 @@
+"""Runs whose plan leaves unknowns open, such as one that was broken off: where no fit holds, they may be why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+
+from monitor.exceptions import MonitorError, TooFewReadingsError
+from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.methods.chain.sufficiency import OpenUnknowns, open_at_start, readings_of_runs
+from monitor.readers.doubts.unit_doubts import runs_in_units
+from monitor.records import Campaign
+from monitor.reporting.run_left_out import poor_runs_refused, poses_too_few
+from monitor.workflow.campaign_parts import without_runs
+
+
+def refusal_of_poor_runs(
+    campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
+) -> TooFewReadingsError | None:
+    """The refusal of a campaign that no machine of the file fits because of runs whose plan leaves unknowns open that
+    other runs determine, by the derivatives at the first guess; None where it fits without them no better."""
+    open_unknowns, readings = _at_start(campaign, problem_of)
+    fewest = min((each.count for each in open_unknowns), default=0)
+    poor = {
+        run: each.count - fewest
+        for run, each in zip(readings, open_unknowns, strict=True)
+        if each.count > fewest
+    }
+    if not poor or {odd.run for odd in runs_in_units(campaign)} & set(poor):
+        return None
+    if not _fits(campaign, poor, problem_of):
+        return None
+    of_poor = {run: readings[run] for run in poor}
+    return TooFewReadingsError(poor_runs_refused(of_poor, poor), of_poor, poor)
+
+
+def hardly_told(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> tuple[str, ...]:
+    """A sentence on plans that are all alike and hardly tell some unknowns from others, so that a fit may lose itself
+    though the file is right; none where the plans tell them."""
+    open_unknowns, readings = _at_start(campaign, problem_of)
+    hardly = min((each.for_a_fit for each in open_unknowns), default=0)
+    if hardly == 0:
+        return ()
+    return (poses_too_few(next(iter(readings)) if len(readings) == 1 else None, hardly),)
+
+
+def _at_start(
+    campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
+) -> tuple[list[OpenUnknowns], dict[int, int]]:
+    """What the plan of each run leaves open, and its readings; nothing of a campaign that is no problem."""
+    try:
+        problem = problem_of(campaign)
+    except MonitorError:
+        return [], {}
+    return open_at_start(problem), readings_of_runs(problem)
+
+
+def _fits(
+    campaign: Campaign, without: Collection[int], problem_of: Callable[[Campaign], ChainProblem]
+) -> bool:
+    """Whether a machine of the file fits a campaign without some runs."""
+    try:
+        with np.errstate(all="ignore"):
+            solve_problem(problem_of(without_runs(campaign, without)))
+    except (MonitorError, np.linalg.LinAlgError):
+        return False
+    return True
