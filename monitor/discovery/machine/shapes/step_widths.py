@@ -36,17 +36,17 @@ class OneStep(NamedTuple):
     width: float
 
 
-def by_width(seen: StepsSeen, steps: Sequence[OneStep]) -> list[ChainCandidate]:
+def by_width(of_error: StepsSeen, steps: Sequence[OneStep]) -> list[ChainCandidate]:
     """Steps as one effect for each width, in the order of their first places."""
     ordered = sorted(steps)
     widths = dict.fromkeys(step.width for step in ordered)
     return [
-        seen.candidate([step.at_mm for step in ordered if step.width == width], width) for width in widths
+        of_error.candidate([step.at_mm for step in ordered if step.width == width], width) for width in widths
     ]
 
 
 def at_widths_of_their_own(
-    seen: StepsSeen, steps: Sequence[OneStep], others: Sequence[ChainCandidate]
+    of_error: StepsSeen, steps: Sequence[OneStep], others: Sequence[ChainCandidate]
 ) -> list[OneStep]:
     """Several steps of one width, each over the width at which it says most beside the rest, where these are worth
     their price: each width is one more unknown."""
@@ -55,58 +55,62 @@ def at_widths_of_their_own(
     best = list(steps)
     for _, index in product(range(TURNS), range(len(steps))):
         rest = best[:index] + best[index + 1 :]
-        able = _about(seen, steps[index], rest)
-        remaining = _left_with_each(seen, able, rest, others)
+        able = _about(of_error, steps[index], rest)
+        remaining = _left_with_each(of_error, able, rest, others)
         alike = [able[some] for some in np.flatnonzero(remaining <= remaining.min() * (1.0 + ALIKE))]
         # A way between two positions is a step at once.
         alike = [step for step in alike if step.width == alike[0].width]
         best[index] = alike[len(alike) // 2]
     before, after = ({step.width for step in some if step.width} for some in (steps, best))
-    price = seen.price(max(len(after) - len(before), 1), others)
-    return best if _cost(seen, best, others) + price < _cost(seen, steps, others) else list(steps)
+    price = of_error.price(max(len(after) - len(before), 1), others)
+    return best if _cost(of_error, best, others) + price < _cost(of_error, steps, others) else list(steps)
 
 
-def _about(seen: StepsSeen, step: OneStep, rest: Sequence[OneStep]) -> list[OneStep]:
+def _about(of_error: StepsSeen, step: OneStep, rest: Sequence[OneStep]) -> list[OneStep]:
     """The steps about one, at once and over any width, that may be beside the rest; itself where none may."""
-    travel = float(seen.positions[-1, 1] - seen.positions[0, 0])
-    reach = max(step.width, LEAST_REGION * travel) + float(np.diff(seen.middles_of_positions).max())
-    at_once = [OneStep(float(at), 0.0) for at in seen.middles if abs(at - step.at_mm) <= reach]
+    travel = float(of_error.positions[-1, 1] - of_error.positions[0, 0])
+    reach = max(step.width, LEAST_REGION * travel) + float(np.diff(of_error.middles_of_positions).max())
+    at_once = [OneStep(float(at), 0.0) for at in of_error.middles if abs(at - step.at_mm) <= reach]
     near = np.round(step.at_mm + np.linspace(-reach, reach, PLACES_ABOUT), 2).tolist()
-    widths = sorted({float(f"{width * part:.3g}") for width in seen.widths for part in NEAR_WIDTHS if width})
-    over = [OneStep(at, width) for width in widths for at in near if seen.are_inside([at], width)]
+    widths = sorted(
+        {float(f"{width * part:.3g}") for width in of_error.widths for part in NEAR_WIDTHS if width}
+    )
+    over = [OneStep(at, width) for width in widths for at in near if of_error.are_inside([at], width)]
     return [
         some
         for some in [*at_once, *over]
-        if all(seen.are_apart([some.at_mm, other.at_mm], (some.width + other.width) / 2.0) for other in rest)
+        if all(
+            of_error.are_apart([some.at_mm, other.at_mm], (some.width + other.width) / 2.0) for other in rest
+        )
     ] or [step]
 
 
-def _columns(seen: StepsSeen, steps: Sequence[OneStep]) -> Array:
+def _columns(of_error: StepsSeen, steps: Sequence[OneStep]) -> Array:
     """The columns (M, k) of steps."""
-    return np.column_stack([seen.columns([step.at_mm], step.width)[:, 0] for step in steps])
+    return np.column_stack([of_error.columns([step.at_mm], step.width)[:, 0] for step in steps])
 
 
 def _left_with_each(
-    seen: StepsSeen, steps: Sequence[OneStep], rest: Sequence[OneStep], others: Sequence[ChainCandidate]
+    of_error: StepsSeen, steps: Sequence[OneStep], rest: Sequence[OneStep], others: Sequence[ChainCandidate]
 ) -> Array:
     """What is left (k,) of the residual with each of some steps, beside the rest and others."""
-    remainder = seen.scene.remainders.beside(others)
-    basis = orthonormal(without(remainder.basis, _columns(seen, rest)))
+    remainder = of_error.scene.remainders.beside(others)
+    basis = orthonormal(without(remainder.basis, _columns(of_error, rest)))
     residual = without(basis, remainder.residual[:, None])[:, 0]
-    columns = without(basis, without(remainder.basis, _columns(seen, steps)))
+    columns = without(basis, without(remainder.basis, _columns(of_error, steps)))
     length = np.linalg.norm(columns, axis=0)
     onto = columns.T @ residual / np.where(length > 0.0, length, 1.0)
     return np.asarray(residual @ residual - onto**2)
 
 
-def _cost(seen: StepsSeen, steps: Sequence[OneStep], others: Sequence[ChainCandidate]) -> float:
+def _cost(of_error: StepsSeen, steps: Sequence[OneStep], others: Sequence[ChainCandidate]) -> float:
     """Minus twice the logarithm of the likelihood of steps beside others."""
-    freedom = seen.scene.remainders.beside(others).degrees_of_freedom
-    return freedom * float(np.log(_left_with_each(seen, steps[:1], steps[1:], others)[0]))
+    freedom = of_error.scene.remainders.beside(others).degrees_of_freedom
+    return freedom * float(np.log(_left_with_each(of_error, steps[:1], steps[1:], others)[0]))
 
 
 def are_sharp(
-    seen: StepsSeen,
+    of_error: StepsSeen,
     steps: Sequence[ChainCandidate],
     companions: Sequence[ChainCandidate],
     others: Sequence[ChainCandidate],
@@ -119,22 +123,22 @@ def are_sharp(
     least = (count - 1) * LIMIT if count > 1 else -LIMIT
     beside = [*others, *companions]
     return all(
-        sharpness(seen, each, [*beside, *(other for other in steps if other is not each)]) > least
+        sharpness(of_error, each, [*beside, *(other for other in steps if other is not each)]) > least
         for each in steps
     )
 
 
-def sharpness(seen: StepsSeen, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
+def sharpness(of_error: StepsSeen, steps: ChainCandidate, others: Sequence[ChainCandidate]) -> float:
     """By how much, in twice the logarithm of a likelihood ratio, steps say more beside others than with a longer way in
     place of the least sharp of them; each of several goes over the width at which it says most: the one that all of
     them have may be too short for it."""
-    shape, freedom = _shape_of(steps), seen.scene.remainders.beside(others).degrees_of_freedom
+    shape, freedom = _shape_of(steps), of_error.scene.remainders.beside(others).degrees_of_freedom
     ratios = []
     for index, at_mm in enumerate(shape.readings):
         rest = [*shape.readings[:index], *shape.readings[index + 1 :]]
-        left_over = partial(_left_over, seen, OneStep(at_mm, shape.width), rest, others)
-        width = min(_widths_of_one(seen, at_mm, rest, shape.width), key=left_over)
-        ratios.append(min(map(left_over, _longer_ways(seen, at_mm, width))) / left_over(width))
+        left_over = partial(_left_over, of_error, OneStep(at_mm, shape.width), rest, others)
+        width = min(_widths_of_one(of_error, at_mm, rest, shape.width), key=left_over)
+        ratios.append(min(map(left_over, _longer_ways(of_error, at_mm, width))) / left_over(width))
     return freedom * float(np.log(min(ratios)))
 
 
@@ -146,27 +150,27 @@ def _shape_of(steps: ChainCandidate) -> Step:
 
 
 def _left_over(
-    seen: StepsSeen, step: OneStep, rest: Sequence[float], others: Sequence[ChainCandidate], way: float
+    of_error: StepsSeen, step: OneStep, rest: Sequence[float], others: Sequence[ChainCandidate], way: float
 ) -> float:
     """What is left of the residual with a step that goes over another way than the rest."""
-    return float(seen.left_with([step.at_mm], rest, step.width, others, way)[0])
+    return float(of_error.left_with([step.at_mm], rest, step.width, others, way)[0])
 
 
-def _widths_of_one(seen: StepsSeen, at_mm: float, rest: Sequence[float], width: float) -> list[float]:
+def _widths_of_one(of_error: StepsSeen, at_mm: float, rest: Sequence[float], width: float) -> list[float]:
     """The width of steps, and the longer ones over which one of several may go."""
     nearest = min((abs(at_mm - other_mm) for other_mm in rest), default=0.0)
-    longer = {some * part for some in seen.widths for part in NEAR_WIDTHS if some * part > width}
+    longer = {some * part for some in of_error.widths for part in NEAR_WIDTHS if some * part > width}
     able = [
         some
         for some in sorted(longer)
-        if seen.are_inside([at_mm], some) and nearest >= WIDTHS_APART * (some + width) / 2.0
+        if of_error.are_inside([at_mm], some) and nearest >= WIDTHS_APART * (some + width) / 2.0
     ]
     return [width, *able]
 
 
-def _longer_ways(seen: StepsSeen, at_mm: float, width: float) -> list[float]:
+def _longer_ways(of_error: StepsSeen, at_mm: float, width: float) -> list[float]:
     """Ways in mm about a place that take at least two positions on either side off the levels of a step there."""
-    at = seen.positions.mean(axis=1)
+    at = of_error.positions.mean(axis=1)
     after = int(np.clip(np.searchsorted(at, at_mm), 1, len(at) - 1))
     gap = at[after] - at[after - 1]
     around = at[min(after + 1, len(at) - 1)] - at[max(after - 2, 0)]
