@@ -185,12 +185,18 @@ class StepsOfError(StepsSeen):
     ) -> list[float]:
         """The places that are far enough apart, without those that say least: a way over more than a width was followed
         by two of its steps."""
-        kept = list(places)
-        while len(kept) > 1 and not self.are_apart(kept, width):
-            without_each = [kept[:index] + kept[index + 1 :] for index in range(len(kept))]
-            kept = min(without_each, key=lambda some: self.cost(some, width, others))
-        changed = len(kept) < len(places)
-        return self._worth_keeping(self._refined(kept, width, others), width, others) if changed else kept
+        places_apart = list(places)
+        while len(places_apart) > 1 and not self.are_apart(places_apart, width):
+            without_each = [
+                places_apart[:index] + places_apart[index + 1 :] for index in range(len(places_apart))
+            ]
+            places_apart = min(without_each, key=lambda some: self.cost(some, width, others))
+        changed = len(places_apart) < len(places)
+        return (
+            self._worth_keeping(self._refined(places_apart, width, others), width, others)
+            if changed
+            else places_apart
+        )
 
 
 def steps_of(scene: ChainScene, shape: ChainCandidate) -> StepsOfError | None:
