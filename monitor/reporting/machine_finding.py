@@ -144,7 +144,9 @@ NOT_FOLLOWED = (
 RECURRING = (
     "{count} readings are off alike in most runs at nearly the same places: they are no bad points, the model lacks "
     "something there. They were left out of the search for effects; see whether a small move decides there from which "
-    "side an axis came, or whether the part or plate, or a place stated of it, is off there."
+    "side an axis came, or whether the part or plate, or a place stated of it, is off there. Where it is the first or "
+    "last position of an axis, a step between it and the next would read the same: measure another position between "
+    "the two and beyond it."
 )
 UNCHECKED = (
     "They lie where no other run read, and are so many that they may be an error which the model lacks."

@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import explain
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError
+from monitor.effects import parse_effect
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 
@@ -92,3 +95,27 @@ def test_a_step_beside_a_wave_of_its_error_is_of_that_error(tmp_path: Path) -> N
     missing = told(lasers(tmp_path, 13, both, positions=41)).missing
     assert {found.effect.partition(":")[0] for found in missing} == {"EXX"}
     assert sorted(found.effect[4:8] for found in missing) == ["cycl", "step"]
+
+
+def of_unequal_widths(place: float) -> float:
+    """A step over 60 mm about 130 mm, and one at once at 390 mm."""
+    return float(5.0 * np.clip((place - 130.0) / 60.0 + 0.5, 0.0, 1.0) + 4.0 * (place > 390.0))
+
+
+def test_steps_of_unequal_widths_are_each_of_their_own(tmp_path: Path) -> None:
+    """Over one width between the two they were told as a table or a free shape."""
+    campaign = read_campaign(lasers(tmp_path, 14, of_unequal_widths, positions=31))
+    scene = scene_of(fit(campaign_method(campaign).problem_of(campaign).for_search()), [])
+    effect = parse_effect("EXX:poly2", scene.fit.problem.context.chain)
+    wide, sharp = (each.effect.shape for each in StepsOfError(scene, effect).beside([]))
+    assert wide.readings == pytest.approx([130.0], abs=8.0)
+    assert wide.width > 40.0
+    assert sharp.readings == pytest.approx([390.0], abs=TRAVEL / 30)
+    assert sharp.width == 0.0
+
+
+@pytest.mark.slow
+def test_steps_of_unequal_widths_are_told_without_another_effect(tmp_path: Path) -> None:
+    missing = told(lasers(tmp_path, 15, of_unequal_widths, positions=31)).missing
+    assert missing
+    assert all(found.effect.startswith("EXX:step") for found in missing)

@@ -10,6 +10,7 @@ from monitor.discovery import explain, fit, nearest_readings, steps_of_model
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError
 from monitor.discovery.machine.shapes.step_places import places_of_steps
+from monitor.discovery.machine.shapes.step_widths import sharpness
 from monitor.discovery.machine.shapes.steps_instead import steps_instead
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
@@ -44,7 +45,7 @@ def test_the_places_of_steps_are_found_between_positions(virtual_campaigns, curv
         assert interval.low < told < interval.high
     assert found.variant.tries > 1
     # Over three gaps between positions or more each of the steps says far less.
-    assert steps.sharpness(found, []) > 50.0
+    assert sharpness(steps, found, []) > 50.0
     grown = problem_of(campaign, Model("grown", added=(found.effect.text,)))
     (of_model,) = steps_of_model(fit(grown)).values()
     # Maps and certificates say the same.
@@ -57,7 +58,7 @@ def test_a_step_is_weighed_as_the_data_see_its_effect(virtual_campaigns):
     campaign, _ = virtual_campaigns.virtual(77, [hidden], days=1, runs_per_day=1)
     steps, (found,) = steps_beside_nothing(campaign, "EXX")
     shape = found.effect.shape
-    np.testing.assert_allclose(steps._columns(shape.readings, shape.width), found.columns, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(steps.columns(shape.readings, shape.width), found.columns, rtol=0, atol=1e-9)
 
 
 def test_a_free_shape_of_a_step_alone_is_told_by_its_place(virtual_campaigns):

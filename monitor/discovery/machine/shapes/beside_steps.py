@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
@@ -52,7 +52,7 @@ def _with_steps_anew(scene: ChainScene, result: ChainScan) -> tuple[ChainScene, 
     """The findings with the steps that say most beside those of other errors, in place of the steps among them and of
     what stands beside these, where that says more; and the scene with them."""
     selected = result.candidates
-    for steps in filter(has_steps, result.candidates):
+    for steps in _of_different_errors(filter(has_steps, result.candidates)):
         effect = steps.effect
         assert isinstance(effect, ChainEffect)
         mine = [each for each in selected if error_of(each) == error_of(steps) and not is_cycle(each)]
@@ -60,10 +60,16 @@ def _with_steps_anew(scene: ChainScene, result: ChainScan) -> tuple[ChainScene, 
         anew = StepsOfError(scene, effect).beside(others)
         if anew and priced(scene, anew, others) > priced(scene, mine, others):
             selected = [*others, *anew]
-            without_steps = [each for each in scene.candidates if each is not steps]
+            gone = list(filter(has_steps, mine))
+            without_steps = [each for each in scene.candidates if not any(each is some for some in gone)]
             scene = replace(scene, candidates=(*without_steps, *filter(has_steps, anew)))
     return (
         (scene, result)
         if selected is result.candidates
         else (scene, ScanResult(findings_of(scene, selected)))
     )
+
+
+def _of_different_errors(steps: Iterable[ChainCandidate]) -> list[ChainCandidate]:
+    """One of the steps of each error: those of one over several widths are sought together."""
+    return list({error_of(each): each for each in steps}.values())

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.refine import LIMIT
-from monitor.discovery.machine.shapes.scale_steps import POSITIONS_BEYOND, StepsOfError, steps_of
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
+from monitor.discovery.machine.shapes.steps_seen import POSITIONS_BEYOND
 from monitor.discovery.machine.shapes.tables import SAME_POSITION
 from monitor.effects.shapes import Step
 from monitor.records import Array
