@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from by_path import load, simulator as simulator_of
 
 from monitor.discovery import explain
+from monitor.discovery.machine.missing import ChainMissing
 from monitor.methods.samba.method import problem_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -95,14 +96,23 @@ def answered(number: int, shape: str) -> Line:
     false = tuple(
         each.effect for each in answer.missing if not any(each is known for known in (*right, *of_further))
     )
-    within = abs(abs(right[0].amplitude) - size) <= 2.0 * right[0].u if right else None
-    sizes = None
+    within = sizes = None
     if right:
-        sizes = tuple(round(1e3 * value, 3) for value in (size, abs(right[0].amplitude), right[0].u))
+        told_peak, u = peak_of_error(right[0])
+        within = abs(told_peak - size) <= 2.0 * u
+        sizes = tuple(round(1e3 * value, 3) for value in (size, told_peak, u))
     return Line(
         number, error, round(teeth, 2), peak_um, further, tuple(each.effect for each in answer.missing),
         bool(right) and answer.missing[0] is right[0], bool(of_further), false, within, sizes, round(seconds, 1),
     )  # fmt: skip
+
+
+def peak_of_error(effect: ChainMissing) -> tuple[float, float]:
+    """The largest value of an effect's curve with its standard uncertainty; of teeth the amplitude is their step."""
+    if effect.curve is None:
+        return abs(effect.amplitude), effect.u
+    largest = int(np.abs(effect.curve.size).argmax())
+    return abs(float(effect.curve.size[largest])), float(effect.curve.u[largest])
 
 
 def table(lines: list[Line]) -> None:

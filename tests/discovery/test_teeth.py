@@ -9,6 +9,8 @@ from by_path import simulator
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.teeth import TeethOfError
+from monitor.discovery.machine.sizes import size_of
+from monitor.discovery.search.amplitudes import amplitudes
 from monitor.effects import parse_effect
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
@@ -36,6 +38,19 @@ def test_pitch_and_edge_of_a_sawtooth_are_found(virtual_campaigns):
     )
     assert abs(np.corrcoef(told, hidden)[0, 1]) > 0.999
     assert found.variant.nearest == f"EYX:cyclic{shape.pitch:.3g}mm"
+
+
+def test_the_size_of_teeth_is_their_step(virtual_campaigns):
+    """``explain`` told half of what ``identify`` says, the largest value of the curve."""
+    error = simulator().Effect("EYX:curve", peak_um=8.0, curve=sawtooth)
+    campaign, _ = virtual_campaigns.virtual(77, [error], days=1, runs_per_day=2)
+    scene = scene_of(fit(problem_of(campaign).for_search()), [])
+    (found,) = TeethOfError(scene, parse_effect("EYX:poly2", scene.fit.problem.context.chain)).beside([])
+    sizes = amplitudes(scene, [found])
+    size = size_of(found, sizes.estimate, sizes.covariance)
+    assert size.amplitude == sizes.estimate[0]
+    assert size.u == pytest.approx(float(np.sqrt(sizes.covariance[0, 0])))
+    assert np.abs(size.curve.size).max() == pytest.approx(abs(size.amplitude) / 2.0, rel=0.3)
 
 
 def test_an_error_that_is_among_the_others_has_no_teeth_beside_them(virtual_campaigns):

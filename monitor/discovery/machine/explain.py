@@ -201,7 +201,7 @@ def _varying(
     suspects, problem = latest.suspects, search.problem
     if not suspects.varying:
         return ()
-    effects = [*suspects.move_effects(problem), *latest.effects]
+    effects = [*suspects.move_effects(problem), *latest.sides, *latest.effects]
     steady, _ = fit_those_possible(suspects.weighed(problem), effects, latest.under.left_out, first)
     steady = steady.with_correlation(correlation_under(latest.under))
     varying = varying_effects(steady, suspects.varying, search.variants, search.rate, surroundings)

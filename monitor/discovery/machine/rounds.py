@@ -32,11 +32,12 @@ from monitor.discovery.machine.suspects.suspects import (
     with_scatter_of,
     with_slip_of,
 )
+from monitor.discovery.machine.suspects.unknown_sides import unknown_sides
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rounds import Turns, in_rounds
 from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.discovery.search.sign_flips import FEWEST
-from monitor.effects import ArtefactEffect
+from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.driver import HeatDriver
 from monitor.methods.chain.problem import ChainProblem
 
@@ -58,7 +59,8 @@ class Limit(StrEnum):
 @dataclass(frozen=True)
 class ChainRound:
     """The findings of a round: ``under`` is the fit with them and the ``suspects``; ``unable`` are those that could not
-    be fitted, ``unfitted`` the families of earlier rounds that could not."""
+    be fitted, ``unfitted`` the families of earlier rounds that could not; ``sides`` is what plays do where nobody knows
+    on which side they are."""
 
     scene: ChainScene
     result: ChainScan
@@ -68,6 +70,7 @@ class ChainRound:
     unable: tuple[str, ...] = ()
     unfitted: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
+    sides: tuple[MachineEffect, ...] = ()
 
     @property
     def effects(self) -> list[MachineEffect]:
@@ -189,6 +192,7 @@ class _Rounds:
         self.correlation = correlation
         self.shared = correlation is not None
         self.unfitted: dict[str, None] = {}
+        self.sides: tuple[MachineEffect, ...] = ()
         self._noises: NoiseTurns = Turns()
         self._earlier: Turns[SuspectNames, ChainRound] = Turns()
 
@@ -197,26 +201,42 @@ class _Rounds:
 
     def round(self) -> ChainRound:
         """The effects under the present suspects and correlation, and the fit with those that can be fitted."""
-        conditions = self.suspects.conditions, self.correlation, *self.unfitted
+        conditions = self.suspects.conditions, self.correlation, self.sides, *self.unfitted
         if conditions not in self.before.rounds:
             searched = self._round()
+            if sides := self._new_sides(searched):
+                self.sides += sides
+                searched = self._round()
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
             self.before.rounds[conditions] = replace(searched, scene=replace(searched.scene))
+        self.sides = self.before.rounds[conditions].sides
         return replace(self.before.rounds[conditions], suspects=self.suspects)
+
+    def _new_sides(self, searched: ChainRound) -> tuple[ChainEffect, ...]:
+        """What plays do where nobody knows on which side they are, of errors of which it is not among the unknowns of
+        the runs yet."""
+        if self.beside_curves:
+            return ()
+        errors = {side.term for side in self.sides if isinstance(side, ChainEffect)}
+        candidates = [finding.candidate for finding in searched.refined]
+        sides = unknown_sides(searched.scene, candidates, self.search.rate)
+        return tuple(side for side in sides if side.term not in errors)
 
     def _round(self) -> ChainRound:
         """Search effects under the present conditions."""
         problem, suspects = self.search.problem, self.suspects
-        out, single = suspects.left_out(problem), suspects.effects(problem)
+        out, single = suspects.left_out(problem), [*suspects.effects(problem), *self.sides]
         current = self.first
-        if not suspects.same_as(self.initial):
+        if self.sides or not suspects.same_as(self.initial):
             current = fit(with_effects(suspects.weighed(problem), single), out, self.first)
         scene, result = self._scan(current.with_correlation(self.correlation))
         result, refined = told_apart(scene, result)
         effects = [finding.candidate.effect for finding in refined]
         under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
         unable = tuple(finding.candidate.family for finding in refined if finding.candidate.effect in without)
-        return ChainRound(scene, result, refined, suspects, under, unable, tuple(self.unfitted))
+        return ChainRound(
+            scene, result, refined, suspects, under, unable, tuple(self.unfitted), sides=self.sides
+        )
 
     def judged(self, current: ChainRound) -> ChainRound | None:
         """Judge what cannot be fitted, the noise of neighbours and, once these have settled, the suspects."""
@@ -256,10 +276,14 @@ class _Rounds:
     def _suspects_anew(self, standing: ChainRound, start: Fit) -> Suspects:
         """Judge the readings under the effects of a round, again from the ``gross`` ones where others were left out:
         what looked bad without the effects may be good."""
-        problem, gross, begin = self.search.problem, self.search.gross, standing.under
+        problem, gross, begin = (
+            with_effects(self.search.problem, standing.sides),
+            self.search.gross,
+            standing.under,
+        )
         left_out = self.suspects.conditions if self.beside_curves else ()
         noise = None if start.whitening is None else start.whitening.correlation
-        beside = tuple(standing.effects), noise, *self.unfitted, *left_out
+        beside = tuple(standing.effects), standing.sides, noise, *self.unfitted, *left_out
         if beside in self.before.suspects:
             return self.before.suspects[beside]
         if not self.beside_curves and not self.suspects.same_as(gross):

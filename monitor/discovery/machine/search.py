@@ -11,6 +11,7 @@ from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.separation.drive_first import drive_first
 from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.beside_steps import with_those_beside_steps
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
@@ -43,7 +44,8 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
     if may_be_mimics(searched, result.candidates, rate):
         beside = beside_free_shapes(scene)
         searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
-    return searched, by_error_taken_away(searched, standing_out(searched, result))
+    searched, result = drive_first(searched, standing_out(searched, result))
+    return searched, by_error_taken_away(searched, result)
 
 
 def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:

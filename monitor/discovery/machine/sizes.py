@@ -1,8 +1,8 @@
 """How large an effect is that was found: one number with its standard uncertainty.
 
-A coefficient is its own size, and a cosine and a sine, or the components of gravity, have a length. Where coefficients
-nearly cancel or there are as many as one likes (lines over a part of a turn, weights of links, nodes of a table, parts
-of a free shape) the size is the largest value of the error.
+A coefficient is its own size (of teeth it is their step), and a cosine and a sine, or the components of gravity, have a
+length. Where coefficients nearly cancel or there are as many as one likes (lines over a part of a turn, weights of
+links, nodes of a table, parts of a free shape) the size is the largest value of the error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, parse_effect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
-from monitor.effects.shapes import Harmonics, Nodes, Poly, Step
+from monitor.effects.shapes import Harmonics, Nodes, Poly, Sawtooth, Step
 from monitor.effects.weight import LinkWeights
 from monitor.machine import MOTION
 from monitor.records import Array
@@ -52,6 +52,10 @@ def size_of(candidate: ChainCandidate, coefficients: Array, covariance: Array) -
     if candidate.variant.nearest is not None and not is_curve(candidate):
         curve = curve_of(context, effect, coefficients, covariance)
         if curve is not None:
+            if isinstance(effect, ChainEffect) and isinstance(effect.shape, Sawtooth):
+                # One coefficient, the step of the teeth: that of the fitted model, of maps and of tables.
+                size_and_u = spread_or_length(effect, coefficients, covariance)
+                return Size(*size_and_u, _of_shape(candidate, beyond_base), curve=curve)
             # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
             largest = int(np.abs(curve.size).argmax())
             amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])
