@@ -177,7 +177,7 @@ def _table(answer: TrendAnswer) -> None:
     columns = {heading: cells for heading, cells in columns.items() if any(text != "-" for text in cells)}
     slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
-        f"{answer.machine}: {_size(answer)}; latest: mean of the n runs of the last day{slopes}",
+        f"{answer.machine}: {_size(answer)}; latest: mean of the n runs of the last day{_freedoms(answer)}{slopes}",
         ["parameter", "relative to", *(_HEADINGS.get(heading, heading) for heading in columns)],
         [
             [name, answer.refers_to.get(name, ""), *cells]
@@ -185,6 +185,19 @@ def _table(answer: TrendAnswer) -> None:
         ],
         text_columns=3,
     )
+
+
+def _freedoms(answer: TrendAnswer) -> str:
+    """By what the u of the latest means is known, with its degrees of freedom."""
+    means = (parameter.mean for parameter in answer.parameters.values())
+    freedoms = sorted(
+        int(mean.latest_degrees_of_freedom) for mean in means if mean.latest_degrees_of_freedom is not None
+    )
+    if not freedoms:
+        return ""
+    few = freedoms[0]
+    more = "" if few == freedoms[-1] else " or more"
+    return f", u by the scatter of runs within days ({few} degree{'' if few == 1 else 's'} of freedom{more})"
 
 
 def _p_value(change: DatedChange) -> str:

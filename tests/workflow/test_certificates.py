@@ -294,9 +294,14 @@ def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(gua
     assert "conditional pass" in text
 
 
-def test_17025_7_8_6_a_limit_without_a_result_is_named_as_not_decided(guarded: Path, found: RunUncertainty) -> None:
+def test_17025_7_8_6_a_limit_without_a_result_is_named_as_not_decided(
+    guarded: Path, found: RunUncertainty
+) -> None:
     text = " ".join(" ".join(page.extract_text().split()) for page in pypdf.PdfReader(guarded).pages)
-    assert "also limits the volumetric error, to 190.0 µm. This certificate has no volumetric error: whether" in text
+    assert (
+        "also limits the volumetric error, to 190.0 µm. This certificate has no volumetric error: whether"
+        in text
+    )
     freedoms = dict.fromkeys(found.framework.names, math.inf)
     asked = {"campaign": "limited", "freedoms": freedoms, "stated": {**LIMITS, "EXX:reversal": 5.0}}
     statement = statement_of(results_of(as_stated(found), texts_of()), "ilac", texts_of(), **asked)
@@ -322,13 +327,19 @@ def test_the_limit_of_the_volumetric_error_is_decided_as_the_others_where_it_is_
         )  # fmt: skip
     record = from_document(
         CertificateRecord,
-        {key: value for key, value in load_certificate(db, f"V-{language}").record.items() if key != "inputs"},
+        {
+            key: value
+            for key, value in load_certificate(db, f"V-{language}").record.items()
+            if key != "inputs"
+        },
     )
     assert isinstance(record.conformity, ConformityStatement)
     *parameters, judged = record.conformity.verdicts
     assert {one.name for one in parameters} == set(LIMITS)
     largest, law = record.volumetric[0].largest, stats.t(as_stated(found).fewest_dof)
-    assert judged.probability == pytest.approx(float(law.cdf((LONGEST - largest.value_um) / largest.u_um)), abs=1e-9)
+    assert judged.probability == pytest.approx(
+        float(law.cdf((LONGEST - largest.value_um) / largest.u_um)), abs=1e-9
+    )
     assert judged.guard_band == pytest.approx(float(law.ppf(0.95)) * largest.u_um, rel=1e-6)
     assert judged.verdict == "undecided"
     assert 0.5 < judged.probability < 0.95

@@ -165,7 +165,9 @@ def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> Non
     values = history.values[-4:, history.parameters.index("EX0B")]
     assert found["latest_runs"] == 4
     assert found["latest"] == pytest.approx(values.mean())
-    assert found["latest_u"] == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
+    by_day = history.values[:, history.parameters.index("EX0B")].reshape(-1, 4)
+    assert found["latest_u"] == pytest.approx(np.sqrt(by_day.var(axis=1, ddof=1).mean() / 4))
+    assert found["latest_degrees_of_freedom"] == 3 * len(by_day)
 
 
 def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:
