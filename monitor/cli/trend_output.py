@@ -29,7 +29,10 @@ FEWEST_RUNS = 10
 
 
 def say(answer: TrendAnswer) -> None:
-    """Print a page."""
+    """Print a page: what is out of tolerance first, because whoever reads one line has to read that."""
+    for name, parameter in answer.parameters.items():
+        for sentence in out_of_tolerance(name, parameter):
+            output.say(sentence)
     for note in answer.notes:
         output.say(f"note: {note}")
     for pair in answer.agreement:
@@ -50,8 +53,6 @@ def say(answer: TrendAnswer) -> None:
 
 def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
-    for name, parameter in parameters:
-        yield from out_of_tolerance(name, parameter)
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
         yield from _settled(name, parameter)

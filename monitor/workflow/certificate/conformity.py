@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import InputError
 from monitor.records import VOLUMETRIC, Array
+from monitor.reporting import messages
 from monitor.reporting.certificate.record import ConformityStatement, ConformityVerdict, Verdict
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
@@ -72,15 +73,8 @@ def statement_of(
     names = [result.names[index] for index in limited]
     limit = (stated or {}).get(VOLUMETRIC)
     if not names and (limit is None or volumetric is None):
-        by_map = "" if limit is None else "; its limit of the volumetric error is decided with --map"
-        raise InputError(
-            f"campaign {campaign} states no tolerance of {', '.join(result.names)}: a statement of conformity "
-            f"needs [machine.tolerances] in its campaign.toml{by_map}"
-        )
-    unknown = sorted(set(process or {}) - set(names))
-    if unknown:
-        having = f"only {', '.join(names)} have" if names else "no parameter has"
-        raise InputError(f"--process {unknown[0]}: {having} a result and a tolerance in campaign {campaign}")
+        raise InputError(messages.no_tolerance(campaign, result.names, by_map=limit is not None))
+    _check_process(process or {}, names, campaign)
     judged, joint = _of_parameters(rule, result, limited, limits, freedoms) if names else ([], 1.0)
     sentences = []
     if limit is not None and volumetric is not None:
@@ -97,6 +91,13 @@ def statement_of(
         " ".join(sentences),
         _process_in_words(verdicts, process or {}, texts),
     )
+
+
+def _check_process(process: Mapping[str, float], names: Sequence[str], campaign: str) -> None:
+    unknown = sorted(set(process) - set(names))
+    if unknown:
+        having = f"only {', '.join(names)} have" if names else "no parameter has"
+        raise InputError(f"--process {unknown[0]}: {having} a result and a tolerance in campaign {campaign}")
 
 
 def _of_parameters(

@@ -99,19 +99,19 @@ def _scatter(steady: Series, last: npt.NDArray[np.bool_]) -> tuple[float, float]
     Pooled over the days that the instruments of the last one measured (JCGM 100:2008, 4.2.4), because two runs know it
     with one degree of freedom; that of the last day alone where its runs scatter more by more than chance.
     """
-    own = float(steady.values[last].var(ddof=1))
-    own_dof = int(last.sum()) - 1
+    variance = float(steady.values[last].var(ddof=1))
+    own_freedom = int(last.sum()) - 1
     others = ~last & np.isin(steady.measured, steady.measured[last])
     _, day = np.unique(steady.days[others], return_inverse=True)
     runs = np.bincount(day)
     dof = int((runs - 1).sum())
     if dof == 0:
-        return float(np.sqrt(own)), own_dof
+        return float(np.sqrt(variance)), own_freedom
     values = steady.values[others]
     pooled = float(((values - (np.bincount(day, values) / runs)[day]) ** 2).sum())
-    if scipy.special.fdtrc(own_dof, dof, own * dof / pooled if pooled > 0.0 else np.inf) < _CHANCE:
-        return float(np.sqrt(own)), own_dof
-    return float(np.sqrt((own * own_dof + pooled) / (own_dof + dof))), own_dof + dof
+    if scipy.special.fdtrc(own_freedom, dof, variance * dof / pooled if pooled > 0.0 else np.inf) < _CHANCE:
+        return float(np.sqrt(variance)), own_freedom
+    return float(np.sqrt((variance * own_freedom + pooled) / (own_freedom + dof))), own_freedom + dof
 
 
 def calibrations(drift: PieceDrift) -> tuple[RestsOn, ...]:
