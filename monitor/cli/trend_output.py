@@ -29,7 +29,10 @@ FEWEST_RUNS = 10
 
 
 def say(answer: TrendAnswer) -> None:
-    """Print a page."""
+    """Print a page: what is out of tolerance first, because whoever reads one line has to read that."""
+    for name, parameter in answer.parameters.items():
+        for sentence in out_of_tolerance(name, parameter):
+            output.say(sentence)
     for note in answer.notes:
         output.say(f"note: {note}")
     for pair in answer.agreement:
@@ -50,8 +53,6 @@ def say(answer: TrendAnswer) -> None:
 
 def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
-    for name, parameter in parameters:
-        yield from out_of_tolerance(name, parameter)
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
         yield from _settled(name, parameter)
@@ -177,7 +178,7 @@ def _table(answer: TrendAnswer) -> None:
     columns = {heading: cells for heading, cells in columns.items() if any(text != "-" for text in cells)}
     slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
-        f"{answer.machine}: {_size(answer)}; latest: mean of the n runs of the last day{slopes}",
+        f"{answer.machine}: {_size(answer)}; latest: mean of the n runs of the last day{_freedoms(answer)}{slopes}",
         ["parameter", "relative to", *(_HEADINGS.get(heading, heading) for heading in columns)],
         [
             [name, answer.refers_to.get(name, ""), *cells]
@@ -185,6 +186,19 @@ def _table(answer: TrendAnswer) -> None:
         ],
         text_columns=3,
     )
+
+
+def _freedoms(answer: TrendAnswer) -> str:
+    """By what the u of the latest means is known, with its degrees of freedom."""
+    means = (parameter.mean for parameter in answer.parameters.values())
+    freedoms = sorted(
+        int(mean.latest_degrees_of_freedom) for mean in means if mean.latest_degrees_of_freedom is not None
+    )
+    if not freedoms:
+        return ""
+    few = freedoms[0]
+    more = "" if few == freedoms[-1] else " or more"
+    return f", u by the scatter of runs within days ({few} degree{'' if few == 1 else 's'} of freedom{more})"
 
 
 def _p_value(change: DatedChange) -> str:

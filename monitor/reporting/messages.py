@@ -286,6 +286,15 @@ def campaign_of_certificate_withdrawn(campaign: str, number: str, why: str) -> s
     return f"the campaign {campaign}, which certificate {number} rests on, was withdrawn: {why}"
 
 
+def no_tolerance(campaign: str, names: Sequence[str], *, by_map: bool) -> str:
+    """Return that a campaign states no tolerance of the results; ``by_map``: it limits the volumetric error."""
+    volumetric = "; its limit of the volumetric error is decided with --map" if by_map else ""
+    return (
+        f"campaign {campaign} states no tolerance of {', '.join(names)}: a statement of conformity needs "
+        f"[machine.tolerances] in its campaign.toml{volumetric}"
+    )
+
+
 def conformity_replaced(rule: str, said: str) -> str:
     """Return that a statement of conformity by a rule stands in place of the laboratory's sentence."""
     return (

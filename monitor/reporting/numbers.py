@@ -25,6 +25,7 @@ _UNITY = Decimal("1e-9")
 _EXACT = Context(prec=700)
 MINUS = "\N{MINUS SIGN}"
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
+LESS_OR_EQUAL = "\N{LESS-THAN OR EQUAL TO}"
 
 
 @dataclass(frozen=True)

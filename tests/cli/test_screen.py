@@ -46,6 +46,7 @@ OTHER = frozenset(
             "axes_by_pose",
         ),
         *("p", "f", "bic", "bic_before", "bic_after", "degrees_of_freedom", "pure_error_degrees_of_freedom"),
+        "latest_degrees_of_freedom",
         *(
             "p_value",
             "bartlett_p",

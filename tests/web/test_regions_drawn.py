@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
 from monitor.web.charts.statistics import cloud_chart
+from monitor.web.pages.campaign import _charts
 from monitor.workflow.uncertainty.cloud import CloudAnswer
 
 CLOUD = CloudAnswer(
@@ -33,3 +35,17 @@ def test_no_ellipse_is_drawn_where_nothing_bounds_it() -> None:
         "no ellipse, which would need more degrees of freedom than parameters, rectangle with k_q = 2.50"
         in chart.says
     )
+
+
+def test_two_runs_draw_no_correlations_and_more_say_their_degrees_of_freedom() -> None:
+    """With one degree of freedom all of them are +1 or -1, and look like a finding."""
+    two, many = (
+        SimpleNamespace(
+            parameter_order=("EXX", "EYY"), correlation_pooled=np.eye(2), degrees_of_freedom_pooled=freedom,
+            coordinates=SimpleNamespace(histograms={}, n=0),
+        )
+        for freedom in (1, 16)
+    )  # fmt: skip
+    assert _charts(two) == []
+    (chart,) = _charts(many)
+    assert chart.says.endswith("pooled within the groups (16 degrees of freedom)")

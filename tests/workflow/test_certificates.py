@@ -23,9 +23,12 @@ from monitor.cli import main
 from monitor.documents import from_document, to_document
 from monitor.exceptions import DataError, InputError
 from monitor.readers import read_campaign
+from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.page import _printed
 from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement
 from monitor.reporting.certificate.results import ResultSet
+from monitor.reporting.certificate.tables import conformity_rows
+from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_campaign, load_certificate
@@ -46,6 +49,8 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
 #: Run 20 of the example: EX0C is far outside, EXX inside by less than U, EA0B inside by more.
 LIMITS = {"EX0C": 20.0, "EXX": 60.0, "EA0B": 60.0}
+#: Limit of the volumetric error of that run, µm: beyond its largest by less than 1.645 u.
+LONGEST = 190.0
 DAY = date(2026, 3, 12)
 
 
@@ -62,7 +67,7 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     text = re.sub('campaign = ".*?"', 'campaign = "limited"', text, count=1).replace(
         'id = "HU40-T"', 'id = "M"', 1
     )
-    limits = "".join(f"{name} = {limit}\n" for name, limit in LIMITS.items())
+    limits = "".join(f"{name} = {limit}\n" for name, limit in {**LIMITS, "volumetric": LONGEST}.items())
     text = text.replace("[machine.axes]", f"[machine.tolerances]\n{limits}\n[machine.axes]", 1)
     (limited / "campaign.toml").write_text(text, encoding="utf-8")
     with Database(folder / "c.duckdb", threads=1) as opened:
@@ -288,6 +293,89 @@ def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(gua
     assert "Joint probability that all 3 parameters lie within their tolerances" in text
     assert re.search(r"EXX ± 60\.0 \d+ µm/m", text)
     assert "conditional pass" in text
+
+
+def test_17025_7_8_6_a_limit_without_a_result_is_named_as_not_decided(
+    guarded: Path, found: RunUncertainty
+) -> None:
+    text = " ".join(" ".join(page.extract_text().split()) for page in pypdf.PdfReader(guarded).pages)
+    assert (
+        "also limits the volumetric error, to 190.0 µm. This certificate has no volumetric error: whether"
+        in text
+    )
+    freedoms = dict.fromkeys(found.framework.names, math.inf)
+    asked = {"campaign": "limited", "freedoms": freedoms, "stated": {**LIMITS, "EXX:reversal": 5.0}}
+    statement = statement_of(results_of(as_stated(found), texts_of()), "ilac", texts_of(), **asked)
+    assert "states limits of EXX:reversal too, of which this certificate has no result" in statement.basis
+    bare = replace(results_of(as_stated(found), texts_of()), tolerances=None)
+    asked["stated"] = {"volumetric": LONGEST}
+    with pytest.raises(InputError, match="its limit of the volumetric error is decided with --map"):
+        statement_of(bare, "ilac", texts_of(), **asked)
+
+
+@pytest.mark.parametrize("language", ["en", pytest.param("de", marks=pytest.mark.slow)])
+def test_the_limit_of_the_volumetric_error_is_decided_as_the_others_where_it_is_stated(
+    db: Database, tmp_path: Path, found: RunUncertainty, pdf_unread, language: str
+) -> None:
+    laboratory = LABORATORY if language == "en" else EXAMPLES / "laboratory-de.toml"
+    with pdf_unread():
+        issue(
+            db,
+            CertificateRequest(
+                "limited", 20, laboratory=laboratory, out=tmp_path, number=f"V-{language}", issued_on=DAY,
+                conformity="iso14253", with_map=True,
+            ),
+        )  # fmt: skip
+    record = from_document(
+        CertificateRecord,
+        {
+            key: value
+            for key, value in load_certificate(db, f"V-{language}").record.items()
+            if key != "inputs"
+        },
+    )
+    assert isinstance(record.conformity, ConformityStatement)
+    *parameters, judged = record.conformity.verdicts
+    assert {one.name for one in parameters} == set(LIMITS)
+    largest, law = record.volumetric[0].largest, stats.t(as_stated(found).fewest_dof)
+    assert judged.probability == pytest.approx(
+        float(law.cdf((LONGEST - largest.value_um) / largest.u_um)), abs=1e-9
+    )
+    assert judged.guard_band == pytest.approx(float(law.ppf(0.95)) * largest.u_um, rel=1e-6)
+    assert judged.verdict == "undecided"
+    assert 0.5 < judged.probability < 0.95
+    name, words = {
+        "en": ("volumetric error", "is decided by the same rule for its largest error"),
+        "de": ("volumetrische Abweichung", "wird nach derselben Regel für die größte Abweichung"),
+    }[language]
+    printed = conformity_rows(record.conformity, texts_of(language))
+    assert printed.count == 3
+    assert printed.rows[-1][:3] == (name, "≤ 190,0" if language == "de" else "≤ 190.0", "µm")
+    assert words in record.conformity.basis
+    xml = dcc_xml(record).decode()
+    assert f"{name}, {record.conformity.state}<" in xml
+    assert xml.count("<dcc:conformity>noPass</dcc:conformity>") >= 1
+
+
+def test_by_the_guard_band_of_all_parameters_a_length_has_the_u_of_its_map(found: RunUncertainty) -> None:
+    result = results_of(as_stated(found), texts_of())
+    largest = Length(25.0, 0.4, 0.9)
+    mapped = VolumetricResult(
+        state="as found", p=0.95, k=2.25, ranges=(), from_strokes=True, each=2, poses=1, points=8, datum=(),
+        largest=largest, mean=largest, rms=largest, left_out=(), axes=(), readings_mm=np.empty((0, 3)),
+        vectors_um=np.empty((0, 3)), expanded_um=np.empty(0),
+    )  # fmt: skip
+    alone = replace(result, tolerances=None)
+    for limit, verdict in ((25.95, "pass"), (25.5, "conditional pass"), (24.0, "fail")):
+        statement = statement_of(
+            alone, "guard", texts_of(), campaign="limited", freedoms={"volumetric": math.inf},
+            stated={"volumetric": limit}, volumetric=mapped,
+        )  # fmt: skip
+        (judged,) = statement.verdicts
+        assert judged.verdict == verdict
+        assert judged.guard_band == pytest.approx(0.9)
+        assert conformity_rows(statement, texts_of()).count == 0
+        assert "not one of those that hold at once" in statement.basis
 
 
 def test_jcgm106_9_5_the_global_risks_of_a_rule_are_those_of_drawn_machines(found: RunUncertainty) -> None:

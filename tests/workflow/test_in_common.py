@@ -10,9 +10,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from monitor.cli.agreement_output import agreement_line
 from monitor.cli.rests_on_output import levels
@@ -329,3 +331,33 @@ def test_optics_without_a_scale_calibrate_no_laser_anew(tmp_path: Path, optics: 
     assert {of[LASER] for of in history.calibrations.certificates.values()} == {"C-7"}
     assert what_measured(history)[0] == (f"instruments ({LASER})",)
     assert not between_instruments(history, _stepped(machine_past(history, ()), {"EXX": 2.5}, 0))
+
+
+def _two_a_day(values: Any) -> Series:
+    count = values.size
+    return Series(
+        "EXX", "µm/m", values.ravel(), np.full(count, 1.0),
+        np.repeat(np.arange(count // 2), 2) + np.tile([0.0, 0.1], count // 2),
+        np.repeat(np.arange(count // 2), 2), np.zeros(count), np.zeros(count, dtype=np.bool_), timedelta(),
+    )  # fmt: skip
+
+
+def test_jcgm100_4_2_4_two_runs_of_a_day_have_the_scatter_of_all_days() -> None:
+    """By their own scatter the mean of two was known 100 times too well in one of 100 days."""
+    rng = np.random.default_rng(8)
+    covered = {2: 0, 30: 0}
+    for _ in range(400):
+        for days in covered:
+            mean = latest_mean(_two_a_day(rng.normal(0.0, 2.0, (days, 2))))
+            dof = mean.latest_degrees_of_freedom
+            assert dof in (days, 1)
+            covered[days] += abs(mean.latest) <= stats.t(dof).ppf(0.95 / 2 + 0.5) * mean.latest_u
+    assert all(366 <= count <= 394 for count in covered.values()), covered
+
+
+def test_a_day_that_scatters_more_than_the_others_has_its_own_u() -> None:
+    values = np.random.default_rng(9).normal(0.0, 1.0, (20, 2))
+    values[-1] = 0.0, 30.0
+    loose = latest_mean(_two_a_day(values))
+    assert loose.latest_u == pytest.approx(15.0)
+    assert loose.latest_degrees_of_freedom == 1

@@ -17,7 +17,7 @@ from by_path import TESTS, load
 from scipy.optimize import curve_fit
 
 from monitor.cli import main
-from monitor.cli.trend_output import out_of_tolerance
+from monitor.cli.trend_output import out_of_tolerance, say
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.messages import attention_words
@@ -46,6 +46,8 @@ from monitor.workflow.selections.select import select
 from monitor.workflow.selections.side_by_side import side_by_side
 from monitor.workflow.trend.figures import headline
 from monitor.workflow.trend.parameter import drift_statement
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
@@ -165,7 +167,9 @@ def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> Non
     values = history.values[-4:, history.parameters.index("EX0B")]
     assert found["latest_runs"] == 4
     assert found["latest"] == pytest.approx(values.mean())
-    assert found["latest_u"] == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
+    by_day = history.values[:, history.parameters.index("EX0B")].reshape(-1, 4)
+    assert found["latest_u"] == pytest.approx(np.sqrt(by_day.var(axis=1, ddof=1).mean() / 4))
+    assert found["latest_degrees_of_freedom"] == 3 * len(by_day)
 
 
 def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:
@@ -631,3 +635,15 @@ def test_a_drift_has_one_slope_with_one_uncertainty(made: Any) -> None:
     assert (drift["size"], drift["u"], drift["p_value"]) == pytest.approx(stated)
     # 0.2 µm a week.
     assert drift["size"] == pytest.approx(0.2 * 365.25 / 7.0, abs=4.0 * drift["u"])
+
+
+def test_what_is_out_of_tolerance_is_the_first_line(
+    made: Database, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = trend(made, TrendRequest("M"))
+    found = answer.parameters["EX0C"]
+    limited = replace(found, forecast=replace(found.forecast, limit=0.5 * abs(found.mean.latest)))
+    say(replace(answer, parameters={**answer.parameters, "EX0C": limited}, notes=("a note",)))
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first.startswith("out of tolerance: EX0C, ")
+    assert not any(line.startswith("out of tolerance: EX0C") for line in others)

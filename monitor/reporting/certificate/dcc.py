@@ -36,7 +36,7 @@ from monitor.reporting.certificate.record import (
     Replaced,
     Verdict,
 )
-from monitor.reporting.certificate.tables import guard_band
+from monitor.reporting.certificate.tables import guard_band, judged_name, tolerance_words
 from monitor.reporting.certificate.words import amendment, answer, verdict_words
 from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
@@ -173,7 +173,7 @@ def _conformity(parent: ET.Element, conformity: ConformityStatement, texts: Text
         say(
             statement,
             "name",
-            texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
+            texts("dcc.conformity_of", name=judged_name(verdict, texts), state=conformity.state),
             texts.language,
         )
         banded = verdict.guard_band is not None
@@ -181,7 +181,7 @@ def _conformity(parent: ET.Element, conformity: ConformityStatement, texts: Text
             "dcc.verdict_band" if banded else "dcc.verdict",
             band=guard_band(verdict, texts) if banded else "",
             verdict=verdict_words(verdict.verdict, texts),
-            tolerance=texts.number(decimal_of(verdict.tolerance)),
+            tolerance=tolerance_words(verdict, texts),
             unit=verdict.unit,
             probability=texts.number(decimal_of(verdict.probability)),
             rule=conformity.rule,

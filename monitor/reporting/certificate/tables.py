@@ -6,10 +6,18 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
 
+from monitor.records import VOLUMETRIC
 from monitor.reporting.certificate.record import ConformityStatement, ConformityVerdict
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.words import verdict_words
-from monitor.reporting.numbers import PLUS_MINUS, decimal_of, round_result, round_to_place, round_uncertainty
+from monitor.reporting.numbers import (
+    LESS_OR_EQUAL,
+    PLUS_MINUS,
+    decimal_of,
+    round_result,
+    round_to_place,
+    round_uncertainty,
+)
 from monitor.reporting.palette import PAGE_WIDTH_MM
 from monitor.reporting.svg.letter_widths import BOLD, MILLIMETRES_A_POINT, in_mm
 from monitor.reporting.texts import Texts
@@ -41,8 +49,9 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedConformity:
-    """The verdicts as printed: (symbol, tolerance, unit, probability, verdict) and the joint probability.
+    """The verdicts as printed: (symbol, tolerance, unit, probability, verdict).
 
+    ``joint`` is the joint probability of the ``count`` parameters among them.
     ``bands`` are the guard bands and ``risks`` the global risks (R_C, R_P) of the rows; empty where none are stored.
     """
 
@@ -109,8 +118,8 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
     """The verdicts with their tolerances and probabilities."""
     rows = tuple(
         (
-            verdict.name,
-            f"{PLUS_MINUS} {texts.number(decimal_of(verdict.tolerance))}",
+            judged_name(verdict, texts),
+            tolerance_words(verdict, texts),
             verdict.unit,
             _probability(verdict.probability, texts),
             verdict_words(verdict.verdict, texts),
@@ -121,7 +130,7 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
     return PrintedConformity(
         rows,
         _probability(statement.joint_probability, texts),
-        len(rows),
+        sum(verdict.name != VOLUMETRIC for verdict in statement.verdicts),
         bands=tuple(guard_band(verdict, texts) for verdict in verdicts)
         if any(verdict.guard_band is not None for verdict in verdicts)
         else (),
@@ -132,6 +141,17 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
         if any(verdict.consumers_risk is not None for verdict in verdicts)
         else (),
     )
+
+
+def judged_name(verdict: ConformityVerdict, texts: Texts) -> str:
+    """What a verdict is of: the symbol of its parameter, or the volumetric error."""
+    return texts("page.volumetric_error") if verdict.name == VOLUMETRIC else verdict.name
+
+
+def tolerance_words(verdict: ConformityVerdict, texts: Texts) -> str:
+    """The tolerance without its unit: of either sign, or what a length does not exceed."""
+    limit = texts.number(decimal_of(verdict.tolerance))
+    return f"{LESS_OR_EQUAL if verdict.name == VOLUMETRIC else PLUS_MINUS} {limit}"
 
 
 def guard_band(verdict: ConformityVerdict, texts: Texts) -> str:

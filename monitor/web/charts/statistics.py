@@ -26,10 +26,11 @@ OUTLINE = 181
 def correlation_chart(answer: StatisticsAnswer) -> Chart:
     """Show the pooled correlation matrix of the parameters."""
     names = list(answer.parameter_order)
+    freedom = answer.degrees_of_freedom_pooled
     matrix = np.asarray(answer.correlation_pooled, dtype=float)
     return Chart(
         key="correlation",
-        says="correlation matrix of the parameters, pooled within the groups",
+        says=f"correlation matrix of the parameters, pooled within the groups ({freedom} degrees of freedom)",
         traces=[
             {
                 "type": "heatmap", "x": names, "y": names, "z": [_row(row) for row in matrix.tolist()], "zmin": -1,

@@ -109,11 +109,17 @@ def _conditions(runs: RunsAnswer) -> list[str]:
     return list(dict.fromkeys(name for run in runs.runs for name in run.conditions))
 
 
+#: With one degree of freedom every correlation is +1 or -1, whatever the parameters share.
+_FEWEST_FREEDOMS = 2
+
+
 def _charts(statistics: StatisticsAnswer) -> list[Chart]:
     histograms = [
         p_value_chart(name, histogram, statistics.coordinates.n)
         for name, histogram in statistics.coordinates.histograms.items()
     ]
+    if statistics.degrees_of_freedom_pooled < _FEWEST_FREEDOMS:
+        return histograms
     return [correlation_chart(statistics), *histograms]
 
 

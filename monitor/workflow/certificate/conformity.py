@@ -2,21 +2,29 @@
 
 Which rule: ``iso14253`` (or ``probability``, the same decision named after JCGM 106) and ``ilac`` for every parameter
 by itself; ``guard`` where all statements together are to hold; ``simple`` where both sides share the risk.
+
+The limit of the volumetric error is decided by the same rule where the certificate has a map: by its largest error with
+the u of that point, as in the weekly report. A limit of the machine's file that the certificate cannot decide is named.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.exceptions import InputError
+from monitor.records import VOLUMETRIC, Array
+from monitor.reporting import messages
 from monitor.reporting.certificate.record import ConformityStatement, ConformityVerdict, Verdict
 from monitor.reporting.certificate.results import ResultSet
+from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.numbers import decimal_of, round_to_place, written_probability
 from monitor.reporting.texts import Texts
+from monitor.units import MICROMETRE
 
 #: Probability of conformity that ISO 14253-1:2017 asks for where nothing else is agreed; its complement decides for
 #: failure.
@@ -29,8 +37,11 @@ _HALVINGS = 40
 
 @dataclass(frozen=True)
 class _Judged:
-    """One parameter: absolute ``value``, ``limit``, ``u``, degrees of freedom, guard band w, probability."""
+    """One parameter, or the volumetric error: absolute ``value``, ``limit``, ``u``, degrees of freedom, guard band w,
+    probability."""
 
+    name: str
+    unit: str
     value: float
     limit: float
     u: float
@@ -47,55 +58,113 @@ def statement_of(
     campaign: str,
     freedoms: Mapping[str, float],
     process: Mapping[str, float] | None = None,
+    stated: Mapping[str, float] | None = None,
+    volumetric: VolumetricResult | None = None,
 ) -> ConformityStatement:
     """The statement on every parameter of a result that has a tolerance, in the language of ``texts``.
 
-    ``freedoms`` are the degrees of freedom of every parameter's variance, ``process`` the standard deviations of true
-    values about zero where global risks are asked for. Raises InputError where ``campaign``, which the tolerances are
-    from, states none, or ``process`` names a parameter that has none.
+    ``freedoms`` are the degrees of freedom of every parameter's variance and of the volumetric error's, ``process`` the
+    standard deviations of true values about zero where global risks are asked for, ``stated`` all limits of the
+    machine's file, ``volumetric`` the volumetric error of the certificate. Raises InputError where ``campaign``, which
+    the tolerances are from, states none that can be decided, or ``process`` names a parameter that has none.
     """
+    limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances
+    limited = np.flatnonzero(np.isfinite(limits))
+    names = [result.names[index] for index in limited]
+    limit = (stated or {}).get(VOLUMETRIC)
+    if not names and (limit is None or volumetric is None):
+        raise InputError(messages.no_tolerance(campaign, result.names, by_map=limit is not None))
+    _check_process(process or {}, names, campaign)
+    judged, joint = _of_parameters(rule, result, limited, limits, freedoms) if names else ([], 1.0)
+    sentences = []
+    if limit is not None and volumetric is not None:
+        judged.append(_of_volumetric(rule, volumetric, limit, freedoms[VOLUMETRIC]))
+        sentences = _volumetric_in_words(rule, volumetric, texts)
+    verdicts = [_stated(rule, each, (process or {}).get(each.name)) for each in judged]
+    sentences.insert(0, _basis(campaign, min(each.dof for each in judged), texts))
+    sentences += _not_decided(stated or {}, [each.name for each in judged], texts)
+    return ConformityStatement(
+        *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged))),
+        tuple(verdicts),
+        joint,
+        result.state,
+        " ".join(sentences),
+        _process_in_words(verdicts, process or {}, texts),
+    )
+
+
+def _check_process(process: Mapping[str, float], names: Sequence[str], campaign: str) -> None:
+    unknown = sorted(set(process) - set(names))
+    if unknown:
+        having = f"only {', '.join(names)} have" if names else "no parameter has"
+        raise InputError(f"--process {unknown[0]}: {having} a result and a tolerance in campaign {campaign}")
+
+
+def _of_parameters(
+    rule: str, result: ResultSet, limited: npt.NDArray[np.intp], limits: Array, freedoms: Mapping[str, float]
+) -> tuple[list[_Judged], float]:
+    """The parameters ``limited`` of a result against their ``limits``, and the joint probability of conformity."""
     # Loaded here: most certificates state no conformity.
     from monitor.uncertainty.conformity import conformity
 
-    limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances
-    limited = np.flatnonzero(np.isfinite(limits))
-    if not len(limited):
-        raise InputError(
-            f"campaign {campaign} states no tolerance of {', '.join(result.names)}: a statement of conformity "
-            "needs [machine.tolerances] in its campaign.toml"
-        )
     names = [result.names[index] for index in limited]
-    unknown = sorted(set(process or {}) - set(names))
-    if unknown:
-        raise InputError(
-            f"--process {unknown[0]}: only {', '.join(names)} have a result and a tolerance in campaign {campaign}"
-        )
     tolerance = limits[limited]
     dofs = np.array([freedoms[name] for name in names])
-    judged = conformity(
+    within = conformity(
         result.estimate[limited], result.covariance[np.ix_(limited, limited)], -tolerance, tolerance, dof=dofs
     )
-    verdicts, wrong = [], 0.0
-    for index, dof, p in zip(map(int, limited), map(float, dofs), map(float, judged.single), strict=True):
-        u = float(result.u[index])
-        band = _guard_factor(rule, result, dof) * u
-        parameter = _Judged(abs(float(result.estimate[index])), float(limits[index]), u, dof, band, p)
-        wrong = max(wrong, _largest_risk(parameter))
-        name = result.names[index]
-        risks = _global_risks(rule, parameter, (process or {}).get(name))
-        verdicts.append(
-            ConformityVerdict(
-                name, result.units[index], parameter.limit, _verdict(rule, parameter), p, band, *risks
-            )
-        )
-    return ConformityStatement(
-        *_rule_in_words(rule, result, texts, wrong),
-        tuple(verdicts),
-        judged.joint,
-        result.state,
-        _basis(campaign, float(dofs.min()), texts),
-        _process_in_words(verdicts, process or {}, texts),
+    judged = []
+    for index, dof, p in zip(map(int, limited), map(float, dofs), map(float, within.single), strict=True):
+        value, u = abs(float(result.estimate[index])), float(result.u[index])
+        band = _guard_factor(rule, result.k_q, dof) * u
+        name, unit = result.names[index], result.units[index]
+        judged.append(_Judged(name, unit, value, float(limits[index]), u, dof, band, p))
+    return judged, within.joint
+
+
+def _of_volumetric(rule: str, volumetric: VolumetricResult, limit: float, dof: float) -> _Judged:
+    """The largest error of a map against its limit; where the rule takes U it is that of the map."""
+    from monitor.uncertainty.conformity import conformity
+
+    value, u = volumetric.largest.value_um, volumetric.largest.u_um
+    within = conformity([value], [[u**2]], [-limit], [limit], dof=dof)
+    band = _guard_factor(rule, volumetric.k, dof) * u
+    return _Judged(VOLUMETRIC, MICROMETRE.name, value, limit, u, dof, band, float(within.single[0]))
+
+
+def _stated(rule: str, judged: _Judged, spread: float | None) -> ConformityVerdict:
+    return ConformityVerdict(
+        judged.name,
+        judged.unit,
+        judged.limit,
+        _verdict(rule, judged),
+        judged.probability,
+        judged.band,
+        *_global_risks(rule, judged, spread),
     )
+
+
+def _volumetric_in_words(rule: str, volumetric: VolumetricResult, texts: Texts) -> list[str]:
+    """By what the limit of the volumetric error is decided."""
+    sentences = [texts("conformity.volumetric", points=volumetric.points)]
+    if rule == "guard":
+        p = written_probability(volumetric.p, texts.decimal_sign)
+        sentences.append(texts("conformity.volumetric_guard", p=p))
+    if volumetric.left_out:
+        sentences.append(texts("conformity.volumetric_left_out"))
+    return sentences
+
+
+def _not_decided(stated: Mapping[str, float], decided: Sequence[str], texts: Texts) -> list[str]:
+    """The limits of the machine's file on which the certificate has no result."""
+    sentences = []
+    lacking = [name for name in stated if name not in decided and name != VOLUMETRIC]
+    if lacking:
+        sentences.append(texts("conformity.not_decided", parameters=", ".join(lacking)))
+    if VOLUMETRIC in stated and VOLUMETRIC not in decided:
+        limit = texts.number(decimal_of(stated[VOLUMETRIC]))
+        sentences.append(texts("conformity.volumetric_not_decided", limit=limit, unit=MICROMETRE.name))
+    return sentences
 
 
 def _rule_in_words(rule: str, result: ResultSet, texts: Texts, wrong: float) -> tuple[str, str]:
@@ -135,14 +204,14 @@ def _process_in_words(
     return texts("conformity.process", spreads=spreads)
 
 
-def _guard_factor(rule: str, result: ResultSet, dof: float) -> float:
-    """The guard band w in standard uncertainties."""
+def _guard_factor(rule: str, k: float, dof: float) -> float:
+    """The guard band w in standard uncertainties; ``k`` is the factor of U where the rule takes that."""
     from monitor.uncertainty.coverage_regions.coverage import single_factor
 
     if rule == "simple":
         return 0.0
     if rule == "guard":
-        return result.k_q
+        return k
     if rule == "ilac":
         return single_factor(COVERED, dof)
     # One limit is near, the other far: the one-sided quantile.

@@ -11,6 +11,7 @@ from typing import Literal
 from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
+from monitor.records import VOLUMETRIC
 from monitor.reporting import messages
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.completeness import RefusedGroundsError, missing_items
@@ -243,7 +244,12 @@ def _record(
             request.conformity,
             texts,
             campaign=last.campaign.name,
-            freedoms=dict(zip(last.names, map(float, last.dof_by_parameter), strict=True)),
+            freedoms={
+                **dict(zip(last.names, map(float, last.dof_by_parameter), strict=True)),
+                VOLUMETRIC: last.fewest_dof,
+            },
+            stated=last.campaign.machine.tolerances,
+            volumetric=record.volumetric[-1] if record.volumetric else None,
             process=request.process,
         )
         record = dataclasses.replace(record, conformity=statement)

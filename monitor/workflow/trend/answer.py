@@ -86,13 +86,14 @@ class DriftStatement:
 
 @dataclass(frozen=True)
 class LatestMean:
-    """The mean of the last day's runs; its uncertainty by their scatter and the calibrations that they rest on, of a
-    single run as stated."""
+    """The mean of the last day's runs; its uncertainty, with degrees of freedom, by the scatter of runs within days and
+    the calibrations that they rest on; of a single run as stated."""
 
     latest: float
     latest_u: float | None
     latest_runs: int
     latest_at: str | None
+    latest_degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
+import scipy
 
 from monitor.statistics import Change
 from monitor.units import DAYS_PER_YEAR
@@ -62,22 +64,54 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
     )
 
 
-def latest_mean(steady: Series) -> LatestMean:
-    """The mean of the last day's steady runs, with its standard uncertainty (None where not stated): the scatter of the
-    runs by their number, and what it has of the calibrations that they rest on.
+#: Below this probability the runs of the last day scatter more than those of the other days by more than chance.
+_CHANCE = 0.01
 
-    A day of another campaign that overlaps it is part of it, as in the table of all machines.
+
+def latest_mean(steady: Series) -> LatestMean:
+    """The mean of the last day's steady runs, with its standard uncertainty and degrees of freedom.
+
+    A day of another campaign that overlaps it is part of it, as in the table of all machines. Of several runs u is
+    the scatter of runs within days by their number, and what it has of the calibrations that they rest on; of a single
+    run it is the stated one, None where there is none.
     """
     last = steady.of_last_day
     count = int(last.sum())
+    u, dof = float(steady.u[last][0]), None
     if count > 1:
-        common = float(np.linalg.norm(steady.part(last).common_of_mean))
-        u = float(np.hypot(steady.values[last].std(ddof=1) / np.sqrt(count), common))
-    else:
-        u = float(steady.u[last][0])
+        scatter, freedom = _scatter(steady, last)
+        of_mean = scatter / np.sqrt(count)
+        u = float(np.hypot(of_mean, np.linalg.norm(steady.part(last).common_of_mean)))
+        # JCGM 100:2008, G.4.1: what the calibrations add has no end of degrees of freedom here.
+        dof = freedom * (u / of_mean) ** 4 if of_mean > 0.0 else None
     return LatestMean(
-        float(steady.values[last].mean()), number(u), count, date(float(steady.t[-1]), steady.offset)
+        float(steady.values[last].mean()),
+        number(u),
+        count,
+        date(float(steady.t[-1]), steady.offset),
+        number(dof),
     )
+
+
+def _scatter(steady: Series, last: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Standard deviation of the runs of a day, and its degrees of freedom.
+
+    Pooled over the days that the instruments of the last one measured (JCGM 100:2008, 4.2.4), because two runs know it
+    with one degree of freedom; that of the last day alone where its runs scatter more by more than chance.
+    """
+    variance = float(steady.values[last].var(ddof=1))
+    own_freedom = int(last.sum()) - 1
+    others = ~last & np.isin(steady.measured, steady.measured[last])
+    _, day = np.unique(steady.days[others], return_inverse=True)
+    runs = np.bincount(day)
+    dof = int((runs - 1).sum())
+    if dof == 0:
+        return float(np.sqrt(variance)), own_freedom
+    values = steady.values[others]
+    pooled = float(((values - (np.bincount(day, values) / runs)[day]) ** 2).sum())
+    if scipy.special.fdtrc(own_freedom, dof, variance * dof / pooled if pooled > 0.0 else np.inf) < _CHANCE:
+        return float(np.sqrt(variance)), own_freedom
+    return float(np.sqrt((variance * own_freedom + pooled) / (own_freedom + dof))), own_freedom + dof
 
 
 def calibrations(drift: PieceDrift) -> tuple[RestsOn, ...]:
