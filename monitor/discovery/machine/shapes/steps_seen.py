@@ -133,6 +133,7 @@ class StepsSeen:
 
     @cached_property
     def middles_of_positions(self) -> Array:
+        """The middles (n,) of the positions, in mm."""
         return np.asarray(self.positions.mean(axis=1))
 
     def are_apart(self, places: Array | Sequence[float], width: float) -> npt.NDArray[np.bool_]:
