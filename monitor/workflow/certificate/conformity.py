@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -58,7 +59,7 @@ def statement_of(
     campaign: str,
     freedoms: Mapping[str, float],
     process: Mapping[str, float] | None = None,
-    stated: Mapping[str, float] | None = None,
+    stated: Mapping[str, float] = MappingProxyType({}),
     volumetric: VolumetricResult | None = None,
 ) -> ConformityStatement:
     """The statement on every parameter of a result that has a tolerance, in the language of ``texts``.
@@ -68,28 +69,29 @@ def statement_of(
     machine's file, ``volumetric`` the volumetric error of the certificate. Raises InputError where ``campaign``, which
     the tolerances are from, states none that can be decided, or ``process`` names a parameter that has none.
     """
+    spreads = process or {}
     limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances
     limited = np.flatnonzero(np.isfinite(limits))
     names = [result.names[index] for index in limited]
-    limit = (stated or {}).get(VOLUMETRIC)
+    limit = stated.get(VOLUMETRIC)
     if not names and (limit is None or volumetric is None):
         raise InputError(messages.no_tolerance(campaign, result.names, by_map=limit is not None))
-    _check_process(process or {}, names, campaign)
-    judged, joint = _of_parameters(rule, result, limited, limits, freedoms) if names else ([], 1.0)
+    _check_process(spreads, names, campaign)
+    judged, joint = _of_parameters(rule, result, limited, limits, freedoms)
     sentences = []
     if limit is not None and volumetric is not None:
         judged.append(_of_volumetric(rule, volumetric, limit, freedoms[VOLUMETRIC]))
         sentences = _volumetric_in_words(rule, volumetric, texts)
-    verdicts = [_stated(rule, each, (process or {}).get(each.name)) for each in judged]
+    verdicts = [_stated(rule, each, spreads.get(each.name)) for each in judged]
     sentences.insert(0, _basis(campaign, min(each.dof for each in judged), texts))
-    sentences += _not_decided(stated or {}, [each.name for each in judged], texts)
+    sentences += _not_decided(stated, [each.name for each in judged], texts)
     return ConformityStatement(
         *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged))),
         tuple(verdicts),
         joint,
         result.state,
         " ".join(sentences),
-        _process_in_words(verdicts, process or {}, texts),
+        _process_in_words(verdicts, spreads, texts),
     )
 
 
@@ -108,6 +110,8 @@ def _of_parameters(
     from monitor.uncertainty.conformity import conformity
 
     names = [result.names[index] for index in limited]
+    if not names:
+        return [], 1.0
     tolerance = limits[limited]
     dofs = np.array([freedoms[name] for name in names])
     within = conformity(
