@@ -226,7 +226,7 @@ def _beside_groups(best: Scan, series: _Series) -> Scan:
     )
 
 
-#: Part of the probability of a false alarm that is spent on plateaus, where they are sought; the rest is for one change.
+#: Part of the probability of a false alarm that is spent on plateaus, where they are sought, the rest on one change.
 #: Ten percent less for it cost next to nothing, and a plateau that matters is far beyond its level
 #: (docs/trials-statistics.md).
 OF_PLATEAUS = 0.1
@@ -234,13 +234,15 @@ OF_PLATEAUS = 0.1
 
 def _ends(series: _Series, found: Plateau, base: Base, offset: int) -> list[Change]:
     """Both steps of the plateau that was found, each beside the other."""
-    runs, steps = np.arange(len(series.y)), []
+    runs = np.arange(len(series.y))
+    kind: Kind = "step"
+    steps: list[Change] = []
     for edge, other in ((found.first, found.last), (found.last, found.first)):
         column = (runs >= other.at).astype(np.float64)[:, np.newaxis]
         beside = column if series.beside is None else np.column_stack([series.beside, column])
         step = Scan(
-            "step", edge.at, found.p_value / OF_PLATEAUS, found.shape, found.root, column[:, 0],
-            ("step",) * len(edge.places), edge.places, edge.deviance,
+            kind, edge.at, found.p_value / OF_PLATEAUS, found.shape, found.root, column[:, 0],
+            (kind,) * len(edge.places), edge.places, edge.deviance,
         )  # fmt: skip
         steps.append(_change(_with_beside(series, beside), step, base, offset))
     return steps

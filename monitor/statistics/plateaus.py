@@ -97,9 +97,7 @@ class PlateauScanner(Scanner):
             good = self.allowed & (square > 1e-12)
             square = np.where(good, square, 1.0)
             self.tables.append(
-                _Table(
-                    np.where(good, 1.0 / square, 0.0), np.where(good, square ** (1.0 / self.free), np.inf)
-                )
+                _Table(np.where(good, 1.0 / square, 0.0), np.where(good, square ** (1.0 / self.free), np.inf))
             )
 
     def _along(self, place: int, weighted: Array) -> tuple[Array, Array]:
@@ -183,7 +181,9 @@ class PlateauScanner(Scanner):
     def _edges(self, place: int, total: Array, steps: Array, start: int, stop: int) -> tuple[Edge, Edge]:
         """Both edges with the likelihood of all their places, each beside the other."""
         inverse, n = self.tables[place].inverse, len(steps) - 1
-        left = np.maximum(total - (steps - steps[:, 0][[start, stop]]) ** 2 * np.column_stack([inverse[start], inverse[:, stop]]), 1e-15 * total + 1e-300)  # fmt: skip
-        deviance = n * np.log(left)
-        first, last = (np.flatnonzero(part[: n]) for part in (self.allowed[:, stop], self.allowed[start]))
+        # The first column moves the last edge, the second the first one.
+        one_over = np.column_stack([inverse[start], inverse[:, stop]])
+        taken = (steps - steps[[start, stop], 0]) ** 2 * one_over
+        deviance = n * np.log(np.maximum(total - taken, 1e-15 * total + 1e-300))
+        first, last = (np.flatnonzero(part[:n]) for part in (self.allowed[:, stop], self.allowed[start]))
         return Edge(start, first, deviance[first, 1]), Edge(stop, last, deviance[last, 0])

@@ -267,9 +267,7 @@ class Scanner:
         self._null[null] = gains
         return gains[:count]
 
-    def _p_value(
-        self, gain: float, null: Null, level: float, rng: np.random.Generator, trials: int
-    ) -> float:
+    def _p_value(self, gain: float, null: Null, level: float, rng: np.random.Generator, trials: int) -> float:
         exceeding = simulated = 0
         while simulated < trials:
             upto = min(simulated + BLOCK if simulated else FIRST_BLOCK, trials)

@@ -78,7 +78,9 @@ def rate(hits: Sequence[bool]) -> str:
 
 def false_rates(count: int) -> None:
     """Print how many series without a step have one (or a bend), or any finding: without plateaus and with them."""
-    print("| noise | weeks | steps, % | with plateaus | any finding | with plateaus | only with | only without |")
+    print(
+        "| noise | weeks | steps, % | with plateaus | any finding | with plateaus | only with | only without |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind in NOISES:
         for weeks in WEEKS:
