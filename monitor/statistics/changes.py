@@ -255,7 +255,7 @@ class _Search:
     one change draws what it draws without.
     """
 
-    def __init__(self, rng: np.random.Generator, trials: int, plateaus: bool) -> None:
+    def __init__(self, rng: np.random.Generator, trials: int, plateaus: bool = False) -> None:
         self.rng, self.trials, self.plateaus = rng, trials, plateaus
         self.apart = rng.spawn(1)[0] if plateaus else rng
         self.wide: set[str] = set()
