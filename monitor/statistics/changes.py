@@ -25,6 +25,7 @@ from monitor.statistics.plateaus import FEWEST_IN_ALL, MOST_IN_ALL, Plateau, Pla
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
+from monitor.statistics.when_changed import when
 
 #: A history of fewer runs is not searched.
 FEWEST_RUNS = 2 * EDGE + 2
@@ -119,21 +120,6 @@ class _Series:
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
     """Return the days where they have a component beside the scatter of runs: several days, one with two runs."""
     return None if day is None or not 0 < int(day.max()) < len(day) - 1 else day
-
-
-#: 95 % point of the likelihood ratio for the place of a change, -2 log(1 - sqrt(0.95)): the larger of two
-#: independent exponential maxima, one on each side (Siegmund, Ann. Stat. 16 (1988) 1; Eo and Morley 2015).
-PLACE = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
-
-
-def when(t: Array, places: npt.NDArray[np.int64], deviance: Array, fitted: int) -> tuple[float, float]:
-    """Times between which a change lies, from all ``places`` (c,) that explain nearly as much as the best.
-
-    ``deviance`` (c,) is minus twice their log-likelihood, ``fitted`` the number of fitted coefficients.
-    """
-    freedom = max(len(t) - fitted, 1) / len(t)
-    inside = places[freedom * (deviance - deviance.min()) <= PLACE]
-    return float(t[max(int(inside.min()) - 1, 0)]), float(t[min(int(inside.max()), len(t) - 1)])
 
 
 def _size(series: _Series, best: Scan, base: Base) -> tuple[float, float]:
@@ -232,16 +218,16 @@ def _beside_groups(best: Scan, series: _Series) -> Scan:
 OF_PLATEAUS = 0.1
 
 
-def _ends(series: _Series, found: Plateau, base: Base, offset: int) -> list[Change]:
-    """Both steps of the plateau that was found, each beside the other."""
+def _ends(series: _Series, plateau: Plateau, base: Base, offset: int) -> list[Change]:
+    """Both steps of the plateau, each beside the other."""
     runs = np.arange(len(series.y))
     kind: Kind = "step"
     steps: list[Change] = []
-    for edge, other in ((found.first, found.last), (found.last, found.first)):
+    for edge, other in ((plateau.first, plateau.last), (plateau.last, plateau.first)):
         column = (runs >= other.at).astype(np.float64)[:, np.newaxis]
         beside = column if series.beside is None else np.column_stack([series.beside, column])
         step = Scan(
-            kind, edge.at, found.p_value / OF_PLATEAUS, found.shape, found.root, column[:, 0],
+            kind, edge.at, plateau.p_value / OF_PLATEAUS, plateau.shape, plateau.root, column[:, 0],
             (kind,) * len(edge.places), edge.places, edge.deviance,
         )  # fmt: skip
         steps.append(_change(_with_beside(series, beside), step, base, offset))
@@ -327,11 +313,10 @@ class _Search:
         """Return changes and trends of one piece of history, split again at every step."""
         if not series.searched:
             return [], []
-        returns = self.plateaus and series.may_return
-        whole, level = level, level * (1.0 - OF_PLATEAUS) if returns else level
+        whole, level = level, level * (1.0 - self.share_of_plateaus(series))
         best = self.scan(series, "constant", level)
         if best.p_value > level:
-            return self.plateau(series, "constant", offset, whole) if returns else ([], [])
+            return self.plateau(series, "constant", offset, whole)
         base: Base = "constant"
         trends: list[Change] = []
         best = _beside_groups(best, series)
@@ -347,13 +332,17 @@ class _Search:
             base = "line"
             best = self.scan(series, base, level)
             if best.p_value > level:
-                steps, slopes = self.plateau(series, base, offset, whole) if returns else ([], [])
+                steps, slopes = self.plateau(series, base, offset, whole)
                 return steps, trends + slopes
         change = _change(series, best, base, offset)
         if best.kind == "slope":
             return [change], trends
         inner, slopes = self.between(series, (best.at,), offset, whole)
         return [change, *inner], trends + slopes
+
+    def share_of_plateaus(self, series: _Series) -> float:
+        """Part of the probability of a false alarm that is spent on plateaus."""
+        return OF_PLATEAUS if self.plateaus and series.may_return else 0.0
 
     def between(
         self, series: _Series, steps: Sequence[int], offset: int, level: float
@@ -372,14 +361,16 @@ class _Search:
     ) -> tuple[list[Change], list[Change]]:
         """Return the steps of a plateau, and what is found between them; nothing where a single step explains nearly as
         much."""
-        own = level * OF_PLATEAUS
-        # A few more trials than the level needs at least: a plateau that matters is beyond them all.
-        trials = max(self.trials, int(np.ceil(1.2 / own)))
-        found = self.plateau_scanner(series).plateau(series.y, self.apart, trials, own)
-        # A coefficient and a place more must earn their keep (Schwarz's criterion).
-        if found.p_value > own or found.gain < 2.0 * np.log(len(series.y)):
+        level_here = level * self.share_of_plateaus(series)
+        if level_here == 0.0:
             return [], []
-        steps = _ends(series, found, base, offset)
+        # A few more trials than the level needs at least: a plateau that matters is beyond them all.
+        trials = max(self.trials, int(np.ceil(1.2 / level_here)))
+        best = self.plateau_scanner(series).plateau(series.y, self.apart, trials, level_here)
+        # A coefficient and a place more must earn their keep (Schwarz's criterion).
+        if best.p_value > level_here or best.gain < 2.0 * np.log(len(series.y)):
+            return [], []
+        steps = _ends(series, best, base, offset)
         changes, trends = self.between(series, [step.index - offset for step in steps], offset, level)
         return steps + changes, trends
 
@@ -394,7 +385,6 @@ def find_changes(
     events: Sequence[float] = (),
     cycle: float | None = None,
     groups: Mapping[str, npt.NDArray[np.intp]] | None = None,
-    plateaus: bool = False,
     false_alarm: float = 0.05,
     trials: int = 1999,
 ) -> History:
@@ -405,9 +395,9 @@ def find_changes(
     may share a component; ``cycle`` is the period of a wave (the year) that is no change where a piece covers it.
     ``groups`` (name to (n,)) number what measured a run: those that take turns may be off by any amount each
     (``interleaved_columns``); where others follow for good a step is preferred to a transient that explains as much.
-    ``plateaus``: seek changes that were put right again, too, in pieces of at least twelve runs without ``days``: two
-    steps of opposite signs, neither of which need show alone, beside a drift and a wave of any size, for a tenth of
-    ``false_alarm``.
+    With a ``cycle`` changes that were put right again are sought, too, in pieces of at least twelve runs without
+    ``days``: two steps of opposite signs, neither of which need show alone, beside a drift and a wave of any size, for
+    a tenth of ``false_alarm``.
     ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.8 and for day components up to four
@@ -427,7 +417,7 @@ def find_changes(
     ]
     pieces = [(a, b) for a, b in pairwise(bounds) if b > a]
     level = false_alarm / (len(pieces) * len(values))
-    if (trials + 1) * level * (1.0 - OF_PLATEAUS if plateaus else 1.0) < 1.0:
+    if (trials + 1) * level * (1.0 - OF_PLATEAUS) < 1.0:
         raise DataError(
             f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
             f"{int(np.ceil(1.0 / level)) - 1}."
@@ -439,7 +429,7 @@ def find_changes(
         run_u = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
         series = _Series(name, y, t, run_u, _repeated(day), cycle, (groups or {}).get(name))
         parts += [(series.part(start, stop), start) for start, stop in pieces]
-    changes, trends = _Search(rng, trials, plateaus).pieces(parts, level)
+    changes, trends = _Search(rng, trials, cycle is not None).pieces(parts, level)
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)

@@ -92,17 +92,17 @@ class PlateauScanner(Scanner):
             rows = prepared.shape.whiten(steps)
             rows -= prepared.base @ (prepared.base.T @ rows)
             products = rows.T @ rows
-            own = np.diag(products)
-            square = own[:, np.newaxis] + own - 2.0 * products
+            squares = np.diag(products)
+            square = squares[:, np.newaxis] + squares - 2.0 * products
             good = self.allowed & (square > 1e-12)
             square = np.where(good, square, 1.0)
             self.tables.append(
                 _Table(np.where(good, 1.0 / square, 0.0), np.where(good, square ** (1.0 / self.free), np.inf))
             )
 
-    def _along(self, place: int, weighted: Array) -> tuple[Array, Array]:
+    def _along(self, shape: int, weighted: Array) -> tuple[Array, Array]:
         """Sum of squares (m,) that the base leaves of columns (n, m), and products (n + 1, m) with all steps."""
-        prepared = self.prepared[place]
+        prepared = self.prepared[shape]
         rows = prepared.shape.whiten(weighted)
         rows -= prepared.base @ (prepared.base.T @ rows)
         back = self.root[:, np.newaxis] * prepared.shape.back(rows)
@@ -111,11 +111,11 @@ class PlateauScanner(Scanner):
         return np.einsum("ij,ij->j", rows, rows), steps
 
     def _best(
-        self, place: int, total: Array, steps: Array
+        self, shape: int, total: Array, steps: Array
     ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array, Array]:
         """First run of the best plateau of each column (m,), the one behind it, what these leave, weighted; and what
         the best single step leaves."""
-        table, n = self.tables[place], len(steps) - 1
+        table, n = self.tables[shape], len(steps) - 1
         pick, column = self.ends, np.arange(len(total))
         tried = steps[pick[0]] - steps[pick[1]]
         tried *= tried
@@ -131,16 +131,16 @@ class PlateauScanner(Scanner):
             inverse, weight = (
                 (part[other, :n].T if move % 2 else part[:n, other]) for part in (table.inverse, table.weight)
             )
-            left = np.maximum(
+            residue = np.maximum(
                 total - (steps[:n] - steps[other, column]) ** 2 * inverse, 1e-15 * total + 1e-300
             )
-            left *= weight
-            best = left.argmin(axis=0)
+            residue *= weight
+            best = residue.argmin(axis=0)
             start, stop = (start, best) if move % 2 else (best, stop)
-            least = left[best, column]
-        one = np.maximum(total - steps[self.single] ** 2 * table.inverse[self.single, n, np.newaxis], 0.0)
-        one *= table.weight[self.single, n, np.newaxis]
-        return start, stop, least, one.min(axis=0)
+            least = residue[best, column]
+        by_step = np.maximum(total - steps[self.single] ** 2 * table.inverse[self.single, n, np.newaxis], 0.0)
+        by_step *= table.weight[self.single, n, np.newaxis]
+        return start, stop, least, by_step.min(axis=0)
 
     def _deviances(self, weighted: Array, places: Sequence[int]) -> tuple[Array, Array]:
         """As for one change, of the best plateau or single step."""
@@ -149,38 +149,38 @@ class PlateauScanner(Scanner):
         for begin in range(0, weighted.shape[1], FIRST_BLOCK):
             part = slice(begin, begin + FIRST_BLOCK)
             rows = weighted[:, part] - self.plain @ (self.plain.T @ weighted[:, part])
-            for i, place in enumerate(places):
-                total, steps = self._along(place, rows)
-                _, _, least, one = self._best(place, total, steps)
-                constant = self.prepared[place].constant
+            for i, shape in enumerate(places):
+                total, steps = self._along(shape, rows)
+                _, _, least, least_of_steps = self._best(shape, total, steps)
+                constant = self.prepared[shape].constant
                 plain[i, part] = constant + self.free * np.log(total + 1e-300)
-                best[i, part] = constant + self.free * np.log(np.minimum(least, one) + 1e-300)
+                best[i, part] = constant + self.free * np.log(np.minimum(least, least_of_steps) + 1e-300)
         return plain, best
 
     def plateau(self, y: Array, rng: np.random.Generator, trials: int, level: float) -> Plateau:
         """The likeliest plateau of ``y`` (n,) and its p-value from ``trials`` simulated series a shape."""
         weighted = (self.root * (y - y.mean()))[:, np.newaxis]
         plain, best = self._deviances_of(y)
-        place = int(best[:, 0].argmin())
-        likeliest = self.prepared[place]
-        total, steps = self._along(place, weighted)
-        start, stop, least, one = (part[0] for part in self._best(place, total, steps))
+        shape = int(best[:, 0].argmin())
+        likeliest = self.prepared[shape]
+        total, steps = self._along(shape, weighted)
+        start, stop, least, least_of_steps = (part[0] for part in self._best(shape, total, steps))
         column = np.zeros(len(y))
         column[start:stop] = 1.0
         tailed = kurtosis_is_heavy(likeliest, weighted, self.root * column)
         index = self._not_refuted(best[:, 0], [0], REFUTED)[0][1]
         p = self._p_value(float(plain.min() - best.min()), Null(0, index, tailed), level, rng, trials)
         return Plateau(
-            *self._edges(place, total, steps, int(start), int(stop)),
+            *self._edges(shape, total, steps, int(start), int(stop)),
             p,
-            float(self.free * np.log((one + 1e-300) / (least + 1e-300))),
+            float(self.free * np.log((least_of_steps + 1e-300) / (least + 1e-300))),
             likeliest.shape,
             self.root,
         )
 
-    def _edges(self, place: int, total: Array, steps: Array, start: int, stop: int) -> tuple[Edge, Edge]:
+    def _edges(self, shape: int, total: Array, steps: Array, start: int, stop: int) -> tuple[Edge, Edge]:
         """Both edges with the likelihood of all their places, each beside the other."""
-        inverse, n = self.tables[place].inverse, len(steps) - 1
+        inverse, n = self.tables[shape].inverse, len(steps) - 1
         # The first column moves the last edge, the second the first one.
         one_over = np.column_stack([inverse[start], inverse[:, stop]])
         taken = (steps - steps[[start, stop], 0]) ** 2 * one_over

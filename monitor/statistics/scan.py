@@ -50,6 +50,8 @@ TAILED, TAIL_FREEDOM, MANY, FREEDOM_OF_MANY = 1.5, 4.0, 80, 3.5
 #: (of a run, where runs are independent): without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and
 #: 28 % at 1 % (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
 SEASON, SEASON_FROM = 1.0, 0.1
+#: Part of the period from which on a wave is fitted, by what stands beside a change.
+FITTED_FROM: dict[Base, float] = {"constant": COVERED, "line": COVERED, "season": SEASON_FROM}
 
 
 @dataclass(frozen=True)
@@ -135,8 +137,7 @@ class Scanner:
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
         columns = [np.ones(n)] if base == "constant" else [np.ones(n), line]
         columns += [] if beside is None else list(beside.T)
-        covered = SEASON_FROM if base == "season" else COVERED
-        basis = np.column_stack([*columns, wave_columns(times, cycle, covered)])
+        basis = np.column_stack([*columns, wave_columns(times, cycle, FITTED_FROM[base])])
         if beside is not None:
             basis = basis[:, independent_columns(self.root[:, np.newaxis] * basis)]
         self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]

@@ -14,7 +14,6 @@ import numpy as np
 import scipy
 
 from monitor.statistics import changes
-from monitor.statistics.changes import find_changes
 
 SEED, LEVEL, YEAR = 20261128, 0.01, 365.25
 WEEKS = (16, 26, 35, 52, 104)
@@ -55,12 +54,14 @@ def noise(kind: str, weeks: int, count: int, rng: np.random.Generator) -> np.nda
     return draws
 
 
-def found(series: np.ndarray, with_plateaus: bool) -> list[tuple[list[int], bool]]:
+def found(
+    series: np.ndarray, with_plateaus: bool, level: float = LEVEL, trials: int = 1999
+) -> list[tuple[list[int], bool]]:
     """Of each series the steps and bends that are found, and whether a drift or transient is."""
     times = 7.0 * np.arange(series.shape[1])
     parts = [(changes._Series(str(i), y, times, None, None, YEAR), 0) for i, y in enumerate(series)]
-    search = changes._Search(np.random.default_rng(SEED), 1999, with_plateaus)
-    steps, trends = search.pieces(parts, LEVEL)
+    search = changes._Search(np.random.default_rng(SEED), trials, with_plateaus)
+    steps, trends = search.pieces(parts, level)
     at: dict[str, list[int]] = {}
     for step in steps:
         at.setdefault(step.parameter, []).append(step.index)
@@ -145,15 +146,11 @@ def machines(count: int) -> None:
     print("| --- | --- | --- | --- | --- |")
     for kind, weeks in (("normal", 35), ("normal", 52), ("AR 0.6", 35), ("AR 0.8", 35), ("Student 3", 52)):
         rng = np.random.default_rng([SEED, weeks, NOISES.index(kind), 13])
-        cells = [[], []]
-        for machine in range(count):
-            values = {str(i): y for i, y in enumerate(noise(kind, weeks, 13, rng))}
-            for cell, plateaus in zip(cells, (False, True), strict=True):
-                history = find_changes(
-                    values, 7.0 * np.arange(weeks), rng=np.random.default_rng([SEED, machine]), cycle=YEAR,
-                    false_alarm=LEVEL, trials=6500, plateaus=plateaus,
-                )  # fmt: skip
-                cell.append(bool(history.changes or history.trends))
+        series = noise(kind, weeks, 13 * count, rng)
+        cells = []
+        for with_plateaus in (False, True):
+            hits = [bool(steps or moves) for steps, moves in found(series, with_plateaus, LEVEL / 13, 6500)]
+            cells.append([any(hits[13 * i : 13 * i + 13]) for i in range(count)])
         print(f"| {kind} | {weeks} | {count} | {rate(cells[0])} | {rate(cells[1])} |", flush=True)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from monitor.statistics import find_changes
+from monitor.statistics.changes import _Search, _Series
 from monitor.statistics.plateaus import FEWEST, PlateauScanner
 from monitor.statistics.scan import GRID
 from monitor.statistics.scan_candidates import EDGE
@@ -21,7 +22,7 @@ def weekly(weeks, start, stop, height, seed):
 
 def changes_of(t, y, **options):
     return find_changes(
-        {"EB0A": y}, t, rng=np.random.default_rng(1), cycle=YEAR, false_alarm=0.01, plateaus=True, **options
+        {"EB0A": y}, t, rng=np.random.default_rng(1), cycle=YEAR, false_alarm=0.01, **options
     ).changes
 
 
@@ -40,8 +41,10 @@ def test_a_change_that_was_put_right_again_is_found_with_both_its_steps(weeks, s
 def test_one_step_alone_is_one_change_and_the_same_with_and_without_plateaus():
     t, y = weekly(40, 20, 40, 8.0, seed=3)
     (change,) = changes_of(t, y)
-    alone = find_changes({"EB0A": y}, t, rng=np.random.default_rng(1), cycle=YEAR, false_alarm=0.01).changes
-    assert (change,) == alone
+    alone, _ = _Search(np.random.default_rng(1), 1999).pieces(
+        [(_Series("EB0A", y, t, None, None, YEAR), 0)], 0.01
+    )
+    assert [change] == alone
 
 
 def test_half_a_season_and_a_drift_are_no_plateaus():

@@ -111,7 +111,7 @@ def search_changes(
         try:
             history = find_changes(
                 plan.values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
-                u=plan.u, days=plan.days, cycle=DAYS_PER_YEAR, groups=plan.groups, plateaus=True,
+                u=plan.u, days=plan.days, cycle=DAYS_PER_YEAR, groups=plan.groups,
                 false_alarm=false_alarm * len(plan.values) / len(series),
                 # Five times as many trials as the level of one parameter in one piece needs at least.
                 trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),
