@@ -21,9 +21,11 @@ from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.days.day_steps import day_step_p_value
 from monitor.statistics.groups import eras, interleaved_columns
+from monitor.statistics.plateaus import FEWEST_IN_ALL, MOST_IN_ALL, Plateau, PlateauScanner
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
+from monitor.statistics.when_changed import when
 
 #: A history of fewer runs is not searched.
 FEWEST_RUNS = 2 * EDGE + 2
@@ -81,6 +83,26 @@ class _Series:
         return columns if columns is not None and columns.size else None
 
     @property
+    def plan(self) -> tuple[object, ...]:
+        """What series that share a search have in common."""
+        plan = (self.t, self.u, self.day, self.beside)
+        return tuple(None if column is None else column.tobytes() for column in plan)
+
+    @property
+    def may_return(self) -> bool:
+        """Whether a change that was put right again is sought: of single runs, or means of days, and enough of them."""
+        fitted = 0 if self.beside is None else self.beside.shape[1]
+        return self.day is None and FEWEST_IN_ALL + fitted <= len(self.y) <= MOST_IN_ALL
+
+    def fitted(self, base: Base) -> Array:
+        """What is fitted (n, k) beside a change."""
+        t = self.t
+        columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
+        return np.column_stack(
+            [*columns, wave_columns(t, self.cycle), *([] if self.beside is None else [self.beside])]
+        )
+
+    @property
     def searched(self) -> bool:
         """Whether there are runs enough, and any scatter, for a search."""
         fitted = 0 if self.beside is None else self.beside.shape[1]
@@ -100,28 +122,10 @@ def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
     return None if day is None or not 0 < int(day.max()) < len(day) - 1 else day
 
 
-#: 95 % point of the likelihood ratio for the place of a change, -2 log(1 - sqrt(0.95)): the larger of two
-#: independent exponential maxima, one on each side (Siegmund, Ann. Stat. 16 (1988) 1; Eo and Morley 2015).
-PLACE = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
-
-
-def when(t: Array, places: npt.NDArray[np.int64], deviance: Array, fitted: int) -> tuple[float, float]:
-    """Times between which a change lies, from all ``places`` (c,) that explain nearly as much as the best.
-
-    ``deviance`` (c,) is minus twice their log-likelihood, ``fitted`` the number of fitted coefficients.
-    """
-    freedom = max(len(t) - fitted, 1) / len(t)
-    inside = places[freedom * (deviance - deviance.min()) <= PLACE]
-    return float(t[max(int(inside.min()) - 1, 0)]), float(t[min(int(inside.max()), len(t) - 1)])
-
-
 def _size(series: _Series, best: Scan, base: Base) -> tuple[float, float]:
     """Generalised least squares: size of the change and its standard uncertainty, place and correlation as known."""
     t = series.t
-    columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
-    columns += list(wave_columns(t, series.cycle).T) + (
-        [] if series.beside is None else list(series.beside.T)
-    )
+    columns = list(series.fitted(base).T)
     after = (np.arange(len(t)) >= best.at).astype(np.float64)
     if best.kind == "step":
         columns.append(after)
@@ -176,6 +180,13 @@ DAYS_THAT_SHOW = 8
 PARAMETERS_THAT_SHOW = 4
 
 
+def _with_beside(series: _Series, beside: Array) -> _Series:
+    """Return the series with other columns (n, k) beside a change."""
+    other = replace(series)
+    other.__dict__["beside"] = beside
+    return other
+
+
 def _of_days(column: Array, day: npt.NDArray[np.intp]) -> bool:
     """Whether a column (n,) differs more from day to day than within its days, as no warm-up of a morning does."""
     mean = np.bincount(day, column) / np.bincount(day)
@@ -201,21 +212,55 @@ def _beside_groups(best: Scan, series: _Series) -> Scan:
     )
 
 
-class _Search:
-    """One search that reuses its scanners: parameters with the same plan share the preparation."""
+#: Part of the probability of a false alarm that is spent on plateaus, where they are sought, the rest on one change.
+#: Ten percent less for it cost next to nothing, and a plateau that matters is far beyond its level
+#: (docs/trials-statistics.md).
+OF_PLATEAUS = 0.1
 
-    def __init__(self, rng: np.random.Generator, trials: int) -> None:
-        self.rng, self.trials = rng, trials
+
+def _ends(series: _Series, plateau: Plateau, base: Base, offset: int) -> list[Change]:
+    """Both steps of the plateau, each beside the other."""
+    runs = np.arange(len(series.y))
+    kind: Kind = "step"
+    steps: list[Change] = []
+    for edge, other in ((plateau.first, plateau.last), (plateau.last, plateau.first)):
+        column = (runs >= other.at).astype(np.float64)[:, np.newaxis]
+        beside = column if series.beside is None else np.column_stack([series.beside, column])
+        step = Scan(
+            kind, edge.at, plateau.p_value / OF_PLATEAUS, plateau.shape, plateau.root, column[:, 0],
+            (kind,) * len(edge.places), edge.places, edge.deviance,
+        )  # fmt: skip
+        steps.append(_change(_with_beside(series, beside), step, base, offset))
+    return steps
+
+
+class _Search:
+    """One search that reuses its scanners: parameters with the same plan share the preparation.
+
+    ``plateaus``: whether changes that were put right again are sought; ``apart`` draws for them, so that the search for
+    one change draws what it draws without.
+    """
+
+    def __init__(self, rng: np.random.Generator, trials: int, plateaus: bool = False) -> None:
+        self.rng, self.trials, self.plateaus = rng, trials, plateaus
+        self.apart = rng.spawn(1)[0] if plateaus else rng
         self.wide: set[str] = set()
         self.by_means = False
         self._kept: dict[tuple[object, ...], Scanner] = {}
+        self._kept_of_plateaus: dict[tuple[object, ...], PlateauScanner] = {}
 
     def scanner(self, series: _Series, base: Base) -> Scanner:
-        plan = (series.t, series.u, series.day, series.beside)
-        key = (base, *(None if column is None else column.tobytes() for column in plan))
+        key = (base, *series.plan)
         if key not in self._kept:
             self._kept[key] = Scanner(series.t, series.u, base, series.day, series.cycle, series.beside)
         return self._kept[key]
+
+    def plateau_scanner(self, series: _Series) -> PlateauScanner:
+        if series.plan not in self._kept_of_plateaus:
+            self._kept_of_plateaus[series.plan] = PlateauScanner(
+                series.t, series.u, series.cycle, series.beside
+            )
+        return self._kept_of_plateaus[series.plan]
 
     def look(self, every: Sequence[_Series]) -> None:
         """Prepare the first scan of pieces: those of one plan together."""
@@ -268,9 +313,10 @@ class _Search:
         """Return changes and trends of one piece of history, split again at every step."""
         if not series.searched:
             return [], []
+        whole, level = level, level * (1.0 - self.share_of_plateaus(series))
         best = self.scan(series, "constant", level)
         if best.p_value > level:
-            return [], []
+            return self.plateau(series, "constant", offset, whole)
         base: Base = "constant"
         trends: list[Change] = []
         best = _beside_groups(best, series)
@@ -286,16 +332,47 @@ class _Search:
             base = "line"
             best = self.scan(series, base, level)
             if best.p_value > level:
-                return [], trends
+                steps, slopes = self.plateau(series, base, offset, whole)
+                return steps, trends + slopes
         change = _change(series, best, base, offset)
         if best.kind == "slope":
             return [change], trends
-        changes = [change]
-        for start, stop in ((0, best.at), (best.at, len(series.y))):
+        inner, slopes = self.between(series, (best.at,), offset, whole)
+        return [change, *inner], trends + slopes
+
+    def share_of_plateaus(self, series: _Series) -> float:
+        """Part of the probability of a false alarm that is spent on plateaus."""
+        return OF_PLATEAUS if self.plateaus and series.may_return else 0.0
+
+    def between(
+        self, series: _Series, steps: Sequence[int], offset: int, level: float
+    ) -> tuple[list[Change], list[Change]]:
+        """Return changes and trends between ``steps``, runs of the piece."""
+        changes: list[Change] = []
+        trends: list[Change] = []
+        for start, stop in pairwise((0, *steps, len(series.y))):
             inner, slopes = self.piece(series.part(start, stop), offset + start, level)
             changes += inner
             trends += slopes
         return changes, trends
+
+    def plateau(
+        self, series: _Series, base: Base, offset: int, level: float
+    ) -> tuple[list[Change], list[Change]]:
+        """Return the steps of a plateau, and what is found between them; nothing where a single step explains nearly as
+        much."""
+        level_here = level * self.share_of_plateaus(series)
+        if level_here == 0.0:
+            return [], []
+        # A few more trials than the level needs at least: a plateau that matters is beyond them all.
+        trials = max(self.trials, int(np.ceil(1.2 / level_here)))
+        best = self.plateau_scanner(series).plateau(series.y, self.apart, trials, level_here)
+        # A coefficient and a place more must earn their keep (Schwarz's criterion).
+        if best.p_value > level_here or best.gain < 2.0 * np.log(len(series.y)):
+            return [], []
+        steps = _ends(series, best, base, offset)
+        changes, trends = self.between(series, [step.index - offset for step in steps], offset, level)
+        return steps + changes, trends
 
 
 def find_changes(
@@ -318,6 +395,9 @@ def find_changes(
     may share a component; ``cycle`` is the period of a wave (the year) that is no change where a piece covers it.
     ``groups`` (name to (n,)) number what measured a run: those that take turns may be off by any amount each
     (``interleaved_columns``); where others follow for good a step is preferred to a transient that explains as much.
+    With a ``cycle`` changes that were put right again are sought, too, in pieces of at least twelve runs without
+    ``days``: two steps of opposite signs, neither of which need show alone, beside a drift and a wave of any size, for
+    a tenth of ``false_alarm``.
     ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.8 and for day components up to four
@@ -337,7 +417,7 @@ def find_changes(
     ]
     pieces = [(a, b) for a, b in pairwise(bounds) if b > a]
     level = false_alarm / (len(pieces) * len(values))
-    if (trials + 1) * level < 1.0:
+    if (trials + 1) * level * (1.0 - OF_PLATEAUS) < 1.0:
         raise DataError(
             f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
             f"{int(np.ceil(1.0 / level)) - 1}."
@@ -349,7 +429,7 @@ def find_changes(
         run_u = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
         series = _Series(name, y, t, run_u, _repeated(day), cycle, (groups or {}).get(name))
         parts += [(series.part(start, stop), start) for start, stop in pieces]
-    changes, trends = _Search(rng, trials).pieces(parts, level)
+    changes, trends = _Search(rng, trials, cycle is not None).pieces(parts, level)
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)

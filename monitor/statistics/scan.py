@@ -19,7 +19,7 @@ import scipy
 
 from monitor.records import Array
 from monitor.statistics.groups import independent_columns
-from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates, wave_columns
+from monitor.statistics.scan_candidates import COVERED, EDGE, Base, Kind, candidates, wave_columns
 from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 
 #: Correlations of neighbours of which the likelihood is computed.
@@ -50,6 +50,8 @@ TAILED, TAIL_FREEDOM, MANY, FREEDOM_OF_MANY = 1.5, 4.0, 80, 3.5
 #: (of a run, where runs are independent): without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and
 #: 28 % at 1 % (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
 SEASON, SEASON_FROM = 1.0, 0.1
+#: Part of the period from which on a wave is fitted, by what stands beside a change.
+FITTED_FROM: dict[Base, float] = {"constant": COVERED, "line": COVERED, "season": SEASON_FROM}
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Scan:
 
 
 @dataclass(frozen=True)
-class _Prepared:
+class Prepared:
     """One shape with what the base and the candidates are under it.
 
     ``turned`` (n, k) is W' base, ``along`` (c, k) its products with the candidates.
@@ -88,7 +90,7 @@ class _Prepared:
     constant: float
 
 
-class _Null(NamedTuple):
+class Null(NamedTuple):
     """Series without a change: a family of shapes, the place of that which they have, whether tails are heavy, and
     whether they hold a part of a yearly wave."""
 
@@ -114,7 +116,8 @@ class Scanner:
     """Everything of the search that does not depend on the values: prepared once for one plan.
 
     ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that
-    is no change: fitted where the history covers it (``wave_columns``), else one of ``SEASON`` is allowed for.
+    is no change: fitted where the history covers it (``wave_columns``), else one of ``SEASON`` is allowed for; beside
+    the base ``season`` it is fitted from ``SEASON_FROM`` of it on.
     ``beside`` (n, k) are columns of which every series may have any amount: what groups of runs are off by.
     """
 
@@ -132,9 +135,9 @@ class Scanner:
         root = np.ones(n) if u is None else 1.0 / u
         self.root = root / np.sqrt(np.mean(root**2))
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
-        columns = [np.ones(n), line] if base == "line" else [np.ones(n)]
+        columns = [np.ones(n)] if base == "constant" else [np.ones(n), line]
         columns += [] if beside is None else list(beside.T)
-        basis = np.column_stack([*columns, wave_columns(times, cycle)])
+        basis = np.column_stack([*columns, wave_columns(times, cycle, FITTED_FROM[base])])
         if beside is not None:
             basis = basis[:, independent_columns(self.root[:, np.newaxis] * basis)]
         self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]
@@ -157,11 +160,11 @@ class Scanner:
         self.prepared = [self._prepare(shape, basis) for shape in shapes]
         # Places of the shapes for which the level is claimed.
         self._claimed = {i for i in range(len(shapes)) if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
-        self._null: dict[_Null, Array] = {}
+        self._null: dict[Null, Array] = {}
         self._known: dict[bytes, tuple[Array, Array]] = {}
         self._seed: int | None = None
 
-    def _prepare(self, shape: Shape, basis: Array) -> _Prepared:
+    def _prepare(self, shape: Shape, basis: Array) -> Prepared:
         q, r = np.linalg.qr(shape.whiten(self.root[:, np.newaxis] * basis))
         rows = shape.whiten(self.root[:, np.newaxis] * self.columns)
         rows -= q @ (q.T @ rows)
@@ -176,7 +179,7 @@ class Scanner:
         weight = np.where(good, square ** (1.0 / self.free), np.inf)
         turned = shape.back(q)
         along = self._products(turned)
-        return _Prepared(shape, q, turned, along, np.where(good, 1.0 / square, 0.0), weight, constant)
+        return Prepared(shape, q, turned, along, np.where(good, 1.0 / square, 0.0), weight, constant)
 
     def _products(self, rows: Array) -> Array:
         """Products (c, m) of the candidates, weighted, with rows (n, m)."""
@@ -202,7 +205,7 @@ class Scanner:
         squares = (np.einsum("ij,ij->j", rows, part) for part in parts)
         return _Sums(rows, (whole, within, next_to), (next(squares), next(squares), next(squares)))
 
-    def _residual(self, prepared: _Prepared, sums: _Sums) -> tuple[Array, Array]:
+    def _residual(self, prepared: Prepared, sums: _Sums) -> tuple[Array, Array]:
         """What the base leaves of the columns, as a sum of squares (m,), and what each candidate (c, m) takes."""
         if isinstance(prepared.shape, FirstOrder):
             r = prepared.shape.strength
@@ -244,7 +247,7 @@ class Scanner:
         plain, best = self._deviances(weighted, self.families[family])
         return np.asarray(plain.min(axis=0) - best.min(axis=0))
 
-    def _simulated(self, null: _Null, count: int, rng: np.random.Generator) -> Array:
+    def _simulated(self, null: Null, count: int, rng: np.random.Generator) -> Array:
         """The statistic of at least ``count`` series without a change; cached."""
         if self._seed is None:
             self._seed = int(rng.integers(2**63))
@@ -265,9 +268,7 @@ class Scanner:
         self._null[null] = gains
         return gains[:count]
 
-    def _p_value(
-        self, gain: float, null: _Null, level: float, rng: np.random.Generator, trials: int
-    ) -> float:
+    def _p_value(self, gain: float, null: Null, level: float, rng: np.random.Generator, trials: int) -> float:
         exceeding = simulated = 0
         while simulated < trials:
             upto = min(simulated + BLOCK if simulated else FIRST_BLOCK, trials)
@@ -277,7 +278,9 @@ class Scanner:
             simulated = upto
         return (1 + exceeding) / (trials + 1)
 
-    def _not_refuted(self, best: Array, numbers: Sequence[int]) -> list[tuple[int, int]]:
+    def _not_refuted(
+        self, best: Array, numbers: Sequence[int], refuted: float = REFUTED
+    ) -> list[tuple[int, int]]:
         """Each family that the deviances (s,) allow, with the place of its strongest shape that they allow.
 
         The stronger the correlation, the larger the gains without a change: a weaker one has the smaller p-value.
@@ -286,7 +289,7 @@ class Scanner:
         allowed = []
         for number in numbers:
             family = self.families[number]
-            likely = [i for i in family if best[i] - least <= 2.0 * REFUTED]
+            likely = [i for i in family if best[i] - least <= 2.0 * refuted]
             if likely:
                 allowed.append((number, min(max(likely), max(self._claimed & set(family)))))
         return allowed
@@ -326,11 +329,11 @@ class Scanner:
         unexplained = np.maximum(total - explained, 1e-15 * total + 1e-300)[:, 0]
         best_candidate = int((unexplained * likeliest.weight).argmin())
         column = self.columns[:, best_candidate]
-        tailed = _kurtosis(likeliest, weighted, self.root * column) > 3.0 + TAILED * np.sqrt(24.0 / len(y))
-        nulls = [_Null(family, index, tailed) for family, index in self._not_refuted(best[:, 0], numbers)]
+        tailed = kurtosis_is_heavy(likeliest, weighted, self.root * column)
+        nulls = [Null(family, index, tailed) for family, index in self._not_refuted(best[:, 0], numbers)]
         if self._phase is not None:
             in_order = {0} | {null.shape for null in nulls if null.family == 0}
-            nulls += [_Null(0, index, tailed, season=True) for index in sorted(in_order)]
+            nulls += [Null(0, index, tailed, season=True) for index in sorted(in_order)]
         p = 0.0
         for null in nulls:
             members = list(self.families[null.family])
@@ -351,11 +354,12 @@ class Scanner:
         )
 
 
-def _kurtosis(prepared: _Prepared, weighted: Array, candidate: Array) -> float:
-    """Kurtosis of what the base and a candidate (n,) leave of a series (n, 1), made independent."""
+def kurtosis_is_heavy(prepared: Prepared, weighted: Array, candidate: Array) -> bool:
+    """Whether what the base and a candidate (n,) leave of a series (n, 1), made independent, has heavy tails."""
     rows = prepared.shape.whiten(np.column_stack([weighted, candidate]))
     rows -= prepared.base @ (prepared.base.T @ rows)
     length = float(rows[:, 1] @ rows[:, 1])
     residual = rows[:, 0] - rows[:, 1] * (float(rows[:, 0] @ rows[:, 1]) / length if length > 1e-16 else 0.0)
-    square = float(residual @ residual)
-    return float(len(residual) * (residual**4).sum() / square**2) if square > 0.0 else 0.0
+    square, n = float(residual @ residual), len(residual)
+    kurtosis = float(n * (residual**4).sum() / square**2) if square > 0.0 else 0.0
+    return bool(kurtosis > 3.0 + TAILED * np.sqrt(24.0 / n))

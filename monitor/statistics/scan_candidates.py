@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from monitor.records import Array
 
-Base = Literal["constant", "line"]
+#: What stands beside a change: a constant, a line, or (``season``) a line and a wave of the year of any size.
+Base = Literal["constant", "line", "season"]
 Kind = Literal["step", "slope", "trend", "transient"]
 
 #: Time constants of a warm-up or running-in tried, as fractions of the history; a finer fit is `warm_up`'s.
@@ -25,9 +26,9 @@ ONE_RUN = 0.75
 COVERED, FEWEST_OF_WAVE = 0.82, 12
 
 
-def wave_columns(times: Array, cycle: float | None) -> Array:
-    """Cosine and sine (n, 2) of a wave of the period ``cycle``; none (n, 0) where the history does not cover it."""
-    if cycle is None or len(times) < FEWEST_OF_WAVE or float(np.ptp(times)) < COVERED * cycle:
+def wave_columns(times: Array, cycle: float | None, covered: float = COVERED) -> Array:
+    """Cosine and sine (n, 2) of a wave of the period ``cycle``; none (n, 0) where the history covers less of it."""
+    if cycle is None or len(times) < FEWEST_OF_WAVE or float(np.ptp(times)) < covered * cycle:
         return np.empty((len(times), 0))
     phase = 2.0 * np.pi / cycle * (times - times.mean())
     return np.column_stack([np.cos(phase), np.sin(phase)])

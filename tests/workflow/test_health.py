@@ -367,6 +367,14 @@ def test_changes_are_rarely_found_where_there_are_none() -> None:
     assert alarms <= 9
 
 
+def test_a_change_that_was_put_right_again_ends_the_history_before_it() -> None:
+    week = np.arange(35)
+    values = np.random.default_rng(8).normal(25.0, 1.5, 35) + 22.0 * ((week >= 20) & (week < 31))
+    search = search_changes([series_of("EB0A", values, 1.5)], [])["EB0A"]
+    assert [(change.kind, change.index) for change in search.changes] == [("step", 20), ("step", 31)]
+    assert all(change.p_value <= FALSE_ALARM for change in search.changes)
+
+
 def test_a_drift_is_trusted_no_longer_than_the_history_is_long() -> None:
     values = 0.1 * np.arange(60.0) + np.random.default_rng(1).normal(scale=0.2, size=60)
     drift = PieceDrift(series_of("EXX", values, 0.2), -np.inf)
