@@ -310,9 +310,7 @@ def _where(effect: MachineMissing) -> None:
     """Where an effect lies, as far as it was looked for: its steps, or the place at which a plate is held."""
     for step in effect.steps or ():
         size = f"{output.rounded(step.value, step.u)} ± {output.two_digits(step.u)} {effect.unit}"
-        output.say(
-            f"   {step_in_words(effect.effect, size, step.middle_mm or (step.low_mm, step.high_mm), step.width_mm)}"
-        )
+        output.say(f"   {step_in_words(effect.effect, size, step.middle, step.width_mm)}")
     if effect.held_at is not None:
         places = (
             f"{held.axis} = {output.rounded(held.value, held.u)} ± {output.two_digits(held.u)} {held.unit}"

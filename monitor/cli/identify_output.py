@@ -60,9 +60,10 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
 def _added(answer: IdentifyAnswer) -> None:
     """The added effects, and those that have no number."""
     for name, estimate in answer.added.items():
+        run = run_of(name)
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
-            f"{estimate.unit}{' in all runs' if run_of(name) is None else ''}"
+            f"{estimate.unit} {'in all runs' if run is None else f'of run {run}'}"
         )
         if answer.reversal_values is not None and name in answer.reversal_values:
             output.say(f"   {reversal_words(answer.reversal_values[name])}")

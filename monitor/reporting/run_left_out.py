@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
@@ -19,18 +19,36 @@ class RunLeftOut:
     readings: int
     undetermined: int | None = field(default=None, metadata=OMITTED)
 
-    def __str__(self) -> str:
-        why = (
-            "determine as many unknowns of the model, and nothing is left over to judge it by"
-            if self.undetermined is None
-            else f"leave {self.undetermined} unknown{'s' * (self.undetermined > 1)} of the model open that the other "
-            "runs determine, and no fit holds with it"
-        )
+
+def runs_left_out(runs: Sequence[RunLeftOut]) -> str:
+    """Say which runs are left out, why, and what to do, once for all of them."""
+    short = [run for run in runs if run.undetermined is None]
+    sentences = [_all_used_up(short)] if short else []
+    sentences += [
+        f"Run {run.run} is left out: its {run.readings} readings leave {run.undetermined} "
+        f"unknown{'s' * (run.undetermined > 1)} of the model open that the other runs determine, and no fit holds "
+        "with it."
+        for run in runs
+        if run.undetermined is not None
+    ]
+    whose = "its" if len(runs) == 1 else "their"
+    return (
+        f"{' '.join(sentences)} Every other question refuses the campaign until {whose} rows are taken out and "
+        "the campaign is imported again; do that before you add an effect."
+    )
+
+
+def _all_used_up(runs: Sequence[RunLeftOut]) -> str:
+    count = joined_by_and([run.readings for run in runs])
+    if len(runs) == 1:
         return (
-            f"Run {self.run} is left out: its {self.readings} readings {why}. Every other question refuses the "
-            "campaign until its rows are taken out and the campaign is imported again; do that before you add an "
-            "effect."
+            f"Run {runs[0].run} is left out: its {count} readings determine as many unknowns of the model, and nothing "
+            "is left over to judge it by."
         )
+    return (
+        f"Runs {joined_by_and([run.run for run in runs])} are left out: their {count} readings determine as "
+        "many unknowns of the model each, and nothing is left over to judge them by."
+    )
 
 
 def poor_runs_refused(readings: Mapping[int, int], undetermined: Mapping[int, int]) -> str:

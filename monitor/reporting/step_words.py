@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 
+def middle_within(low_mm: float, high_mm: float, width_mm: float | None) -> tuple[float, float]:
+    """From where to where in mm the middle of a step lies, all of whose width lies between two readings: what answers
+    of versions say that did not search its middle with its width."""
+    half = (width_mm or 0.0) / 2.0
+    return low_mm + half, high_mm - half
+
+
 def step_in_words(
     effect: str, size: str, between_mm: tuple[float, float], width_mm: float | None = None
 ) -> str:

@@ -18,6 +18,7 @@ from monitor.records import Campaign
 from monitor.store import Database, StoredModel
 from monitor.workflow.explain.explain import explanation_of, first_fit
 from monitor.workflow.models import as_model, resolve
+from tests.discovery.laser_along_x import laser_along_x
 from tests.simulator import four_instruments as shop, free_form as sim
 
 DEVIATIONS = ("dx_um", "dy_um", "dz_um")
@@ -224,3 +225,16 @@ def test_an_axis_with_the_other_sign_in_one_run_is_said_where_nothing_but_positi
     found = read_campaign(sim.write_folder(tmp_path / "pocket", "pocket", layout, runs))
     assert isinstance(found, Campaign)
     assert "the sign of Y were the other way round in run 2" in told(found)
+
+
+def test_two_readings_at_one_place_are_no_run_in_another_unit(tmp_path: Path) -> None:
+    """Of one degree of freedom it is chance that they are 25 times nearer to each other than what the others leave."""
+    positions = [25.0 * number for number in range(9)]
+    found, _ = laser_along_x(tmp_path / "laser", [positions] * 4, lambda x: 5.0 if x > 110.0 else 0.0, 1)
+    probings = found.probings
+    kept = np.flatnonzero(probings.run < 4).tolist() + np.flatnonzero(probings.run == 4)[[0, -1]].tolist()
+    probings = probings.rows(np.array(kept))
+    readings = np.array(probings.channels["reading_um"])
+    readings[-2:] = 0.02, 0.08
+    channels = {**probings.channels, "reading_um": readings}
+    assert not told(replace(found, probings=replace(probings, channels=channels)))

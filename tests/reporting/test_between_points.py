@@ -18,6 +18,7 @@ from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.health.page import machine_pages
 from monitor.reporting.health.records import VolumetricMap
 from monitor.reporting.texts import texts_of
+from monitor.workflow.explain.explain_answer import StepBetween
 
 page = load("first_page_records", Path(__file__).with_name("test_first_page.py"))
 TEETH = BetweenPoints("EXX:sawtooth84mm(12)", "X", 84.0, 100.0, 6.3, "µm")
@@ -117,3 +118,23 @@ def test_a_health_report_says_it() -> None:
     assert str(replace(STEP, zero_between=True)).endswith(
         "and all points, because the workpiece's zero lies between; no U contains that"
     )
+
+
+def test_of_a_step_over_a_width_that_an_earlier_version_stored_the_middle_lies_half_of_it_within() -> None:
+    """Was: its middle between the readings between which all of it lies."""
+    assert StepBetween(5.0, 0.2, 100.0, 150.0, width_mm=20.0).middle == (110.0, 140.0)
+    assert StepBetween(5.0, 0.2, 100.0, 150.0).middle == (100.0, 150.0)
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [("en", "of a machine without rotary axes"), ("de", "einer Maschine ohne Drehachsen")],
+)
+def test_a_map_of_linear_axes_alone_is_at_no_rotary_pose(
+    make_record: Callable[..., CertificateRecord], language: str, said: str
+) -> None:
+    (plain,) = make_record(language=language, maps=1).volumetric
+    one_pose = replace(plain, poses=1)
+    assert said not in printed_map(one_pose, texts_of(language)).explained
+    linear = replace(one_pose, largest=replace(plain.largest, at=(("X", 10.0, "mm"),)))
+    assert said in printed_map(linear, texts_of(language)).explained

@@ -409,3 +409,16 @@ def test_nothing_is_adjusted_by_values_of_a_model_that_does_not_explain_its_read
     explained = replace(model, verdict="the model explains it", refuted_p=None, missing=())
     week, _ = fleet(replace(DRIFTED, model=explained))
     assert {answer.kind: answer.sentence for answer in answers(week)}["do"].startswith("Adjust or compensate")
+
+
+def test_where_work_points_are_elsewhere_the_file_is_looked_at() -> None:
+    """Was: look at its page for where the model fails, and measure again."""
+    model = ModelHealth(
+        "c", "runs", "instruments", "something is missing", "The work points come out elsewhere.", 0.5, None, None,
+        None, (), 0.5, None, None, (), work_points_elsewhere="The work points come out elsewhere.",
+    )  # fmt: skip
+    sentences = {
+        each.kind: each.sentence for each in answers(fleet(machine("M", "model fails", model=model))[0])
+    }
+    assert sentences["do"].startswith("Look at the work points")
+    assert "measure again" not in sentences["do"]

@@ -11,6 +11,7 @@ from monitor.reporting.certificate.model_effects import printed_effects
 from monitor.reporting.health.sentences import RunsNamed
 from monitor.reporting.messages import not_identified_by_model
 from monitor.reporting.run_coefficient import run_of
+from monitor.reporting.run_left_out import RunLeftOut, runs_left_out
 from monitor.reporting.texts import texts_of
 
 DAY = datetime(2026, 3, 2, 8)
@@ -25,6 +26,12 @@ DAY = datetime(2026, 3, 2, 8)
         # Was: of all runs, so that a certificate stated those of the others.
         ("EBB:harmonic2@each_run.cos.run1", 1),
         ("EXX:step(20,60)@each_run.60mm.run3", 3),
+        # Was: of all runs.
+        ("EXX:reversal@run_time(2)", 2),
+        ("EBB:harmonic2@run_time(12).cos", 12),
+        ("ball:4:moved(run 2, sequence 30).x", 2),
+        ("artefact:moved(run 3, sequence 7)", 3),
+        ("EXX:reversal@run_time", None),
     ],
 )
 def test_the_name_of_a_coefficient_says_its_run(name: str, run: int | None) -> None:
@@ -52,3 +59,10 @@ def test_trend_names_no_command_that_refuses() -> None:
     assert not_identified_by_model("M", ["a", "bo"], {"bo": "few"}).endswith(
         "a, bo; type `monitor identify a`; `identify` refuses bo: few"
     )
+
+
+def test_of_several_runs_left_out_it_is_said_once_what_to_do() -> None:
+    assert runs_left_out((RunLeftOut(4, 1),)).startswith("Run 4 is left out: its 1 readings determine")
+    said = runs_left_out((RunLeftOut(4, 1), RunLeftOut(6, 2)))
+    assert said.startswith("Runs 4 and 6 are left out: their 1 and 2 readings determine")
+    assert said.count("is imported again") == 1

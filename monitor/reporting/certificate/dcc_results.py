@@ -66,9 +66,13 @@ def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, 
         say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
         say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
         return
-    alone = "page.effects_explained" if run_of(effect.name) is None else "page.effects_of_run"
+    of_run = run_of(effect.name) is not None
+    if effect.joint:
+        kind = "page.effects_joint_of_run" if of_run else "page.effects_joint"
+    else:
+        kind = "page.effects_of_run" if of_run else "page.effects_explained"
     explained = texts(
-        "page.effects_joint" if effect.joint else alone,
+        kind,
         effects=effect.name,
         runs=effect.runs,
         days=effect.days,

@@ -31,10 +31,10 @@ class Lies:
 class ModelEffect:
     """An effect of the model that all runs share: its size with standard uncertainty, in its display unit.
 
-    With ``joint`` it is one of the results, the value of all runs together. Else the size is the mean of what ``runs``
-    runs on ``days`` days say by themselves, and ``outside`` says why. ``reversal_value`` (ISO 230-2) and ``u_reversal``
-    of a play, twice its amplitude; None of another effect. ``value`` is None where nothing is stored of it. ``lies`` is
-    where a step lies; None of another effect.
+    With ``joint`` it is one of the results, the value of all runs together, or of its run where it is of one alone.
+    Else the size is the mean of what ``runs`` runs on ``days`` days say by themselves, and ``outside`` says why.
+    ``reversal_value`` (ISO 230-2) and ``u_reversal`` of a play, twice its amplitude; None of another effect. ``value``
+    is None where nothing is stored of it. ``lies`` is where a step lies; None of another effect.
     """
 
     name: str

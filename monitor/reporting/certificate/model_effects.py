@@ -55,7 +55,8 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
 
 def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
     """What the values are: those among the results, then those by themselves and why these are no results."""
-    joint = [effect for effect in effects if effect.joint]
+    joint = [effect for effect in effects if effect.joint and run_of(effect.name) is None]
+    joint_of_run = [effect.name for effect in effects if effect.joint and run_of(effect.name) is not None]
     alone = [effect for effect in effects if effect.value is not None and not effect.joint]
     sentences = []
     if joint:
@@ -63,6 +64,8 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
         sentences.append(
             texts.markup("page.effects_joint", effects=names, runs=joint[0].runs, days=joint[0].days)
         )
+    if joint_of_run:
+        sentences.append(texts.markup("page.effects_joint_of_run", effects=", ".join(joint_of_run)))
     of_all = [effect for effect in alone if run_of(effect.name) is None]
     of_run = [effect.name for effect in alone if run_of(effect.name) is not None]
     if of_all:

@@ -63,6 +63,11 @@ def _by_reason(volumetric: VolumetricResult, texts: Texts) -> dict[str, list[str
     return by_reason
 
 
+def _has_rotary_axes(volumetric: VolumetricResult) -> bool:
+    """Whether a place of the map has a reading in degrees."""
+    return any(unit == "°" for _, _, unit in volumetric.largest.at)
+
+
 def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:
     """What the numbers mean, and of which region they are."""
     sign = texts.decimal_sign
@@ -71,6 +76,7 @@ def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:
         points=volumetric.points,
         each=volumetric.each,
         poses=volumetric.poses,
+        pose=texts("page.map_one_pose" if _has_rotary_axes(volumetric) else "page.map_no_rotary"),
         ranges="; ".join(
             texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
             for axis, first, last in volumetric.ranges

@@ -156,11 +156,18 @@ def _not_evaluated(health: MachineHealth) -> str:
     return "; ".join(map(str, health.quality.remarks[:1]))
 
 
+#: What to do where work points come out elsewhere than the file states them.
+LOOK_AT_FILE = (
+    "Look at the work points and the axes' signs, units and columns in campaign.toml, and import the campaign again "
+    "once they are right."
+)
+
+
 def _unexplained(health: MachineHealth) -> str:
     """The effect that the model lacks; what `explain` answers where none is named."""
     if health.model is None:
         return ""
-    if not health.model.missing:
+    if not health.model.missing or health.model.work_points_elsewhere is not None:
         return health.model.answer
     effect = health.model.missing[0]
     unit = "µm" if effect.peak_urad is None else "µrad"
@@ -290,6 +297,10 @@ def to_do(health: MachineHealth) -> str:
         State.NOT_MEASURED: "measure it",
     }.get(health.state, "measure again as planned")
     missing = _first_missing(health)
+    elsewhere = None if health.model is None else health.model.work_points_elsewhere
+    if health.state is State.MODEL_FAILS and elsewhere is not None:
+        # What fails is the file: the same plan would give the same.
+        return LOOK_AT_FILE
     if health.state in (State.MODEL_FAILS, State.MAY_BE_OUT_OF_TOLERANCE) and missing is not None:
         # More runs would not help: what the model lacks is what is uncertain.
         action = f"{missing.remedy.rstrip('.')}; then measure again"

@@ -87,6 +87,7 @@ class ModelHealth:
     ``unchanged`` are parameters that stepped between runs of the campaign and have no change in the machine's history.
     ``refuted_p`` is the p-value of lack of fit with the noise of neighbours allowed for, where the readings of the
     campaign refute the model; None where they do not, and where runs of the campaign are still to come.
+    ``work_points_elsewhere`` is what says that the file states work points elsewhere than they come out.
     """
 
     campaign: str
@@ -105,6 +106,7 @@ class ModelHealth:
     steps: tuple[ErrorStep, ...]
     unchanged: tuple[str, ...] = field(default=(), metadata=OMITTED)
     refuted_p: float | None = field(default=None, metadata=OMITTED)
+    work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
 
     @property
     def is_doubted(self) -> bool:

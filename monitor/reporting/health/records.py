@@ -50,7 +50,8 @@ STATES: dict[State, str] = {
     "exceeds the stated limit",
     State.NOT_EVALUATED: "what was measured last could not be evaluated: nothing is known of its tolerances",
     State.CHANGED: "a parameter or an artefact changed this week",
-    State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing",
+    State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing, or the "
+    "campaign's file states something else than was measured",
     State.DRIFTS: "a parameter without a tolerance drifts, or follows a season that the history is too short to "
     "tell from a drift",
     State.SUSPECT_DATA: "bad points, or a ball that scatters, were found and count by less; nothing else",

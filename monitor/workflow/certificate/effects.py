@@ -75,7 +75,11 @@ def _coefficients(evaluated: StatedUncertainty) -> dict[str, tuple[str, ...]]:
         added.effect.text: tuple(name for name in added.names() if run_of(name) in (None, evaluated.run))
         for added in problem.shared
     }
-    return {**names, **{text: (text,) for text in problem.left_out if text not in names}}
+    outside = (
+        text for text in problem.left_out if text not in names and run_of(text) in (None, evaluated.run)
+    )
+    # Of an effect of another run there is nothing to say here.
+    return {text: of_run for text, of_run in names.items() if of_run} | {text: (text,) for text in outside}
 
 
 def _places(evaluated: StatedUncertainty) -> dict[str, Lies]:
@@ -140,8 +144,9 @@ def _joint(evaluated: StatedUncertainty) -> dict[str, ModelEffect]:
     effects = {}
     for name in answer.effects or ():
         amplitude = Estimate(answer.guf.estimate[name], answer.guf.u[name], answer.units[name])
-        days = len({run.day for run in runs})
-        effects[name] = _stated(name, amplitude, len(runs), days, joint=True)
+        of_its_runs = [run for run in runs if run_of(name) in (None, run.run)]
+        days = len({run.day for run in of_its_runs})
+        effects[name] = _stated(name, amplitude, len(of_its_runs), days, joint=True)
     return effects
 
 

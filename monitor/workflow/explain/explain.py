@@ -38,7 +38,7 @@ from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import result_doubts
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.reporting.machine_finding import doubt_sentence
-from monitor.reporting.run_left_out import RunLeftOut
+from monitor.reporting.run_left_out import RunLeftOut, runs_left_out
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
 from monitor.workflow.explain.alias_ties import with_uneven_positions
@@ -198,7 +198,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     explanation = explanation_of(campaign, model, first, rate)
     answer = explained(explanation, campaign, model, rate)
     if left_out:
-        sentences = " ".join((answer.answer, *map(str, left_out)))
+        sentences = f"{answer.answer} {runs_left_out(left_out)}"
         answer = replace(answer, answer=sentences, runs_left_out=tuple(left_out))
 
     def draw(folder: Path) -> Sequence[str]:

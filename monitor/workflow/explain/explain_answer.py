@@ -9,6 +9,7 @@ from monitor.documents import INLINED, OMITTED, Said, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.reporting.run_left_out import RunLeftOut
+from monitor.reporting.step_words import middle_within
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate, LikelyMistake
@@ -72,6 +73,11 @@ class StepBetween:
     high_mm: float
     width_mm: float | None = field(default=None, metadata=OMITTED)
     middle_mm: tuple[float, float] | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """From where to where in mm its middle may lie, of a step at once the step."""
+        return self.middle_mm or middle_within(self.low_mm, self.high_mm, self.width_mm)
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,7 @@ def model_health(
             )
         ),
         refuted_p=refuted_p,
+        work_points_elsewhere=explanation.work_points_elsewhere,
     )
 
 

@@ -17,6 +17,7 @@ from monitor.discovery import Fit
 from monitor.methods.chain.shared_effects import FollowedEffects, followed_effects, shared_parameters
 from monitor.records import Array
 from monitor.reporting.certificate.model_effect import Outside
+from monitor.reporting.run_coefficient import run_of
 from monitor.sources import Sharing
 from monitor.uncertainty import Inputs, OutputContribution
 from monitor.uncertainty.runs.measured_run import MeasuredRun, same_plan
@@ -150,7 +151,8 @@ def why_outside(fit: Fit, *, linear_axes: bool) -> Outside | None:
 def effect_outputs(fit: Fit, index: int, places: Sequence[int]) -> EffectOutputs | None:
     """The added effects of a fit beside the parameters at ``places`` of the run at ``index``; None where it has none.
 
-    Only those that the plan determines are outputs; what is not known of the others moves the parameters as well.
+    Only those that the plan determines, and that are not of another run alone, are outputs; what is not known of the
+    others moves the parameters as well.
     """
     problem, solution = fit.problem, fit.solution
     if not problem.added_names:
@@ -158,7 +160,8 @@ def effect_outputs(fit: Fit, index: int, places: Sequence[int]) -> EffectOutputs
     fixed, coefficients = problem.resolved(solution.common)
     runs = tuple(measured_run(fixed, int(number), coefficients) for number in problem.runs)
     shared = shared_parameters(problem, solution)
-    columns = np.flatnonzero(np.isfinite(shared.estimate))
+    of_this_run = [run_of(name) in (None, int(problem.runs[index])) for name in shared.names]
+    columns = np.flatnonzero(np.isfinite(shared.estimate) & of_this_run)
     searched = np.array([name.endswith(".tau") for name in problem.added_names])
     by_logarithm = np.where(searched & np.isfinite(shared.estimate), shared.estimate, 1.0)
     scale = by_logarithm[columns]

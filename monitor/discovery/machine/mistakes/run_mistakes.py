@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import fdtr, fdtrc
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.mistakes.column_mistakes import (
@@ -29,6 +30,9 @@ FAR_MORE, FAR_LESS = 3.0, 0.1
 LIKE_OTHERS = 1.5
 #: A mistake that does the same leaves the same, but for rounding and the noise of a run.
 AS_WELL = 1.25
+#: Two readings at one place have one degree of freedom: they leave a tenth of what is usual in one of twelve runs. So
+#: rarely does noise make one of all runs as unlike the others as one that is tried.
+BY_CHANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,8 @@ def find_run_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tupl
     """
     remainders = _remainders(first)
     campaign = without_gross(campaign, first)
-    for odd_runs in _odd_runs(remainders):
+    for tried in _odd_runs(remainders):
+        odd_runs = [odd for odd in tried if not _is_chance(odd, tried, remainders, first)]
         cured = {
             odd.run: cures for odd in odd_runs if (cures := _cures(campaign, problem_of, odd, remainders))
         }
@@ -103,6 +108,35 @@ def _odd_runs(remainders: Mapping[int, float]) -> Iterator[tuple[_Odd, ...]]:
     yield tuple(_Odd(run, smaller, is_small=False) for run, value in by_run.items() if value >= upper)
     if lower < FAR_LESS * upper:
         yield tuple(_Odd(run, 1.0, is_small=True) for run, value in by_run.items() if value <= lower)
+
+
+def _is_chance(odd: _Odd, tried: tuple[_Odd, ...], remainders: Mapping[int, float], first: Fit) -> bool:
+    """Whether noise alone makes a run as unlike those it is held against, by the degrees of freedom of both."""
+    freedom = _degrees_of_freedom(first)
+    beside = {odd.run} if odd.by_most else {each.run for each in tried}
+    others = sum(number for run, number in freedom.items() if run not in beside)
+    own = freedom[odd.run]
+    if min(own, others) < 1:
+        return True
+    level = odd.usual
+    if odd.is_small and not odd.by_most:
+        level = float(np.median([value for run, value in remainders.items() if run not in beside]))
+    ratio = (remainders[odd.run] / level) ** 2
+    chance = fdtr(own, others, ratio) if ratio < 1.0 else fdtrc(own, others, ratio)
+    return bool(len(remainders) * chance > BY_CHANCE)
+
+
+def _degrees_of_freedom(fit: Fit) -> dict[int, int]:
+    """The numbers with weight of every run, less what its own unknowns take of them."""
+    of_run = fit.nuisance.basis
+    taken = np.rint(np.sum(of_run**2, axis=(1, 2))).astype(int)
+    count = fit.has_weight.sum(axis=1)
+    calibrated = len(fit.problem.extra_names)
+    run = fit.problem.context.run
+    return {
+        int(number): int(count[run == number].sum()) + calibrated - int(less)
+        for number, less in zip(fit.problem.runs, taken, strict=True)
+    }
 
 
 def _cures(
