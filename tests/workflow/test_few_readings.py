@@ -16,6 +16,7 @@ from monitor.exceptions import TooFewReadingsError
 from monitor.methods.instruments.method import problem_of
 from monitor.readers import read_campaign
 from monitor.reporting.health.sentences import RunsNamed
+from monitor.reporting.run_left_out import runs_left_out
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.mistaken_columns import with_mistake
@@ -107,7 +108,7 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
         whole = db.ask("explain", campaign="r-test").explanation
     (left_out,) = told.runs_left_out
     assert (left_out.run, left_out.readings) == (5, 9)
-    assert told.answer == f"{whole.answer} {left_out}"
+    assert told.answer == f"{whole.answer} {runs_left_out((left_out,))}"
     assert replace(told, answer=whole.answer, runs_left_out=None) == whole
     starts = {run: datetime(2026, 3, run) for run in range(1, 6)}
     health = model_health(told, None, Span(starts, 0, None), set())
