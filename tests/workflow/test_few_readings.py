@@ -24,6 +24,7 @@ from monitor.workflow.campaign_parts import without_runs
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import ExplainRequest
+from monitor.reporting.run_left_out import runs_left_out
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.identify import identify
@@ -119,7 +120,7 @@ def test_a_run_that_was_broken_off_is_named_and_the_others_are_answered_without_
         whole = db.ask("explain", campaign="r-test").explanation
     (left_out,) = told.runs_left_out
     assert (left_out.run, left_out.readings) == (5, 9)
-    assert told.answer == f"{whole.answer} {left_out}"
+    assert told.answer == f"{whole.answer} {runs_left_out((left_out,))}"
     assert replace(told, answer=whole.answer, runs_left_out=None) == whole
     starts = {run: datetime(2026, 3, run) for run in range(1, 6)}
     health = model_health(told, None, Span(starts, 0, None), set())

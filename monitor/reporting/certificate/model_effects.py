@@ -55,9 +55,10 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
 
 def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
     """What the values are: those among the results, then those by themselves and why these are no results."""
-    joint = [effect for effect in effects if effect.joint and run_of(effect.name) is None]
-    joint_of_run = [effect.name for effect in effects if effect.joint and run_of(effect.name) is not None]
-    alone = [effect for effect in effects if effect.value is not None and not effect.joint]
+    joint, joint_of_run = _by_extent([effect for effect in effects if effect.joint])
+    alone, alone_of_run = _by_extent(
+        [effect for effect in effects if effect.value is not None and not effect.joint]
+    )
     sentences = []
     if joint:
         names = ", ".join(effect.name for effect in joint)
@@ -66,12 +67,10 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
         )
     if joint_of_run:
         sentences.append(texts.markup("page.effects_joint_of_run", effects=", ".join(joint_of_run)))
-    of_all = [effect for effect in alone if run_of(effect.name) is None]
-    of_run = [effect.name for effect in alone if run_of(effect.name) is not None]
-    if of_all:
-        sentences.append(texts.markup("page.effects_explained", runs=of_all[0].runs, days=of_all[0].days))
-    if of_run:
-        sentences.append(texts.markup("page.effects_of_run", effects=", ".join(of_run)))
+    if alone:
+        sentences.append(texts.markup("page.effects_explained", runs=alone[0].runs, days=alone[0].days))
+    if alone_of_run:
+        sentences.append(texts.markup("page.effects_of_run", effects=", ".join(alone_of_run)))
     outside = {effect.outside for effect in effects if effect.outside is not None}
     sentences += [texts.markup(f"page.outside_{reason.value}") for reason in sorted(outside)]
     sentences += [
@@ -80,6 +79,12 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
         if effect.lies is not None
     ]
     return Markup(" ").join(sentences)
+
+
+def _by_extent(effects: list[ModelEffect]) -> tuple[list[ModelEffect], list[str]]:
+    """The effects of all runs, and the names of those of one run."""
+    of_all = [effect for effect in effects if run_of(effect.name) is None]
+    return of_all, [effect.name for effect in effects if run_of(effect.name) is not None]
 
 
 def place_in_words(name: str, lies: Lies, texts: Texts) -> str:
