@@ -19,12 +19,12 @@ from monitor.methods.samba.method import problem_of as samba_problem
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.health.sentences import RunsNamed
+from monitor.reporting.run_left_out import runs_left_out
 from monitor.store import Database, import_campaign
 from monitor.workflow.campaign_parts import without_runs
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import ExplainRequest
-from monitor.reporting.run_left_out import runs_left_out
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.identify import identify

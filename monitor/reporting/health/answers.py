@@ -297,9 +297,7 @@ def to_do(health: MachineHealth) -> str:
         State.NOT_MEASURED: "measure it",
     }.get(health.state, "measure again as planned")
     missing = _first_missing(health)
-    elsewhere = None if health.model is None else health.model.work_points_elsewhere
-    if health.state is State.MODEL_FAILS and elsewhere is not None:
-        # What fails is the file: the same plan would give the same.
+    if _fails_by_file(health):
         return LOOK_AT_FILE
     if health.state in (State.MODEL_FAILS, State.MAY_BE_OUT_OF_TOLERANCE) and missing is not None:
         # More runs would not help: what the model lacks is what is uncertain.
@@ -311,6 +309,15 @@ def to_do(health: MachineHealth) -> str:
     elif is_due(health):
         return _sentence(f"measure it again {_after_colon(str(health.next_check))}")
     return _sentence(f"{action} {_when(health)}")
+
+
+def _fails_by_file(health: MachineHealth) -> bool:
+    """Whether what fails is the file: the same plan would give the same."""
+    return (
+        health.state is State.MODEL_FAILS
+        and health.model is not None
+        and health.model.work_points_elsewhere is not None
+    )
 
 
 def _when(health: MachineHealth) -> str:
