@@ -58,6 +58,14 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
         _model_effect(results, effect, version, texts)
 
 
+def _kind(effect: ModelEffect) -> str:
+    """The text of what an effect with a value is: among the results or beside them, of all runs or of one."""
+    of_run = run_of(effect.name) is not None
+    if effect.joint:
+        return "page.effects_joint_of_run" if of_run else "page.effects_joint"
+    return "page.effects_of_run" if of_run else "page.effects_explained"
+
+
 def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, texts: Texts) -> None:
     """An effect that was added to the model, with its own standard uncertainty; a play with its reversal value too."""
     description = describe(effect.name, texts)
@@ -66,13 +74,8 @@ def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, 
         say(element, "name", texts("dcc.effect", name=effect.name, words=description), texts.language)
         say(add(element, "data"), "text", texts("page.effects_unknown", effects=effect.name), texts.language)
         return
-    of_run = run_of(effect.name) is not None
-    if effect.joint:
-        kind = "page.effects_joint_of_run" if of_run else "page.effects_joint"
-    else:
-        kind = "page.effects_of_run" if of_run else "page.effects_explained"
     explained = texts(
-        kind,
+        _kind(effect),
         effects=effect.name,
         runs=effect.runs,
         days=effect.days,

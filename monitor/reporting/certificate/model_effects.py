@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -53,25 +54,32 @@ def printed_effects(effects: tuple[ModelEffect, ...] | None, texts: Texts) -> Pr
     )
 
 
-def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
-    """What the values are: those among the results, then those by themselves and why these are no results."""
-    joint = [effect for effect in effects if effect.joint and run_of(effect.name) is None]
-    joint_of_run = [effect.name for effect in effects if effect.joint and run_of(effect.name) is not None]
+def _joint(effects: tuple[ModelEffect, ...], texts: Texts) -> Iterator[Markup]:
+    """What those among the results are: of all runs, and of one."""
+    joint = [effect for effect in effects if effect.joint]
+    of_all = [effect for effect in joint if run_of(effect.name) is None]
+    of_run = [effect.name for effect in joint if run_of(effect.name) is not None]
+    if of_all:
+        names = ", ".join(effect.name for effect in of_all)
+        yield texts.markup("page.effects_joint", effects=names, runs=of_all[0].runs, days=of_all[0].days)
+    if of_run:
+        yield texts.markup("page.effects_joint_of_run", effects=", ".join(of_run))
+
+
+def _alone(effects: tuple[ModelEffect, ...], texts: Texts) -> Iterator[Markup]:
+    """What those with a value beside the results are: of all runs, and of one."""
     alone = [effect for effect in effects if effect.value is not None and not effect.joint]
-    sentences = []
-    if joint:
-        names = ", ".join(effect.name for effect in joint)
-        sentences.append(
-            texts.markup("page.effects_joint", effects=names, runs=joint[0].runs, days=joint[0].days)
-        )
-    if joint_of_run:
-        sentences.append(texts.markup("page.effects_joint_of_run", effects=", ".join(joint_of_run)))
     of_all = [effect for effect in alone if run_of(effect.name) is None]
     of_run = [effect.name for effect in alone if run_of(effect.name) is not None]
     if of_all:
-        sentences.append(texts.markup("page.effects_explained", runs=of_all[0].runs, days=of_all[0].days))
+        yield texts.markup("page.effects_explained", runs=of_all[0].runs, days=of_all[0].days)
     if of_run:
-        sentences.append(texts.markup("page.effects_of_run", effects=", ".join(of_run)))
+        yield texts.markup("page.effects_of_run", effects=", ".join(of_run))
+
+
+def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
+    """What the values are: those among the results, then those by themselves and why these are no results."""
+    sentences = [*_joint(effects, texts), *_alone(effects, texts)]
     outside = {effect.outside for effect in effects if effect.outside is not None}
     sentences += [texts.markup(f"page.outside_{reason.value}") for reason in sorted(outside)]
     sentences += [

@@ -115,14 +115,14 @@ def _is_chance(odd: _Odd, tried: tuple[_Odd, ...], remainders: Mapping[int, floa
     freedom = _degrees_of_freedom(first)
     beside = {odd.run} if odd.by_most else {each.run for each in tried}
     others = sum(number for run, number in freedom.items() if run not in beside)
-    own = freedom[odd.run]
-    if min(own, others) < 1:
+    of_odd = freedom[odd.run]
+    if min(of_odd, others) < 1:
         return True
     level = odd.usual
     if odd.is_small and not odd.by_most:
         level = float(np.median([value for run, value in remainders.items() if run not in beside]))
     ratio = (remainders[odd.run] / level) ** 2
-    chance = fdtr(own, others, ratio) if ratio < 1.0 else fdtrc(own, others, ratio)
+    chance = fdtr(of_odd, others, ratio) if ratio < 1.0 else fdtrc(of_odd, others, ratio)
     return bool(len(remainders) * chance > BY_CHANCE)
 
 
