@@ -274,6 +274,12 @@ def _beyond_since(health: MachineHealth, since: datetime) -> str:
     return "Since " + ", ".join(f"{day(each.out_since)} ({each.name})" for each in named if each.out_since)
 
 
+def _is_file_wrong(health: MachineHealth) -> bool:
+    """Whether what fails is the file: the same plan would give the same."""
+    model = health.model
+    return health.state is State.MODEL_FAILS and model is not None and model.work_points_elsewhere is not None
+
+
 def to_do(health: MachineHealth) -> str:
     """Return what to do on a machine, and by when to measure it again."""
     parameter = concern(health)
@@ -297,9 +303,7 @@ def to_do(health: MachineHealth) -> str:
         State.NOT_MEASURED: "measure it",
     }.get(health.state, "measure again as planned")
     missing = _first_missing(health)
-    elsewhere = None if health.model is None else health.model.work_points_elsewhere
-    if health.state is State.MODEL_FAILS and elsewhere is not None:
-        # What fails is the file: the same plan would give the same.
+    if _is_file_wrong(health):
         return LOOK_AT_FILE
     if health.state in (State.MODEL_FAILS, State.MAY_BE_OUT_OF_TOLERANCE) and missing is not None:
         # More runs would not help: what the model lacks is what is uncertain.
