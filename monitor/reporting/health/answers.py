@@ -314,12 +314,14 @@ def to_do(health: MachineHealth) -> str:
         return _sentence(action)
     elif is_due(health):
         return _sentence(f"measure it again {_after_colon(str(health.next_check))}")
-    when = (
-        "now"
-        if health.state in ALARMS and health.state is not State.NOT_EVALUATED
-        else f"(next check: {_after_colon(str(health.next_check))})"
-    )
-    return _sentence(f"{action} {when}")
+    return _sentence(f"{action} {_when(health)}")
+
+
+def _when(health: MachineHealth) -> str:
+    """By when to measure a machine again."""
+    if health.state in ALARMS and health.state is not State.NOT_EVALUATED:
+        return "now"
+    return f"(next check: {_after_colon(str(health.next_check))})"
 
 
 def _named(parameter: ParameterHealth) -> str:
