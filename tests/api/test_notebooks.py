@@ -56,6 +56,7 @@ def test_a_notebook_is_kept_without_outputs(notebook: Path) -> None:
         for path in NOTEBOOKS
     ],
 )
+@pytest.mark.slow
 def test_a_notebook_runs(notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "examples").symlink_to(EXAMPLES, target_is_directory=True)
     monkeypatch.chdir(tmp_path)

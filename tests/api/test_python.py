@@ -128,6 +128,7 @@ def test_an_answer_is_shown_with_its_numbers(db: mm.Database) -> None:
     assert not any(f" {name} " in text for name in empty)
 
 
+@pytest.mark.slow
 def test_an_answer_without_rows_is_its_sentence(db: mm.Database) -> None:
     nothing = db.campaign("five-days").explain()
     assert nothing.missing == ()

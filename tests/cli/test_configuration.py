@@ -125,6 +125,7 @@ def test_the_shell_completes_every_verb(typed: Any) -> None:
     assert "#compdef monitor" in typed("completion", "zsh").out
 
 
+@pytest.mark.slow
 def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(typed: Any, db: Path) -> None:
     assert "machine type" not in typed("trend", "HU40-T", db=db).out
     configured('[tolerances."hu40-t"]\nEB0C = 0.001\n[tolerances."*"]\nEA0B = 5\n')
@@ -137,6 +138,7 @@ def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(type
     assert "limits of HU40-T are those of the machine type 'hu40-t'" in typed("fleet", db=db).out
 
 
+@pytest.mark.slow
 def test_limits_of_parameters_that_the_machine_has_not_are_said_to_hold_nothing(typed: Any, db: Path) -> None:
     configured('[tolerances."*"]\nEB0C9 = 5\n')
     notes = typed("trend", "HU40-T", "--json", db=db).document["notes"]

@@ -200,6 +200,7 @@ def test_a_terminal_gets_a_sign_of_life_that_goes_away(terminal: Any, filled: Pa
     assert "by axis" in seen
 
 
+@pytest.mark.slow
 def test_a_monte_carlo_on_a_terminal_shows_how_far_it_is(terminal: Any, filled: Path) -> None:
     asked = ("uncertainty", "five-days", "--run", 20, "--method", "mcm", "--digits", 1)
     seen = without_codes(terminal("--db", filled, *asked))

@@ -60,6 +60,7 @@ def test_the_true_values_of_a_rehearsal_are_passed_over_beside_its_campaigns(
     assert f"1 of 2 folders refused: {truth}" in refused.err
 
 
+@pytest.mark.slow
 def test_the_fleet_has_a_row_for_a_machine_without_numbers(typed: Any, tmp_path: Path) -> None:
     db = tmp_path / "x.duckdb"
     assert typed("import", EXAMPLES / "tilting-table", EXAMPLES / "ball-bar", db=db).status == 0
@@ -112,6 +113,7 @@ def test_who_has_no_backup_learns_how_to_make_one(typed: Any, tmp_path: Path) ->
     assert "so it cannot be checked; `monitor backup FILE` writes both" in refused.err
 
 
+@pytest.mark.slow
 def test_one_explanation_measures_by_one_root_mean_square(typed: Any, tmp_path: Path) -> None:
     """What is left with all findings is the RMS of the first line, beside the same expectation."""
     db = tmp_path / "x.duckdb"

@@ -99,6 +99,7 @@ def correlated(rng: np.random.Generator, n: int, phi: float) -> np.ndarray:
     return e
 
 
+@pytest.mark.all_seeds
 def test_false_alarms_of_a_slope_in_correlated_noise() -> None:
     """At 5 %, correlation 0.6, 100 rows: independent rows would say so in a quarter of the series."""
     slope, one = np.linspace(-1.0, 1.0, 100)[:, None], np.ones((100, 1))
@@ -108,6 +109,7 @@ def test_false_alarms_of_a_slope_in_correlated_noise() -> None:
     assert sum(assess(y, one).noticed for y in series) >= 55
 
 
+@pytest.mark.all_seeds
 def test_silence_over_independent_noise_and_over_correlated_noise() -> None:
     alarms = [
         bool(explain_curve(problem_of(curve(correlated(np.random.default_rng([seed, 4]), 60, phi)))).missing)

@@ -111,6 +111,7 @@ def test_a_bad_point_does_not_hide_an_effect(virtual_campaigns, explained):
     assert point.size * 1e3 == pytest.approx(80.0, abs=5.0)
 
 
+@pytest.mark.all_seeds
 def test_a_noisier_run_has_no_bad_points_for_that(virtual_campaigns, explained):
     campaign, told = virtual_campaigns.virtual(6)
     rng = np.random.default_rng(6)

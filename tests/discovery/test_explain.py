@@ -94,6 +94,7 @@ def test_the_plain_effect_leads_where_a_driver_hardly_varies(virtual_campaigns, 
     assert both >= len(campaigns) / 2
 
 
+@pytest.mark.slow
 def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaigns, explained):
     sim = simulator()
     hidden = sim.Effect("EYY:cyclic13.7mm", peak_um=5.0, direction=(1.0, 2.0))
@@ -127,6 +128,7 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
         ),
     ],
 )
+@pytest.mark.slow
 def test_campaigns_of_other_kinds_with_and_without_an_effect(virtual_campaigns, explained, options):
     sim = simulator()
     assert explained(virtual_campaigns.virtual(41, **options)[0]).missing == ()
@@ -137,6 +139,7 @@ def test_campaigns_of_other_kinds_with_and_without_an_effect(virtual_campaigns, 
     assert abs(found.amplitude) == pytest.approx(6e-3, abs=4 * found.u)
 
 
+@pytest.mark.slow
 def test_a_channel_with_empty_cells_is_refused_aloud(virtual_campaigns, explained):
     sim = simulator()
     campaign, _ = virtual_campaigns.virtual(1, [sim.Effect("EXX:reversal", peak_um=5.0)], days=2)
@@ -159,6 +162,7 @@ def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaig
 @pytest.mark.parametrize(
     "chosen", [(2,), *(pytest.param(runs, marks=pytest.mark.slow) for runs in ((3, 5, 9, 12), (4, 5)))]
 )
+@pytest.mark.slow
 def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns, explained, chosen):
     sim = simulator()
     campaign, _ = virtual_campaigns.virtual(

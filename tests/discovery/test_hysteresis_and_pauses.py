@@ -65,6 +65,7 @@ def after_a_pause(tau_s):
 
 
 @pytest.mark.parametrize(("axis", "width"), [("X", 40.0), pytest.param("Y", 70.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_drive_that_is_wound_up_is_named_with_its_width(virtual_campaigns, explained, seeds, axis, width):
     """Width within a fifth, as 1 um of noise and a plan of 62 touches allow; the size within 1 um of the hidden 8."""
     for seed in seeds(20, 1):

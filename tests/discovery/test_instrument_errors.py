@@ -33,6 +33,7 @@ Sample = Callable[[int, int], range]
 @pytest.mark.parametrize(
     "error", [error if error in QUICK else pytest.param(error, marks=pytest.mark.slow) for error in ERRORS]
 )
+@pytest.mark.slow
 def test_an_error_of_an_instrument_is_named(error: str, seeds: Sample) -> None:
     """At a size of some five standard uncertainties; 95 % over many seeds, all of a few."""
     sample = seeds(40, 1)

@@ -36,6 +36,7 @@ def test_where_nothing_is_missing_the_answer_is_nothing(example, name):
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
+@pytest.mark.slow
 def test_spindle_growth_with_its_time_constant(example):
     answer = example("hidden-spindle-growth")
     nothing_else(answer)

@@ -51,6 +51,7 @@ def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
         *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (103, 104, 105, 106)),
     ],
 )
+@pytest.mark.slow
 def test_a_tool_that_goes_astray_while_it_touches_is_no_effect(trial, seed):
     """A drift of X shows in the touches along X alone; held against those before it, whatever their direction, it was
     told as an effect in each of these campaigns (an error of free shape, a bent axis)."""
@@ -86,6 +87,7 @@ def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("EZZ:poly2", "EAC:harmonic2")),
     ],
 )
+@pytest.mark.slow
 def test_hidden_effects_of_8_um_are_found(trial, effect):
     (group,) = trial.groups(trial.explained(trial.rotary(np.random.default_rng(5), 4, named(trial, effect))))
     assert effect in group

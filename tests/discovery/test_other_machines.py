@@ -22,6 +22,7 @@ def groups(answer):
 @pytest.mark.parametrize(
     "machine", [*MACHINES, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
 )
+@pytest.mark.slow
 def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, machine):
     campaign, _ = virtual_campaigns.on_machine(machine, 80000)
     answer = explained(campaign)

@@ -66,6 +66,7 @@ def test_one_ball_that_comes_loose_is_no_slip_of_the_piece(virtual_campaigns):
         *(pytest.param(of, marks=pytest.mark.slow) for of in ("EXX:poly1@warmup", "EZC1:const@warmup")),
     ],
 )
+@pytest.mark.slow
 def test_a_drift_of_the_machine_is_no_slip(virtual_campaigns, effect):
     options = {"tau_s": 900.0} if "warmup" in effect else {}
     drift = simulator().Effect(effect, peak_um=10.0, **options)

@@ -43,6 +43,7 @@ def told(found: Campaign) -> Explanation:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.slow
 def test_joints_that_come_to_rest_elsewhere_are_no_effect(robots, tmp_path, seed):
     """40 µrad in every joint, 20 to 40 µm at the tool; counted by readings each of these had six false effects."""
     found = told(campaign(robots, tmp_path, seed, poses=250, repeatability_urad=40.0))

@@ -65,6 +65,7 @@ def test_of_runs_that_are_copies_no_ball_scatters(virtual_campaigns):
     assert scattering(fit(problem_of(campaign))) is None
 
 
+@pytest.mark.all_seeds
 def test_an_explanation_names_the_ball_alone(virtual_campaigns, explained):
     """It was 40 bad points. How much the ball scatters is said to 15 %."""
     campaign, told = virtual_campaigns.virtual(9400, days=2)
@@ -90,6 +91,7 @@ def test_a_ball_that_shakes_hides_no_effect(virtual_campaigns, explained):
     assert answer.suspect == ()
 
 
+@pytest.mark.slow
 def test_a_wreck_of_a_ball_that_shakes_is_a_bad_point_still(virtual_campaigns, explained):
     campaign, told = virtual_campaigns.virtual(9600, days=2, bad_points=[(3, 9, (0.0, 90.0, 0.0))])
     ball = str(told["target"][(told["run"] == 3) & (told["sequence"] == 9)][0])

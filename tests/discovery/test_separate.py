@@ -158,6 +158,7 @@ def test_set_ups_move_the_tip_or_the_targets():
     assert SecondSetup.LONGER_STYLUS not in {each.setup for each in setups_of(chain, np.zeros(3))}
 
 
+@pytest.mark.slow
 def test_poses_are_readings_of_the_controller(virtual_campaigns):
     """The same touches on a machine whose C counts the other way: the poses that tell rivals apart are the same ones in
     its readings. They were those of the other side."""

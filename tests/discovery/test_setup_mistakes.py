@@ -69,6 +69,7 @@ def _spoilt(campaign: Campaign, setup: str, change: dict[str, tuple[str, float]]
         ),
     ],
 )  # fmt: skip
+@pytest.mark.slow
 def test_what_is_wrong_in_one_setup_is_said_in_its_name(
     right: Campaign, setup: str, change: dict[str, tuple[str, float]], what: str
 ) -> None:
@@ -92,6 +93,7 @@ def test_a_setup_alone_contradicts_itself_where_no_machine_reads_so(
     assert _contradicts_itself(alone, _of_machine, int(alone.probings.run[0])) is contradicts
 
 
+@pytest.mark.slow
 def test_right_setups_and_errors_of_an_instrument_are_no_mistake(right: Campaign, tmp_path: Path) -> None:
     assert _told(right) == []
     for error, size in (

@@ -41,6 +41,7 @@ def at_once(size_mm: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("what", ["tracker", "base"])
+@pytest.mark.slow
 def test_a_station_that_moved_once_is_named_with_its_moment(tmp_path: Path, what: str) -> None:
     """Was `tracker:shift@run_time`, or several drifts of the base of the robot."""
     (found,) = explained(tmp_path, at_once(0.1), what).missing

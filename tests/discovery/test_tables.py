@@ -65,6 +65,7 @@ def test_the_size_of_a_table_is_its_largest_node(explanation):
     assert 5e-3 < found.amplitude < 8e-3 + 3.0 * found.u
 
 
+@pytest.mark.slow
 def test_shapes_of_the_catalogue_stay_what_they_are(virtual_campaigns, explained):
     sim = virtual_campaigns.simulator()
     effects = [sim.Effect("EYX:poly3", peak_um=8.0), sim.Effect("EYX:reversal", peak_um=5.0)]

@@ -44,6 +44,7 @@ def trial():
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("play over 40 mm", "fifth harmonic of C")),
     ],
 )
+@pytest.mark.slow
 def test_the_right_error_alone_is_named(virtual_campaigns, trial, explained, family):
     right, effect, curve = trial.FAMILIES[family]
     hidden = simulator().Effect(effect, peak_um=5.0, curve=curve)
@@ -196,6 +197,7 @@ def test_a_bump_that_another_error_mimics_in_part_is_the_error_of_its_axis(
         pytest.param("step in a scale", 301, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_a_slight_step_or_bump_is_the_error_of_its_axis(virtual_campaigns, trial, explained, family, seed):
     """The three were told as EZY:free, EYB:harmonic2 and EBX:free: hats alone make a step of a mixture that an error of
     another axis mimics, and a harmonic that a fifth of a bump looks like was left unquestioned."""

@@ -56,6 +56,7 @@ def in_machine(campaign, vectors):
     ).apply(vectors)
 
 
+@pytest.mark.slow
 def test_a_reading_off_in_any_axis_is_named_with_its_axis_and_size(campaign, seeds):
     """At positions of run 2 drawn at random, along the surface or across it: no other row, axis or size is told."""
     rows = np.flatnonzero(campaign.probings.run == 2)
@@ -113,6 +114,7 @@ def _on_table(table, tips):
     "kind",
     ["scatter of 5 µm", "scatter with heavy tails", "set up anew", "poses that differ from run to run"],
 )
+@pytest.mark.slow
 def test_programs_that_differ_are_no_mistakes(table, seeds, kind):
     rng = np.random.default_rng(2612)
     marked = sum(bool(along_surface(problem_of(as_programs_differ(table, rng, kind)))) for _ in seeds(200, 5))

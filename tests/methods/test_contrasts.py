@@ -117,6 +117,7 @@ def test_right_readings_contradict_each_other_as_seldom_as_said(rows: RunRows, t
         assert scipy.stats.binomtest(count, draws, level, alternative="greater").pvalue > 1e-3, (level, count)
 
 
+@pytest.mark.slow
 def test_a_setup_with_the_other_sign_is_named(tmp_path: Path) -> None:
     """R-test around B with the other sign: its own instrument's R-test around A agrees with laser and bar.
 

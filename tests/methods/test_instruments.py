@@ -251,6 +251,7 @@ def mount_campaign(
 
 
 @pytest.mark.parametrize("kind", MOUNTS)
+@pytest.mark.slow
 def test_simulated_mounts_show_what_was_hidden_and_nothing_else(kind: str, tmp_path: Path) -> None:
     campaign = mount_campaign(kind, 3, tmp_path, sag=2e-4, lift=3e-5)
     problem = campaign_method(campaign).problem_of(campaign)

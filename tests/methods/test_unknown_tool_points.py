@@ -210,6 +210,7 @@ def test_a_bar_off_the_plane_of_its_swing_has_the_derivatives_of_its_readings(tm
         pytest.param((0.0, -0.006, 0.0), "", ["EYA:const"], marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_what_a_head_carries_elsewhere_than_stated_is_a_constant(
     tmp_path: Path, off: tuple[float, ...], key: str, told: list[str]
 ) -> None:

@@ -238,6 +238,7 @@ def test_volumetric_slices(size: float) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("count", [1, 13, 51])
+@pytest.mark.slow
 def test_expected_uncertainties(count: int, size: float) -> None:
     names, u = [f"EX0C1({index})" for index in range(count)], size * np.linspace(1.0, 2.0, count)
     for proposed in (None, 0.5 * u):
@@ -246,6 +247,7 @@ def test_expected_uncertainties(count: int, size: float) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
+@pytest.mark.slow
 def test_standards_curves_and_shapes(size: float) -> None:
     at = np.linspace(-9e3, 9e3, 11)
     two = size * np.stack([at, -at]) / 9e3

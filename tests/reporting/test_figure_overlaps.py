@@ -172,6 +172,7 @@ def test_parameter_over_time(runs: int, size: float) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("count", [1, 13, 51])
+@pytest.mark.slow
 def test_selections_side_by_side(count: int, size: float) -> None:
     rng = np.random.default_rng(2)
     figure = selections_side_by_side(
@@ -185,6 +186,7 @@ def test_selections_side_by_side(count: int, size: float) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("count", [1, 2, 8])
+@pytest.mark.slow
 def test_error_falling(count: int, size: float) -> None:
     names = ["SAMBA", *[f"EZC1:const@warmup_of_the_spindle_{index}" for index in range(count - 1)]]
     rms = size * np.linspace(3.0, 1.0, count)

@@ -70,6 +70,7 @@ print(json.dumps(answers))
 """
 
 
+@pytest.mark.slow
 def test_a_certificate_laid_out_beside_is_the_same(
     make_record: Callable[..., CertificateRecord], tmp_path: Path
 ) -> None:

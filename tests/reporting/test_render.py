@@ -175,6 +175,7 @@ def test_usual_certificate_stays_inside_its_margins(usual: bytes) -> None:
     assert_inside_the_margins(usual)
 
 
+@pytest.mark.slow
 def test_thirty_parameters_and_long_names_in_three_alphabets_are_not_clipped(make_record: Make) -> None:
     record = make_record(30)
     assert record.customer is not None

@@ -63,6 +63,7 @@ def test_of_days_of_as_many_runs_it_is_students_test_of_their_means():
 @pytest.mark.parametrize(
     ("before", "after", "component"), [((3, 4), (2, 4), 0.0), ((5, 4), (5, 4), 1.0), ((4, 3), (2, 3), 2.0)]
 )
+@pytest.mark.all_seeds
 def test_false_alarms_and_a_change_of_three_and_a_half_standard_deviations(
     before, after, component, rate_at_most
 ):

@@ -119,6 +119,7 @@ def test_power_stays_useful(n, r, least):
 
 
 @pytest.mark.parametrize("r", [0.0, 0.6])
+@pytest.mark.all_seeds
 def test_false_alarm_rate_of_many_heteroscedastic_parameters_together(r, rate_at_most):
     rng = np.random.default_rng(3)
     u = np.exp(0.5 * rng.normal(size=24))

@@ -150,6 +150,7 @@ def drawn(rng, before, after, rate=0.0, walk=0.0, step=0.0):
 
 @pytest.mark.parametrize(("before", "after"), [(2, 2), (4, 4), (7, 1)])
 @pytest.mark.parametrize("law", [{}, {"rate": 3.0}, {"walk": 3.0}, {"rate": 20.0, "walk": 1.0}])
+@pytest.mark.all_seeds
 def test_machines_that_drift_or_wander_are_not_said_to_step(before, after, law, rate_at_most):
     rng = np.random.default_rng([before, after, *(int(value) for value in law.values())])
     verdicts = [drawn(rng, before, after, **law) for _ in range(100)]

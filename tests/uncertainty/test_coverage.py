@@ -80,6 +80,7 @@ def test_exact_rectangle_factor_of_two_outputs(gum):
         assert found.value == pytest.approx(exact, abs=6e-4)
 
 
+@pytest.mark.all_seeds
 def test_exact_rectangle_factor_of_many_outputs_within_its_stated_error(gum):
     misses = []
     for key, exact in gum("coverage_factors")["exact_kq_equicorrelated_gaussian_p095"].items():

@@ -143,6 +143,7 @@ def test_residuals_far_beyond_the_statements(five_days: Campaign) -> None:
     assert ground.size > ground.limit == MOST_TIMES
 
 
+@pytest.mark.slow
 def test_lack_of_fit_by_a_hidden_reversal_is_a_ground_or_within_what_is_certified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -307,6 +308,7 @@ def test_every_ground_is_accepted_by_its_name_and_none_that_is_absent(five_days:
         accepted_grounds(found, dict.fromkeys(GroundKind, "all"))
 
 
+@pytest.mark.slow
 def test_the_reason_is_printed_stored_and_made_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -409,6 +411,7 @@ def moved(campaign: Campaign, change) -> Campaign:
         ),
     ],
 )
+@pytest.mark.slow
 def test_a_sphere_that_wanders_is_refused_with_the_sign_or_the_columns(change, said: str) -> None:
     campaign = read_campaign(EXAMPLES / "r-test")
     assert grounds(campaign, 1) == ()

@@ -223,6 +223,7 @@ def test_a_week_without_runs_says_so(fleet: Database, tmp_path: Path) -> None:
     assert "No machine was measured in this week." in text_of(found["files"][1])[0]
 
 
+@pytest.mark.slow
 def test_a_machine_left_in_alarm_and_not_measured_since_is_told_so(
     fleet: Database, tmp_path: Path, pdf_unread
 ) -> None:
@@ -277,6 +278,7 @@ def test_a_stored_record_comes_back_to_the_last_bit(fleet: Database, week10: dic
     assert from_document(MachineHealth, document) == found
 
 
+@pytest.mark.slow
 def test_parts_bound_what_is_laid_out_at_a_time(fleet: Database, week10: dict, monkeypatch) -> None:
     monkeypatch.setattr("monitor.workflow.health.report.MACHINES_A_PART", 2)
     out = Path(str(week10["out"])) / "parts"
@@ -355,6 +357,7 @@ def test_every_state_is_explained_and_weeks_are_iso_8601() -> None:
         week_named("March")
 
 
+@pytest.mark.all_seeds
 def test_changes_are_rarely_found_where_there_are_none() -> None:
     # At most FALSE_ALARM of quiet histories may show a change: 300 histories of 4 parameters, at most 9 (the
     # 99.8 % point of the binomial distribution with 1 %).

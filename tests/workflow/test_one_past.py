@@ -62,6 +62,7 @@ def reported(db: Database, week: str, out: Path, pdf_unread):
     return stored_health(db, number)
 
 
+@pytest.mark.slow
 def test_the_reset_of_the_b_axis_is_one_change_for_page_and_report(
     stepped: Database, tmp_path: Path, pdf_unread
 ) -> None:
@@ -107,6 +108,7 @@ def test_last_values_are_those_of_the_last_day(stepped: Database, tmp_path: Path
         assert stated.estimate == pytest.approx(stated.history.values[-1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -> None:
     with Database(path, threads=1) as db:
         # The past weeks were written by SQL: that each of their runs was identified is written, too.
@@ -225,6 +227,7 @@ def _touched_at(db: Database, degrees: np.ndarray) -> None:
         ),
     ],
 )
+@pytest.mark.slow
 def test_fleet_and_page_fit_the_same_temperature_beside_the_line(
     tmp_path: Path, weeks: int, source: str
 ) -> None:
@@ -269,6 +272,7 @@ def test_fleet_and_page_fit_the_same_temperature_beside_the_line(
         assert any(not parameter.changes for parameter in page.parameters.values())
 
 
+@pytest.mark.slow
 def test_a_machine_that_follows_its_temperature_does_not_drift_in_the_fleet(tmp_path: Path) -> None:
     """Thirty machines follow a season of two kelvin over 26 weeks, with and without a thermometer."""
     rng = np.random.default_rng(4)
