@@ -76,18 +76,30 @@ def _about(of_error: StepsSeen, step: OneStep, rest: Sequence[OneStep]) -> list[
         {float(f"{width * part:.3g}") for width in of_error.widths for part in NEAR_WIDTHS if width}
     )
     over = [OneStep(at, width) for width in widths for at in near if of_error.are_inside([at], width)]
+    able = [*at_once, *over]
+    apart = np.ones(len(able), dtype=bool)
+    for width, among in _by_width(able):
+        at = np.array([able[index].at_mm for index in among])
+        for other in rest:
+            pairs = np.column_stack([at, np.full(len(at), other.at_mm)])
+            apart[among] &= of_error.are_apart(pairs, (width + other.width) / 2.0)
+    return [able[index] for index in np.flatnonzero(apart)] or [step]
+
+
+def _by_width(steps: Sequence[OneStep]) -> list[tuple[float, list[int]]]:
+    """Every width of some steps, with the indices of those that have it."""
     return [
-        some
-        for some in [*at_once, *over]
-        if all(
-            of_error.are_apart([some.at_mm, other.at_mm], (some.width + other.width) / 2.0) for other in rest
-        )
-    ] or [step]
+        (width, [index for index, step in enumerate(steps) if step.width == width])
+        for width in dict.fromkeys(step.width for step in steps)
+    ]
 
 
 def _columns(of_error: StepsSeen, steps: Sequence[OneStep]) -> Array:
-    """The columns (M, k) of steps."""
-    return np.column_stack([of_error.columns([step.at_mm], step.width)[:, 0] for step in steps])
+    """The columns (M, k) of steps, those of one width made together."""
+    columns = np.empty((len(of_error.scene.residual), len(steps)))
+    for width, among in _by_width(steps):
+        columns[:, among] = of_error.columns([steps[index].at_mm for index in among], width)
+    return columns
 
 
 def _left_with_each(
