@@ -417,10 +417,11 @@ def find_changes(
     ]
     pieces = [(a, b) for a, b in pairwise(bounds) if b > a]
     level = false_alarm / (len(pieces) * len(values))
-    if (trials + 1) * level * (1.0 - OF_PLATEAUS) < 1.0:
+    of_change = level if cycle is None else level * (1.0 - OF_PLATEAUS)
+    if (trials + 1) * of_change < 1.0:
         raise DataError(
             f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
-            f"{int(np.ceil(1.0 / level)) - 1}."
+            f"{int(np.ceil(1.0 / of_change)) - 1}."
         )
     day = None if days is None else label_groups(days, len(t))[1]
     parts = []

@@ -25,14 +25,14 @@ def names(found):
         ("EB0C@run_time", {}),
         ("stem:gravity", {"targets": ("3",)}),
         # Of their kinds the labelled campaigns and other tests have one each.
-        pytest.param("artefact:expansion@run_time", {}, marks=pytest.mark.slow),
+        pytest.param("artefact:expansion@run_time", {}, marks=pytest.mark.all_seeds),
         pytest.param("EZC:const@gravity", {"direction": (1.0, 0.5, 0.2)}, marks=pytest.mark.slow),
-        pytest.param("EXX:poly2", {}, marks=pytest.mark.slow),
-        pytest.param("EBZ:poly3", {}, marks=pytest.mark.slow),
-        pytest.param("EXC:harmonic3", {"direction": (0.3, 1.0)}, marks=pytest.mark.slow),
+        pytest.param("EXX:poly2", {}, marks=pytest.mark.all_seeds),
+        pytest.param("EBZ:poly3", {}, marks=pytest.mark.all_seeds),
+        pytest.param("EXC:harmonic3", {"direction": (0.3, 1.0)}, marks=pytest.mark.all_seeds),
         pytest.param("EZC1:const@warmup", {"tau_s": 6000.0}, marks=pytest.mark.slow),
         pytest.param("EZC1:const@x_axis_degC", {}, marks=pytest.mark.slow),
-        pytest.param("EAY:poly2", {}, marks=pytest.mark.slow),
+        pytest.param("EAY:poly2", {}, marks=pytest.mark.all_seeds),
     ],
 )
 def test_a_hidden_effect_leads_or_stands_in_the_leading_group(virtual_campaigns, explained, effect, options):
@@ -68,7 +68,7 @@ def test_three_effects_are_found_one_after_the_other_and_the_error_falls(virtual
     assert answer.missing[-1].held_out_after == pytest.approx(1e-3, rel=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_growth_of_the_artefact_is_not_told_as_that_of_two_axes(virtual_campaigns, explained):
     sim = simulator()
     hidden = [
@@ -117,10 +117,10 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
             marks=pytest.mark.slow,
         ),
         pytest.param({"cold": True, "noise_um": 0.7}, marks=pytest.mark.slow),
-        pytest.param({"days": 1, "runs_per_day": 2}, marks=pytest.mark.slow),
+        pytest.param({"days": 1, "runs_per_day": 2}, marks=pytest.mark.all_seeds),
         pytest.param({"days": 3, "runs_per_day": 1}, marks=pytest.mark.slow),
         pytest.param({"noise_um": 0.5, "stated_um": 1.0}, marks=pytest.mark.all_seeds),
-        pytest.param({"stated_um": 1 / 1.2}, marks=pytest.mark.slow),
+        pytest.param({"stated_um": 1 / 1.2}, marks=pytest.mark.all_seeds),
         pytest.param({"with_channels": False}, marks=pytest.mark.all_seeds),
         pytest.param(
             {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50)},

@@ -52,7 +52,7 @@ def test_spindle_growth_with_its_time_constant(example):
     within_the_floor(found)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     answer = example("hidden-b-indexing")
     nothing_else(answer)
@@ -66,7 +66,7 @@ def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     within_the_floor(found)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_reversal_of_x_is_half_the_reversal_error(example):
     answer = example("hidden-reversal-x")
     nothing_else(answer)

@@ -97,7 +97,7 @@ def test_hidden_effects_of_8_um_are_found(trial, effect):
     ("lobes", "beside"),
     [
         (3, None),
-        pytest.param(2, "ECC:harmonic1", marks=pytest.mark.slow),
+        pytest.param(2, "ECC:harmonic1", marks=pytest.mark.all_seeds),
         pytest.param(3, "ECC:harmonic1", marks=pytest.mark.all_seeds),
     ],
 )

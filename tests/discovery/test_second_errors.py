@@ -35,7 +35,7 @@ def _of_two(virtual_campaigns: ModuleType, seed: int) -> tuple[Explanation, Any]
     return explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1)), campaign
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_beside_a_right_effect_an_unknown_shape_is_not_told_as_several_others(
     virtual_campaigns: ModuleType, seeds: Any
 ) -> None:

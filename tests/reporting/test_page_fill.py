@@ -23,8 +23,8 @@ first_page = load("first_page_records", Path(__file__).with_name("test_first_pag
 Make = Callable[..., CertificateRecord]
 #: Heads and feet stand in the margins, in points.
 HEAD, FOOT = 48.0, 45.0
-#: Certificates (parameters, maps, language) that `make test` lays out; `make slow` all others.
-QUICK = {(1, 0, "en"), (13, 0, "de")}
+#: Certificates (parameters, maps, language) that `make test` lays out; `make slow` the others, and of the longest one.
+QUICK, LONGEST = {(1, 0, "en"), (13, 0, "de")}, (149, 1, "de")
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,15 @@ def with_budget(result: ResultSet, lines: int = 2) -> ResultSet:
     return replace(result, budget=Budget(HoldsFor.DAY, tuple(each), days, (), reference))
 
 
+def _mark(count: int, maps: int, language: str) -> tuple[pytest.MarkDecorator, ...]:
+    if (count, maps, language) in QUICK:
+        return ()
+    is_slow = count < LONGEST[0] or (count, maps, language) == LONGEST
+    return (pytest.mark.slow if is_slow else pytest.mark.all_seeds,)
+
+
 EVERY = [
-    pytest.param(count, maps, language, marks=() if (count, maps, language) in QUICK else pytest.mark.slow)
+    pytest.param(count, maps, language, marks=_mark(count, maps, language))
     for count in (1, 13, 51, 149)
     for maps in (0, 1)
     for language in ("en", "de")

@@ -43,6 +43,8 @@ MACHINES = [
     ("w b X Y Z t", ""),
     ("w X Y Z b t", ""),
 ]
+#: Those of `make slow`: a head and a table, two tables, no rotary axis; `make trials` has the others.
+IN_SLOW = {("w C b X Y Z B t", "CB"), ("w C A Y b X Z t", "CA"), ("w b X Y Z t", "")}
 
 
 def _measured(folder: Path, machine: SerialMachine, axes: str, added: tuple[str, ...] = ()) -> Measured:
@@ -118,7 +120,13 @@ class Measured:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("word", "axes"), MACHINES)
+@pytest.mark.parametrize(
+    ("word", "axes"),
+    [
+        pytest.param(*machine, marks=() if machine in IN_SLOW else pytest.mark.all_seeds)
+        for machine in MACHINES
+    ],
+)
 def test_what_moves_the_tool_beyond_u_is_named(tmp_path: Path, word: str, axes: str) -> None:
     """No error is silent, and what is named moves the tool as much as it is said to."""
     named_errors = {

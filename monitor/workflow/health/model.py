@@ -32,14 +32,16 @@ def model_health(
     comparison = explanation.comparison
     left_out = tuple(each.run for each in explanation.runs_left_out or ())
     compared = [start for run, start in span.starts.items() if run not in left_out]
+    # The days of all of them where none of these was compared.
+    days = compared or list(span.starts.values())
     return ModelHealth(
         campaign=comparison.campaign,
         runs=RunsNamed(
             comparison.campaign,
             len(compared),
             span.later,
-            min(compared),
-            max(compared),
+            min(days),
+            max(days),
             left_out,
         ),
         model=comparison.model,

@@ -21,8 +21,9 @@ from monitor.effects import ChainEffect
 from monitor.effects.shapes import Step
 from monitor.records import Array
 
-# Each of several steps is sought over a width of its own beside the others, so often, at so many places about it.
-TURNS, PLACES_ABOUT = 2, 33
+# Each of several steps is sought over a width of its own beside the others, so often, at so many places about it, and
+# at so many about the best of these over widths near its own.
+TURNS, PLACES_ABOUT, PLACES_NEAR = 2, 17, 9
 # Longer ways are tried in place of each step, as parts of the shortest that is no step: three gaps between positions.
 LONGER_WAYS = (1.0, 1.41, 2.0, 2.83, 4.0)
 # What is left that differs by less than this part is the same.
@@ -55,35 +56,61 @@ def at_widths_of_their_own(
     best = list(steps)
     for _, index in product(range(TURNS), range(len(steps))):
         rest = best[:index] + best[index + 1 :]
-        able = _about(of_error, steps[index], rest)
-        remaining = _left_with_each(of_error, able, rest, others)
-        alike = [able[some] for some in np.flatnonzero(remaining <= remaining.min() * (1.0 + ALIKE))]
-        # A way between two positions is a step at once.
-        alike = [step for step in alike if step.width == alike[0].width]
-        best[index] = alike[len(alike) // 2]
+        about = _able(of_error, _about(of_error, steps[index]), rest) or [steps[index]]
+        step = _likeliest(of_error, about, rest, others)
+        near = _able(of_error, _near(of_error, step, steps[index]), rest)
+        best[index] = _likeliest(of_error, [step, *near], rest, others) if near else step
     before, after = ({step.width for step in some if step.width} for some in (steps, best))
     price = of_error.price(max(len(after) - len(before), 1), others)
     return best if _cost(of_error, best, others) + price < _cost(of_error, steps, others) else list(steps)
 
 
-def _about(of_error: StepsSeen, step: OneStep, rest: Sequence[OneStep]) -> list[OneStep]:
-    """The steps about one, at once and over any width, that may be beside the rest; itself where none may."""
+def _likeliest(
+    of_error: StepsSeen, able: Sequence[OneStep], rest: Sequence[OneStep], others: Sequence[ChainCandidate]
+) -> OneStep:
+    """The one of some steps that says most beside the rest; the middle one of several that say as much."""
+    remaining = _left_with_each(of_error, able, rest, others)
+    least = remaining.min() * (1.0 + ALIKE)
+    alike = [step for step, square in zip(able, remaining, strict=True) if square <= least]
+    # A way between two positions is a step at once.
+    alike = [step for step in alike if step.width == alike[0].width]
+    return alike[len(alike) // 2]
+
+
+def _reach(of_error: StepsSeen, step: OneStep) -> float:
+    """How far in mm from a step its place is sought over other widths."""
     travel = float(of_error.positions[-1, 1] - of_error.positions[0, 0])
-    reach = max(step.width, LEAST_REGION * travel) + float(np.diff(of_error.middles_of_positions).max())
+    return max(step.width, LEAST_REGION * travel) + float(np.diff(of_error.middles_of_positions).max())
+
+
+def _about(of_error: StepsSeen, step: OneStep) -> list[OneStep]:
+    """The steps about one, at once and over the widths that are tried of all."""
+    reach = _reach(of_error, step)
     at_once = [OneStep(float(at), 0.0) for at in of_error.middles if abs(at - step.at_mm) <= reach]
-    near = np.round(step.at_mm + np.linspace(-reach, reach, PLACES_ABOUT), 2).tolist()
-    widths = sorted(
-        {float(f"{width * part:.3g}") for width in of_error.widths for part in NEAR_WIDTHS if width}
-    )
-    over = [OneStep(at, width) for width in widths for at in near if of_error.are_inside([at], width)]
-    able = [*at_once, *over]
-    apart = np.ones(len(able), dtype=bool)
-    for width, among in _by_width(able):
-        at = np.array([able[index].at_mm for index in among])
+    places = np.round(step.at_mm + np.linspace(-reach, reach, PLACES_ABOUT), 2).tolist()
+    return [*at_once, *(OneStep(at, width) for width in of_error.widths if width for at in places)]
+
+
+def _near(of_error: StepsSeen, step: OneStep, first: OneStep) -> list[OneStep]:
+    """The steps near one of those about the first, over widths near its own; none of one at once."""
+    reach = 2.0 * _reach(of_error, first) / (PLACES_ABOUT - 1)
+    places = np.round(step.at_mm + np.linspace(-reach, reach, PLACES_NEAR), 2).tolist()
+    widths = [float(f"{step.width * part:.3g}") for part in NEAR_WIDTHS] if step.width else []
+    return [OneStep(at, width) for width in widths for at in places]
+
+
+def _able(of_error: StepsSeen, steps: Sequence[OneStep], rest: Sequence[OneStep]) -> list[OneStep]:
+    """Those of some steps that may be beside the rest."""
+    able = []
+    for width, among in _by_width(steps):
+        at = np.array([steps[index].at_mm for index in among])
+        first, last = of_error.ends(width)
+        may = (first <= at) & (at <= last)
         for other in rest:
             pairs = np.column_stack([at, np.full(len(at), other.at_mm)])
-            apart[among] &= of_error.are_apart(pairs, (width + other.width) / 2.0)
-    return [able[index] for index in np.flatnonzero(apart)] or [step]
+            may &= of_error.are_apart(pairs, (width + other.width) / 2.0)
+        able += [steps[among[index]] for index in np.flatnonzero(may)]
+    return able
 
 
 def _by_width(steps: Sequence[OneStep]) -> list[tuple[float, list[int]]]:
