@@ -417,8 +417,7 @@ def find_changes(
     ]
     pieces = [(a, b) for a, b in pairwise(bounds) if b > a]
     level = false_alarm / (len(pieces) * len(values))
-    of_change = level if cycle is None else level * (1.0 - OF_PLATEAUS)
-    if (trials + 1) * of_change < 1.0:
+    if (trials + 1) * (of_change := level if cycle is None else level * (1.0 - OF_PLATEAUS)) < 1.0:
         raise DataError(
             f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
             f"{int(np.ceil(1.0 / of_change)) - 1}."
