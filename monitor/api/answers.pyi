@@ -20,6 +20,7 @@ from monitor.reporting.budget import Unchecked
 from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
+from monitor.reporting.health.answers import Answer
 from monitor.reporting.health.comparison import ResidualAgainst
 from monitor.reporting.health.comparison import ResidualMap
 from monitor.reporting.health.records import FleetRow
@@ -420,6 +421,8 @@ class TypedReportAnswer(Answer[ReportAnswer]):
     def refused_imports(self) -> tuple[RefusedImport, ...]: ...
     @property
     def message(self) -> Said: ...
+    @property
+    def answers(self) -> tuple[Answer, ...]: ...
     @property
     def files(self) -> tuple[str, ...]: ...
     @property

@@ -42,8 +42,10 @@ NAMED_BLIND_SPOTS = 6
 
 
 def show(answer: ExplainAnswer) -> None:
-    """Print an explanation."""
+    """Print an explanation: the finding in sentences first, because whoever reads one line has to read that."""
     explanation = answer.explanation
+    output.say(explanation.answer)
+    residual_output.summary(explanation.comparison)
     if isinstance(explanation, MachineExplanation):
         _machine(explanation)
     else:
@@ -53,13 +55,8 @@ def show(answer: ExplainAnswer) -> None:
 
 def _machine(explanation: MachineExplanation) -> None:
     if explanation.likely_mistakes:
-        output.say(explanation.answer)
-        residual_output.summary(explanation.comparison)
         return
-    comes_first = explanation.work_points_elsewhere is not None
-    if comes_first:
-        output.say(explanation.answer)
-    residual_output.summary(explanation.comparison)
+    _remaining(explanation)
     output.say()
     if explanation.against_others is not None:
         against_others(explanation.against_others)
@@ -70,9 +67,6 @@ def _machine(explanation: MachineExplanation) -> None:
         _bad_probing(reading, explanation.target_word)
     for reading in explanation.recurring_data:
         _recurring_probing(reading, explanation.target_word)
-    if not comes_first:
-        output.say(explanation.answer)
-    _remaining(explanation)
     _next_step(explanation)
     for alias in explanation.taken_for_machine:
         output.say(_alias(alias, explanation.comparison.campaign))
@@ -119,14 +113,12 @@ def _remaining(explanation: MachineExplanation) -> None:
 
 
 def _curve(explanation: CurveExplanation) -> None:
-    residual_output.summary(explanation.comparison)
     output.say()
     for effect in explanation.missing:
         _curve_effect(effect, explanation.comparison.unit)
         _advice(effect, "rows")
     for reading in explanation.suspect_data:
         _bad_row(reading, explanation.comparison.unit)
-    output.say(explanation.answer)
     _next_step(explanation, f" --campaign {explanation.comparison.campaign}")
 
 

@@ -109,6 +109,8 @@ def run(options: Namespace) -> int:
 
 
 def _say(answer: ReportAnswer) -> None:
+    for each in answer.answers:
+        output.say(f"{each.question} {each.sentence}")
     output.table(
         f"week {answer.week}, {answer.from_} to {answer.to}",
         ["machine", "state", "what changed", "since", "P(out)", "next check"],

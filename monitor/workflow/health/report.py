@@ -19,6 +19,7 @@ from typing import BinaryIO
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
+from monitor.reporting.health.answers import answers
 from monitor.reporting.health.attention import Looked, attention, look_at
 from monitor.reporting.health.records import (
     ALARMS,
@@ -240,6 +241,7 @@ def _answer(fleet: Fleet, week: Week, files: list[str], looks: WeeklyNotices) ->
         alarms=tuple(row.machine for row in fleet.rows if row.state in ALARMS),
         refused_imports=fleet.refused_imports,
         message="" if measured else NothingMeasured(week.name, week.first, week.last),
+        answers=answers(fleet),
         files=tuple(files),
         weekly_looks=looks,
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
+from monitor.reporting.health.answers import Answer
 from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.engines import check_workers
@@ -52,6 +53,7 @@ class ReportRequest:
 class ReportAnswer:
     """The machines by urgency, those that raise an alarm, and the files written.
 
+    ``answers`` are the questions of the first page with a sentence each, such as which machine is the worst.
     ``weekly_looks`` are the notices of the week, as if the fleet had been looked at every week.
     """
 
@@ -64,6 +66,7 @@ class ReportAnswer:
     alarms: tuple[str, ...]
     refused_imports: tuple[RefusedImport, ...]
     message: Said
+    answers: tuple[Answer, ...]
     files: tuple[str, ...]
     weekly_looks: WeeklyNotices
     mailed_to: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
