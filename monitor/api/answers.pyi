@@ -20,7 +20,7 @@ from monitor.reporting.budget import Unchecked
 from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.certificate.model_effect import Outside
 from monitor.reporting.covariance_source import CovarianceSource
-from monitor.reporting.health.answers import Answer
+from monitor.reporting.health.answers import AnsweredQuestion
 from monitor.reporting.health.comparison import ResidualAgainst
 from monitor.reporting.health.comparison import ResidualMap
 from monitor.reporting.health.records import FleetRow
@@ -422,7 +422,7 @@ class TypedReportAnswer(Answer[ReportAnswer]):
     @property
     def message(self) -> Said: ...
     @property
-    def answers(self) -> tuple[Answer, ...]: ...
+    def answers(self) -> tuple[AnsweredQuestion, ...]: ...
     @property
     def files(self) -> tuple[str, ...]: ...
     @property

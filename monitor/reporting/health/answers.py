@@ -63,7 +63,7 @@ _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a cha
 
 
 @dataclass(frozen=True)
-class Answer:
+class AnsweredQuestion:
     """A question, its ``kind`` (the same in every report) and the sentence that answers it."""
 
     kind: str
@@ -71,18 +71,18 @@ class Answer:
     sentence: str
 
 
-def answers(fleet: Fleet) -> tuple[Answer, ...]:
+def answers(fleet: Fleet) -> tuple[AnsweredQuestion, ...]:
     """Return the answers of a week in the order in which they are asked."""
     worst = next((health for health in fleet.attention if health.state in URGENT), None)
     return (
-        Answer("worst", "Worst machine?", _worst(fleet)),
-        Answer("why", "Why?", _quiet(fleet) if worst is None else reason(worst)),
-        Answer("since", "Since when?", "Nothing to date." if worst is None else _since(worst)),
-        Answer(
+        AnsweredQuestion("worst", "Worst machine?", _worst(fleet)),
+        AnsweredQuestion("why", "Why?", _quiet(fleet) if worst is None else reason(worst)),
+        AnsweredQuestion("since", "Since when?", "Nothing to date." if worst is None else _since(worst)),
+        AnsweredQuestion(
             "do", "What to do?", _with_due(_keep_on(fleet) if worst is None else to_do(worst), fleet.rows)
         ),
-        Answer("fine", "What is fine?", _fine(fleet.rows)),
-        Answer("unjudged", "Not judged?", _unjudged(fleet)),
+        AnsweredQuestion("fine", "What is fine?", _fine(fleet.rows)),
+        AnsweredQuestion("unjudged", "Not judged?", _unjudged(fleet)),
     )
 
 

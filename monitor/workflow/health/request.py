@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor.documents import OMITTED, Said, named
 from monitor.exceptions import InputError
-from monitor.reporting.health.answers import Answer
+from monitor.reporting.health.answers import AnsweredQuestion
 from monitor.reporting.health.records import FleetRow, RefusedImport
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.engines import check_workers
@@ -66,7 +66,7 @@ class ReportAnswer:
     alarms: tuple[str, ...]
     refused_imports: tuple[RefusedImport, ...]
     message: Said
-    answers: tuple[Answer, ...]
+    answers: tuple[AnsweredQuestion, ...]
     files: tuple[str, ...]
     weekly_looks: WeeklyNotices
     mailed_to: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
