@@ -35,6 +35,7 @@ GROUND = {
     "formula_cells",
     "group_sums",
     "moments",
+    "approach",
     "toml_text",
     "topology_text",
     "row_files",

@@ -76,7 +76,8 @@ class Context:
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
     (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
     scale shapes and drivers where these probings are only planned or a part of them, None where these are it;
-    ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were
+    ``approach`` (n, J) is the sign of the move that ended at a row where the readings say so and positions do not, else
+    0; ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were
     brought to a target; ``part_of`` are the probings of the campaign of which these are the rows ``rows`` (n,), in runs
     that may have other numbers; None where these are all of them.
     """
@@ -95,6 +96,7 @@ class Context:
     sight: Array | None = None
     instruments: InstrumentRows | None = None
     stretch: npt.NDArray[np.int64] | None = None
+    approach: npt.NDArray[np.int64] | None = None
     measured: Context | None = None
     resting: frozenset[str] = frozenset()
     stops_are_stated: bool = False
@@ -186,7 +188,7 @@ class Context:
         """Sign (n, J) of every axis's last travel; before an axis has moved in a run, that of its position.
 
         The controller references every axis at zero, so a first position is reached from there. Moves are counted from
-        the end of the last one; a move that is too small leaves the sign as it was.
+        the end of the last one; a move that is too small leaves the sign as it was, unless the row was approached anew.
         """
         turning = np.array([joint.turns for joint in self.chain.joints], dtype=bool)
         places = self.places
@@ -203,6 +205,8 @@ class Context:
                 moved = np.abs(places[row] - ended) > smallest
                 last = np.where(moved, np.sign(places[row] - ended), last)
                 ended = np.where(moved, places[row], ended)
+                if self.approach is not None:
+                    last = np.where(self.approach[row] != 0, self.approach[row], last)
                 signs[row] = last
         return signs
 

@@ -131,4 +131,5 @@ def _commanded(geometric: GeometricErrors, positions: Array, inside: bool) -> Co
         target=np.concatenate([old.target, np.repeat(old.target[:1], count)]),
         nominal=np.concatenate([old.nominal, np.zeros((count, 3))]),
         columns=columns,
+        approach=None if old.approach is None else np.concatenate([old.approach, np.zeros(pairs.shape, int)]),
     )

@@ -9,7 +9,8 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.statistics.standards.circles import circles
-from monitor.statistics.standards.positioning import directions_of_approach, positioning
+from monitor.approach import directions_of_approach
+from monitor.statistics.standards.positioning import positioning
 
 NOISE, GAIN = 0.4, 1e-3
 

@@ -31,7 +31,7 @@ from monitor.discovery.search.scene import family_count
 from monitor.effects import Basis, ChainEffect, ParsedEffect
 from monitor.effects.drivers import Always
 from monitor.effects.joint_error import JointError
-from monitor.effects.shapes import Poly
+from monitor.effects.shapes import Lag, Poly
 from monitor.exceptions import EffectError
 from monitor.machine import MOTION
 from monitor.methods.chain.shared_effects import largest_coefficient
@@ -59,7 +59,7 @@ class ChainCandidate(Candidate[MachineEffect]):
 
     @property
     def behind(self) -> float:
-        """By how much its score stands behind that of the drive's error which does the same at these poses."""
+        """By how much its score stands behind that of a commoner cause which does the same at these poses: the drive's error, a play."""
         return BEHIND * _less_common(self.effect)
 
     @property
@@ -183,12 +183,14 @@ class ChainScene:
 
 def _less_common(effect: MachineEffect) -> int:
     """How much less common a cause an error motion is than that of the drive of its axis, 0: a displacement across it
-    (1), a tilt (2); 0 for all others."""
+    (1), a tilt (2); 0 for all others. What lags in proportion to the last move is less common than any play (3): between
+    moves of one length the two are one."""
     if not isinstance(effect, ChainEffect) or effect.term.stage != MOTION:
         return 0
+    lags = 3 if isinstance(effect.shape, Lag) else 0
     if JointError(effect.term, effect.joint).is_of_drive:
-        return 0
-    return 2 if effect.term.is_rotation else 1
+        return lags
+    return lags + (2 if effect.term.is_rotation else 1)
 
 
 def _is_power(candidate: ChainCandidate) -> bool:

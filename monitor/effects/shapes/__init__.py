@@ -10,6 +10,7 @@ from monitor.effects.shapes.cyclic import Cyclic
 from monitor.effects.shapes.formula import FormulaShape
 from monitor.effects.shapes.harmonic import Harmonic
 from monitor.effects.shapes.harmonics import Harmonics, harmonics_text
+from monitor.effects.shapes.lag import Lag
 from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
 from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
@@ -28,6 +29,7 @@ __all__ = [
     "FormulaShape",
     "Harmonic",
     "Harmonics",
+    "Lag",
     "Nodes",
     "Poly",
     "Reversal",

@@ -91,7 +91,7 @@ def wound_up(context: Context, joint: int, width: float) -> Array:
 
     Position and ``width`` are in mm, in rad of a rotary axis. The play operator of hysteresis: what is dragged stands
     still until one side of the play touches. Every run starts in the middle, with the axis at zero (Visintin,
-    Differential Models of Hysteresis, 1994, III.2).
+    Differential Models of Hysteresis, 1994, III.2); a row that was approached anew has gone through the play.
     """
     half = width / 2.0
     ahead = np.zeros(len(context))
@@ -100,6 +100,8 @@ def wound_up(context: Context, joint: int, width: float) -> Array:
         dragged = 0.0
         for row, at in zip(rows.tolist(), position[rows].tolist(), strict=True):
             dragged = min(max(dragged, at - half), at + half)
+            if context.approach is not None and context.approach[row, joint]:
+                dragged = at - context.approach[row, joint] * half
             ahead[row] = (at - dragged) / half
     return ahead
 

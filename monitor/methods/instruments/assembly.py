@@ -27,6 +27,7 @@ from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.point import Point
 from monitor.methods.model import Model, chain_of
+from monitor.methods.instruments.turned_beyond import turned_beyond
 from monitor.records import Array, Campaign, Setup
 from monitor.sources import SCALE
 
@@ -58,6 +59,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     context = replace(context, sight=_sight(setups, number), nominal=_places(context, parts))
     context = replace(context, instruments=_instrument_rows(context, parts))
+    context = replace(context, approach=turned_beyond(context, parts))
     absent = _absent(context, added)
     problem = InstrumentProblem(
         context=context,

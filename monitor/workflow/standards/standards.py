@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.approach import ONE_TARGET, ONE_TARGET_RAD
 from monitor.documents import Said
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.methods import campaign_method
@@ -48,9 +49,6 @@ from monitor.workflow.standards.paths_and_parts import (
     part_files,
 )
 from monitor.workflow.standards.request import StandardsRequest
-
-#: Positions within so much are one target, in mm and rad: readings of one programmed position.
-ONE_TARGET, ONE_TARGET_RAD = 0.05, 1e-4
 
 
 def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:

@@ -75,6 +75,7 @@ def _anywhere(context: Context, strokes: Mapping[str, tuple[float, float]]) -> C
         sight=None,
         instruments=None,
         stretch=None,
+        approach=None,
         measured=context,
     )
 

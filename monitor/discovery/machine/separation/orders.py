@@ -6,6 +6,8 @@ axes reverse together. The reversed order needs no other pose, target or stylus.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -62,7 +64,7 @@ def _back_order(context: Context) -> npt.NDArray[np.int64]:
 
 def _rows(fit: Fit, effects: tuple[MachineEffect, ...], order: npt.NDArray[np.int64]) -> PlanRows:
     """Whitened rows (N, p) of the first run, its effects as they are where the poses are come to in an ``order``."""
-    context = fit.problem.context.taken(order)
+    context = replace(fit.problem.context.taken(order), approach=None)
     white = np.where(fit.has_weight, 1.0 / fit.problem.sigma, 0.0)[..., None]
     columns = []
     for effect in effects:
