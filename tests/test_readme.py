@@ -132,9 +132,7 @@ def run_here(language: str, source: str, folder: Path) -> tuple[int, str]:
             patch.setenv(name, reader_environment()[name])
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             status = (
-                run_script(source)
-                if language == "python"
-                else main(shlex.split(source, comments=True)[1:])
+                run_script(source) if language == "python" else main(shlex.split(source, comments=True)[1:])
             )
     return status, printed.getvalue()
 
@@ -255,7 +253,7 @@ def test_a_script_runs_in_this_process_as_in_one_of_its_own(tmp_path: Path) -> N
         try_out(written, tmp_path, in_shell=in_shell)
         (tmp_path / "x").unlink()
         for source in ("raise SystemExit(3)", "1 / 0"):
-            with pytest.raises(AssertionError, match="ended with status [13], not 0"):
+            with pytest.raises(AssertionError, match=r"ended with status [13], not 0"):
                 try_out(Example(1, "python", source, ""), tmp_path, in_shell=in_shell)
 
 

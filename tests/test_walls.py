@@ -215,9 +215,10 @@ def test_house_every_library_that_is_imported_is_declared() -> None:
         for path in PACKAGE.rglob("*.py")
         for _, name in imported(path, PACKAGE)
     }
-    assert sorted(
-        each for each in libraries if each[0] not in provided | sys.stdlib_module_names | {"monitor"}
-    ) == []
+    assert (
+        sorted(each for each in libraries if each[0] not in provided | sys.stdlib_module_names | {"monitor"})
+        == []
+    )
 
 
 def modules(package: Path) -> dict[str, Path]:

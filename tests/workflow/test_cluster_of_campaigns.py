@@ -15,8 +15,8 @@ from by_path import TESTS, load
 
 from monitor.cli import main
 from monitor.exceptions import InputError
-from monitor.records import Campaign
 from monitor.readers import read_campaign
+from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportRequest
