@@ -30,6 +30,7 @@ MADE = datetime(2026, 3, 9, 8)
 STORED = (
     "SELECT * EXCLUDE (computed_at) FROM identification ORDER BY ALL",
     "SELECT * FROM identified_run ORDER BY ALL",
+    "SELECT * FROM identified_values ORDER BY ALL",
     "SELECT * FROM residual ORDER BY ALL",
     "SELECT * EXCLUDE (computed_at) FROM analysis ORDER BY ALL",
 )
