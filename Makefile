@@ -129,10 +129,12 @@ challenge: setup  ## campaigns with sealed truth, answered by ours and four othe
 wheel: setup  ## build the wheel and run the whole suite against it (as long as make test); wheel-parts is the quick one
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)
 
-# What a wheel can lack: files of the package (test_wheel compares them one by one), so migrations, templates, fonts and
-# pages; what is imported and not declared; the command. Each is met here once; what the code does, make test has shown.
-WHEEL_PARTS := tests/test_wheel.py tests/cli/test_json.py tests/cli/test_certificates.py tests/cli/test_usage.py \
-	tests/store/test_migrations.py tests/reporting/test_render.py tests/reporting/test_dcc.py tests/web
+# What a wheel can lack: files of the package, so migrations, templates, fonts and pages (make test compares them one by
+# one: tests/test_wheel.py); what is imported and not declared (tests/test_walls.py, late imports too); the command. Each
+# is met here once in the installed wheel; what the code does, make test has shown.
+WHEEL_PARTS := tests/test_wheel.py tests/cli/test_certificates.py tests/cli/test_usage.py tests/store/test_migrations.py \
+	tests/reporting/test_dcc.py tests/reporting/test_render.py::test_templates_and_fonts_with_their_licence_are_found \
+	tests/web/test_layout.py tests/web/test_safety.py tests/web/test_pages.py
 wheel-parts: setup  ## build the wheel and run the tests of what a wheel can lack
 	@$(RUN) tests/setup/installed_wheel.py $(WHEEL_PARTS) $(PARALLEL) $(ARGS)
 

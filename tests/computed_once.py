@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 #: Folders and files of tests in which equal questions are computed once.
-FOLDERS = ("api", "cli", "web", "workflow", "test_readme.py")
+FOLDERS = ("api", "cli", "manual", "web", "workflow", "test_readme.py")
 
 #: The functions, each by the modules' names for it that are replaced.
 LAYOUT = ("monitor.reporting.pdf.render.pdf_of", "monitor.reporting.health.render.pdf_of")

@@ -6,7 +6,8 @@
 - Fenced ``python`` blocks are run as scripts.
 
 All run in document order in one folder that holds a copy of ``examples/``, as a reader would do it. The first command
-is typed into a shell; what only calls ``monitor`` after it runs in this process, which saves a second of loading each.
+is typed into a shell; what only calls ``monitor`` after it, and scripts, run in this process, which saves a second of
+loading each and what was computed before. ``make demo`` of continuous integration is the demo in a process of its own.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,8 +109,20 @@ def run_in_shell(example: Example, source: str, folder: Path) -> tuple[int, str]
     return done.returncode, done.stdout
 
 
-def run_here(source: str, folder: Path) -> tuple[int, str]:
-    """Run a command of ``monitor`` in this process; its exit status and what it prints."""
+def run_script(source: str) -> int:
+    """Run a script in this process; its exit status."""
+    try:
+        exec(compile(source, "<example>", "exec"), {"__name__": "__main__"})
+    except SystemExit as ended:
+        return int(ended.code or 0)
+    except Exception:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def run_here(language: str, source: str, folder: Path) -> tuple[int, str]:
+    """Run a script or a command of ``monitor`` in this process; its exit status and what it prints."""
     printed = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -117,23 +131,29 @@ def run_here(source: str, folder: Path) -> tuple[int, str]:
         for name in ("COLUMNS", "NO_COLOR", "TERM"):
             patch.setenv(name, reader_environment()[name])
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-            status = main(shlex.split(source, comments=True)[1:])
+            status = (
+                run_script(source) if language == "python" else main(shlex.split(source, comments=True)[1:])
+            )
     return status, printed.getvalue()
 
 
 def try_out(example: Example, folder: Path, *, in_shell: bool = True) -> str:
     """Run one example in ``folder`` and return what it prints (nothing where it is not run).
 
-    Without ``in_shell`` a command of ``monitor`` that needs no shell runs in this process. Raises AssertionError where
-    it ends or prints otherwise than the README says.
+    Without ``in_shell`` a script, or a command of ``monitor`` that needs no shell, runs in this process. Raises
+    AssertionError where it ends or prints otherwise than the README says.
     """
     source = MAKE.get(example.source, example.source)
     if example.language == "console" and source.startswith(NOT_RUN):
         return ""
     wanted = re.search(r"# exit status (\d+)$", source)
-    plain = source.startswith("monitor ") and not re.search(r"[|&;<>$`*?~]", source)
+    plain = example.language == "python" or (
+        source.startswith("monitor ") and not re.search(r"[|&;<>$`*?~]", source)
+    )
     status, printed = (
-        run_here(source, folder) if plain and not in_shell else run_in_shell(example, source, folder)
+        run_here(example.language, source, folder)
+        if plain and not in_shell
+        else run_in_shell(example, source, folder)
     )
     line = f"README line {example.line}: {source}\n"
     expected = int(wanted[1]) if wanted else 0
@@ -166,7 +186,7 @@ def test_readme_examples_do_what_it_says(folder: Path) -> None:
 def test_the_demo_does_the_main_job_and_prints_what_the_readme_shows(folder: Path) -> None:
     typed = examples(README.read_text(encoding="utf-8"))
     (example,) = (example for example in typed if example.source == "make demo")
-    demo = try_out(example, folder)
+    demo = try_out(example, folder, in_shell=False)
     assert "five-days: imported, 20 runs, 1240 probings\n" in demo
     assert "U = k_q u" in demo
     step = next(line for line in demo.splitlines() if line.startswith("EB0C ") and "< 0.0001" in line)
@@ -183,7 +203,7 @@ def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
     typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))
     assert len(typed) == 3
-    printed = [try_out(example, tmp_path) for example in typed]
+    printed = [try_out(example, tmp_path, in_shell=example == typed[-1]) for example in typed]
     assert "EZC1:const@warmup" in printed[0]
     assert "EC0A" in printed[2]
     assert (tmp_path / "figures/missing-effects.svg").is_file()
@@ -225,6 +245,16 @@ def test_examples_are_read_with_their_lines() -> None:
 def test_example_that_holds(tmp_path: Path, source: str, shown: str) -> None:
     try_out(Example(1, "console", source, shown), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_script_runs_in_this_process_as_in_one_of_its_own(tmp_path: Path) -> None:
+    written = Example(1, "python", "from pathlib import Path\nPath('x').touch()\nprint(__name__)", "__main__")
+    for in_shell in (True, False):
+        try_out(written, tmp_path, in_shell=in_shell)
+        (tmp_path / "x").unlink()
+        for source in ("raise SystemExit(3)", "1 / 0"):
+            with pytest.raises(AssertionError, match=r"ended with status [13], not 0"):
+                try_out(Example(1, "python", source, ""), tmp_path, in_shell=in_shell)
 
 
 @pytest.mark.parametrize(

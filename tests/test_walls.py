@@ -6,9 +6,13 @@ Imports inside functions and under ``TYPE_CHECKING`` count too: a wall with a do
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import re
+import sys
+import tomllib
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -172,6 +176,50 @@ def breaches(package: Path) -> list[str]:
 
 def test_house_every_import_goes_down_or_to_the_ground() -> None:
     assert breaches(PACKAGE) == []
+
+
+def named(requirement: str) -> tuple[str, frozenset[str]]:
+    """The distribution that a requirement names, as in PEP 503, and the extras that it asks for."""
+    name, extras = re.match(r"([\w.-]+)\s*(?:\[(.*?)\])?", requirement).groups()  # type: ignore[union-attr]
+    return re.sub(r"[-_.]+", "-", name).lower(), frozenset(re.findall(r"[\w-]+", extras or ""))
+
+
+def installed_with(requirements: list[str]) -> set[str]:
+    """The distributions that these need, with all that those need in turn."""
+    known: set[tuple[str, frozenset[str]]] = set()
+    left = {named(requirement) for requirement in requirements}
+    while left:
+        known.add(each := left.pop())
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            for need in metadata.requires(each[0]) or []:
+                extra = re.search(r"extra == ['\"]([\w-]+)", need)
+                if extra is None or extra[1] in each[1]:
+                    left |= {named(need)} - known
+    return {name for name, _ in known}
+
+
+@pytest.mark.skipif(not (PACKAGE.parent / "pyproject.toml").is_file(), reason="reads pyproject.toml")
+def test_house_every_library_that_is_imported_is_declared() -> None:
+    """Where a function alone imports it too: a wheel without it would fail there, and only there."""
+    project = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    for_users = set(extras) - {"release", "fuzz", "challenge", "manual", "dev"}
+    declared = [*project["dependencies"], *(need for extra in sorted(for_users) for need in extras[extra])]
+    there = installed_with(declared)
+    provided = {
+        module
+        for module, names in metadata.packages_distributions().items()
+        if there & {named(name)[0] for name in names}
+    }
+    libraries = {
+        (name.partition(".")[0], str(path.relative_to(PACKAGE.parent)))
+        for path in PACKAGE.rglob("*.py")
+        for _, name in imported(path, PACKAGE)
+    }
+    assert (
+        sorted(each for each in libraries if each[0] not in provided | sys.stdlib_module_names | {"monitor"})
+        == []
+    )
 
 
 def modules(package: Path) -> dict[str, Path]:

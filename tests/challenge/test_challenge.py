@@ -104,7 +104,9 @@ def test_the_peak_of_the_challenge_is_the_products_where_no_straight_line_takes_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("example", ["hidden-reversal-x", "hidden-b-indexing"])
+@pytest.mark.parametrize(
+    "example", ["hidden-reversal-x", pytest.param("hidden-b-indexing", marks=pytest.mark.all_seeds)]
+)
 def test_the_peak_that_explain_tells_is_that_of_the_challenge(example: str) -> None:
     campaign = read_campaign(EXAMPLES / example)
     explanation = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))

@@ -88,13 +88,20 @@ def _copied(killed: Path, folder: Path) -> Path:
     return path
 
 
-#: Those that read the tables, views and files in ways of their own; the others have their turn in ``make slow``.
-QUICK = ("campaigns", "trend", "verify", "backup")
+#: Those that read the tables, views and files in ways of their own; some have their turn in ``make slow``, the others,
+#: which read as one of these does, in ``make trials``.
+QUICK, SLOW = ("campaigns", "trend", "verify", "backup"), ("runs", "fleet", "certificate", "export")
+
+
+def _turn(verb: str) -> tuple[pytest.MarkDecorator, ...]:
+    if verb in QUICK:
+        return ()
+    return (pytest.mark.slow if verb in SLOW else pytest.mark.all_seeds,)
 
 
 @pytest.mark.parametrize(
     "verb",
-    [pytest.param(verb, marks=() if verb[0] in QUICK else pytest.mark.slow) for verb in READING],
+    [pytest.param(verb, marks=_turn(verb[0])) for verb in READING],
     ids=lambda verb: " ".join(verb[:2]),
 )
 def test_no_campaign_is_lost_whichever_verb_comes_first_after_a_kill(

@@ -182,6 +182,13 @@ def page(found: dict[str, Told]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def draw(found: dict[str, Told], folder: Path) -> None:
+    """Draw the pictures of the page."""
+    for name, told in found.items():
+        if told.figure is not None:
+            (folder / f"real-{name}.png").write_bytes(png(told.figure, DPI))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--check", action="store_true")
@@ -193,9 +200,7 @@ def main() -> int:
         print("docs/real-data.md is up to date" if same else "docs/real-data.md is not what comes out now")
         return 0 if same else 1
     PAGE.write_text(text, encoding="utf-8")
-    for name, told in found.items():
-        if told.figure is not None:
-            (IMAGES / f"real-{name}.png").write_bytes(png(told.figure, DPI))
+    draw(found, IMAGES)
     print(PAGE)
     return 0
 

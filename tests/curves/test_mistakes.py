@@ -38,7 +38,7 @@ def daily(seed: int, unit: str) -> CurveCampaign:
 
 
 @pytest.mark.parametrize("unit", ["h", ""])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.all_seeds) for seed in (1, 2))])
 @pytest.mark.slow
 def test_a_drift_and_a_cycle_that_hide_each_other_are_both_found(seed: int, unit: str) -> None:
     campaign = daily(seed, unit)

@@ -184,6 +184,13 @@ def test_the_page_holds_what_comes_out_now(script: Any, told: dict[str, Any]) ->
     assert script.PAGE.read_text(encoding="utf-8") == script.page(told)
 
 
+@pytest.mark.slow
+def test_every_picture_of_the_page_is_drawn(script: Any, told: dict[str, Any], tmp_path: Path) -> None:
+    script.draw(told, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {f"real-{name}.png" for name in script.DRAWN}
+    assert all(path.stat().st_size > 10_000 for path in tmp_path.iterdir())
+
+
 def test_every_picture_of_the_page_is_there(script: Any) -> None:
     if not script.PAGE.exists():
         pytest.skip("the wheel is tested away from the checkout's docs")

@@ -11,18 +11,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
-
-WAYS = {"Z": (0.0, 0.0, 1.0), "X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0)}
-LASER = """
-[[setups]]
-id = "laser"
-reading = "displacement"
-instrument = "laser"
-standard_uncertainty_um = 0.5
-tool_point_mm = [0.0, 0.0, 0.0]
-direction = "X"
-"""
+from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, laser
 
 
 def laser_along_x(
@@ -39,7 +28,7 @@ def laser_along_x(
                 {"run": run, "setup": "laser", "X": x, "Y": 0.0, "Z": 0.0, "reading_um": round(reading, 2)}
             )
     days = [f"2026-03-{day:02d}T20:00:00+00:00" for day in range(2, 2 + len(runs))]
-    campaign = read_campaign(chain.write(folder, LASER, rows, started=days))
+    campaign = read_campaign(chain.write(folder, laser(), rows, started=days))
     assert isinstance(campaign, Campaign)
     return campaign, campaign_method(campaign).problem_of(campaign)
 

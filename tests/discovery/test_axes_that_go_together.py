@@ -22,9 +22,8 @@ from monitor.effects import ChainEffect, parse_effect
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.records import SecondSetup
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 LENGTH, STROKES = 200.0, dict.fromkeys("XYZ", (-600.0, 600.0))
 BALL = """
 [[setups]]

@@ -14,9 +14,8 @@ from monitor.discovery import explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from monitor.workflow.explain.machine_answer import machine_explanation
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TOOL = [0.0, 0.0, -120.0]
 CENTRE = {"X": 250.0, "Y": 200.0, "Z": 320.0}
 PITCH = 25e-6

@@ -12,10 +12,9 @@ import pytest
 from monitor.discovery import Explanation, explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 from tests.simulator.parts_on_a_cmm import CHAIN, SETUP
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TIP = np.array([0.0, 0.0, -150.0])
 TRACKER = """
 [[setups]]

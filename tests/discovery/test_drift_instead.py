@@ -60,7 +60,7 @@ def test_a_drift_with_the_time_is_that_of_no_spindle_alone() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("drift", [8e-3, 3e-3])
+@pytest.mark.parametrize("drift", [pytest.param(8e-3, marks=pytest.mark.all_seeds), 3e-3])
 def test_a_drift_of_a_table_is_told_as_that(tmp_path: Path, drift: float) -> None:
     problem = touched(tmp_path, drift=drift).problem
     answer = explain(read_campaign(tmp_path), problem, "rotary-probing", rng=np.random.default_rng(1))

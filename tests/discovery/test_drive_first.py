@@ -19,18 +19,7 @@ from monitor.discovery.search.scan import ScanResult, findings_of
 from monitor.effects import parse_effect
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
-
-WAYS = {"Z": (0.0, 0.0, 1.0), "X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0)}
-LASER = """
-[[setups]]
-id = "laser"
-reading = "displacement"
-instrument = "laser"
-standard_uncertainty_um = 0.5
-tool_point_mm = [0.0, 0.0, -150.0]
-direction = "X"
-"""
+from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, laser
 
 
 def scene_with(folder: Path, heights: float, seed: int) -> ChainScene:
@@ -47,7 +36,7 @@ def scene_with(folder: Path, heights: float, seed: int) -> ChainScene:
             seen = 1e3 * float((chain.pose(at) @ [0.0, 0.0, -150.0, 1.0])[0]) + rng.normal(0.0, 0.5)
             rows.append({"run": run, "setup": "laser", "reading_um": round(seen, 3)} | at)
     days = [f"2026-03-{day:02d}T20:00:00+00:00" for day in (2, 3, 4)]
-    campaign = read_campaign(chain.write(folder, LASER, rows, started=days))
+    campaign = read_campaign(chain.write(folder, laser(tool=(0.0, 0.0, -150.0)), rows, started=days))
     fitted = fit(campaign_method(campaign).problem_of(campaign).for_search())
     texts = ("EXX:poly2", "EBX:poly2")
     return scene_of(

@@ -130,7 +130,13 @@ def test_parts_that_say_something_together_alone_are_found():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("curve", [dying_away(0.5), wound_up(0.41)], ids=["exponential", "play"])
+@pytest.mark.parametrize(
+    "curve",
+    [
+        pytest.param(dying_away(0.5), id="exponential"),
+        pytest.param(wound_up(0.41), id="play", marks=pytest.mark.all_seeds),
+    ],
+)
 def test_a_head_that_is_wound_up_has_one_effect(virtual_campaigns, curve):
     """Before, a reversal and a wind-up of another width, or these and a wave."""
     hidden = [simulator().Effect("EBB:curve", peak_um=8.0, curve=curve)]

@@ -82,10 +82,7 @@ def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
 
 @pytest.mark.parametrize(
     "effect",
-    [
-        "ECC:harmonic1",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("EZZ:poly2", "EAC:harmonic2")),
-    ],
+    ["ECC:harmonic1", "EZZ:poly2", pytest.param("EAC:harmonic2", marks=pytest.mark.all_seeds)],
 )
 @pytest.mark.slow
 def test_hidden_effects_of_8_um_are_found(trial, effect):

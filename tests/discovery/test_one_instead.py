@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from monitor.discovery import Explanation, explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 from tests.simulator.parts_on_a_cmm import SETUP
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 VECTOR = ("dx_um", "dy_um", "dz_um")
 BALL = """
 [[setups]]

@@ -31,7 +31,9 @@ def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, m
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("machine", ["fork head", "one rotary table"])
+@pytest.mark.parametrize(
+    "machine", ["fork head", pytest.param("one rotary table", marks=pytest.mark.all_seeds)]
+)
 def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
     sim = simulator()
     hidden = ("EXX:reversal", "EZZ:poly2" if machine == "one rotary table" else "EYX:poly3")

@@ -63,7 +63,8 @@ def test_one_ball_that_comes_loose_is_no_slip_of_the_piece(virtual_campaigns):
     "effect",
     [
         "EX0C@run_time",
-        *(pytest.param(of, marks=pytest.mark.slow) for of in ("EXX:poly1@warmup", "EZC1:const@warmup")),
+        "EZC1:const@warmup",
+        pytest.param("EXX:poly1@warmup", marks=pytest.mark.all_seeds),
     ],
 )
 @pytest.mark.slow

@@ -115,7 +115,10 @@ def test_where_nothing_is_hidden_no_step_is_worth_its_price(virtual_campaigns):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("size", "companion"), [(3.0, "EXX:reversal"), (8.0, "EXX:poly2")])
+@pytest.mark.parametrize(
+    ("size", "companion"),
+    [pytest.param(3.0, "EXX:reversal", marks=pytest.mark.all_seeds), (8.0, "EXX:poly2")],
+)
 def test_a_step_is_told_beside_another_effect_of_its_error(virtual_campaigns, explained, size, companion):
     """A free shape, or a table with cycles, was told in place of both."""
     hidden = simulator().Effect("EXX:curve", peak_um=8.0, curve=step)

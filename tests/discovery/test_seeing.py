@@ -94,7 +94,9 @@ def test_neighbours_are_compared_in_the_frame_in_which_they_are_alike(tmp_path, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pole", [np.array([0.0, 0.0, 1.0]), -DOWN])
+@pytest.mark.parametrize(
+    "pole", [np.array([0.0, 0.0, 1.0]), pytest.param(-DOWN, marks=pytest.mark.all_seeds)]
+)
 def test_seeing_that_follows_itself_is_no_drift_of_the_mount(tmp_path, pole):
     """Of 30 nights with noise along the axes 9 had a false drift (EB0DEC@run_time, ECDEC:const@run_time)."""
     for seed in range(12):

@@ -41,7 +41,8 @@ def trial():
     "family",
     [
         "X times B",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("play over 40 mm", "fifth harmonic of C")),
+        "fifth harmonic of C",
+        pytest.param("play over 40 mm", marks=pytest.mark.all_seeds),
     ],
 )
 @pytest.mark.slow
@@ -192,9 +193,9 @@ def test_a_bump_that_another_error_mimics_in_part_is_the_error_of_its_axis(
 @pytest.mark.parametrize(
     ("family", "seed"),
     [
-        pytest.param("joint of two rails", 300, marks=pytest.mark.slow),
+        ("joint of two rails", 300),
         ("wear bump", 302),
-        pytest.param("step in a scale", 301, marks=pytest.mark.slow),
+        pytest.param("step in a scale", 301, marks=pytest.mark.all_seeds),
     ],
 )
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def test_damaged_inputs_are_taken_or_refused_in_words(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", fuzz.TARGETS)
 def test_many_damaged_inputs_are_taken_or_refused_in_words(name: str) -> None:
-    @settings(max_examples=400, derandomize=True, **QUIET)
+    @settings(max_examples=150, derandomize=True, **QUIET)
     @given(st.data())
     def each(data: st.DataObject) -> None:
         damage(data, name)

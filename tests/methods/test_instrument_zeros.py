@@ -13,9 +13,8 @@ import numpy as np
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 GAINS = {"X": -11e-6, "Y": 24e-6, "Z": -20e-6}
 TOOL = np.array([0.0, 0.0, -120.0])
 LASERS, EDGES = (

@@ -33,11 +33,10 @@ from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain, small
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z, small
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARCSECOND = np.pi / 648000.0
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MMT = ("mount-mmt-2021-08", "mount-mmt-2023-07", "mount-mmt-2023-09", "mount-mmt-2025-03")
 GEM = "mount-gem-28"
 FLEXURE, REFRACTION = "flexure:tool@gravity", "sight:up:formula(1/tan(elevation))"

@@ -15,9 +15,8 @@ import pytest
 
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TOOL, CENTRE = np.array([0.0, 0.0, -120.0]), np.array([20.0, -10.0, 5.0])
 #: How far sphere and bar stand off where they were stated, mm.
 OFF = np.array([0.02, 0.01, -0.03])

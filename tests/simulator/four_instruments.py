@@ -15,9 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, X, Y, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TOOL = np.array([0.0, 0.0, -120.0])
 #: What is hidden, rad/mm, and what is true of the machine in mm and rad: the parameters that are identified.
 PITCH = 40e-9

@@ -22,6 +22,32 @@ method = "instruments"
 id = "{name}"
 gravity = {gravity}
 """
+#: Directions of three linear axes, and the axes with theirs as they stand on each other in the usual chain.
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+WAYS = {"Z": Z, "X": X, "Y": Y}
+POINT = (0.0, 0.0, 0.0)
+LASER = """
+[[setups]]
+id = "{id}"
+reading = "displacement"
+instrument = "laser"
+standard_uncertainty_um = {u_um}
+tool_point_mm = {tool}
+work_point_mm = {work}
+direction = "{along}"
+"""
+
+
+def laser(
+    along: str = "X",
+    tool: Sequence[float] = POINT,
+    work: Sequence[float] = POINT,
+    *,
+    u_um: float = 0.5,
+    name: str = "laser",
+) -> str:
+    """The lines of a setup: a laser between two points in mm, along an axis."""
+    return LASER.format(id=name, u_um=u_um, tool=list(tool), work=list(work), along=along)
 
 
 @dataclass(frozen=True)

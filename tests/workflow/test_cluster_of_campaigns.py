@@ -11,14 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from by_path import TESTS, load
 
 from monitor.cli import main
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
+from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportRequest
 from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
+
+first_runs = load("first_runs", TESTS / "first_runs.py").first_runs
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime(2026, 3, 9, 8)
@@ -26,14 +30,17 @@ MADE = datetime(2026, 3, 9, 8)
 STORED = (
     "SELECT * EXCLUDE (computed_at) FROM identification ORDER BY ALL",
     "SELECT * FROM identified_run ORDER BY ALL",
+    "SELECT * FROM identified_values ORDER BY ALL",
     "SELECT * FROM residual ORDER BY ALL",
     "SELECT * EXCLUDE (computed_at) FROM analysis ORDER BY ALL",
 )
 
 
 def fleet(path: Path, machines: int) -> Database:
-    """A database with a campaign of each of so many machines, none identified."""
+    """A database with a campaign of nine runs of each of so many machines, none identified."""
     campaign = read_campaign(EXAMPLES / "cold-cold")
+    assert isinstance(campaign, Campaign)
+    campaign = first_runs(campaign, 9)
     db = Database(path, threads=1)
     for number in range(machines):
         machine = replace(campaign.machine, id=f"M{number}")

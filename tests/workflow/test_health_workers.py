@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -16,11 +16,12 @@ import pytest
 from by_path import TESTS, load
 
 from monitor.exceptions import InputError
+from monitor.readers import read_campaign
 from monitor.records import AuditAnchor
-from monitor.store import Database, verify_audit
-from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.store import Database, import_campaign, verify_audit
 
 answers = load("answers", TESTS / "answers.py")
+first_runs = load("first_runs", TESTS / "first_runs.py").first_runs
 report = answers.report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -30,7 +31,7 @@ STOPPED = "monitor: stopped; what was not finished was not stored\n"
 
 @pytest.fixture
 def fleet(tmp_path: Path, thorough: bool) -> Path:
-    """Three machines: one lacks an effect, one was measured only in February, one has nothing to report.
+    """Three machines of eight runs: one lacks an effect, one was measured only in February, one has nothing to report.
 
     In ``make test`` the second and another of its kind, for which nothing is searched.
     """
@@ -38,12 +39,9 @@ def fleet(tmp_path: Path, thorough: bool) -> Path:
     examples = ("hidden-b-indexing", "cold-cold", "nothing-hidden") if thorough else ("cold-cold", "hot-cold")
     with Database(path, threads=1) as db:
         for example in examples:
-            folder = tmp_path / example
-            shutil.copytree(EXAMPLES / example, folder)
-            file = folder / "campaign.toml"
-            text = re.sub('campaign = ".*?"', f'campaign = "{example}"', file.read_text("utf-8"), count=1)
-            file.write_text(text.replace('id = "HU40-T"', f'id = "on {example}"', 1), "utf-8")
-            import_folders(db, ImportRequest([folder]))
+            campaign = first_runs(read_campaign(EXAMPLES / example), 8)
+            machine = replace(campaign.machine, id=f"on {example}")
+            import_campaign(db, replace(campaign, name=example, machine=machine))
     return path
 
 

@@ -14,10 +14,9 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.workflow.explain.measurements import _Search
 from monitor.workflow.explain.ties import Tie, TieBreak
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, laser
 
 TOOL = (0.0, 0.0, -80.0)
-WAYS = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -33,16 +32,13 @@ class _Missing:
 def lathe(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """Lasers there and back along Z, X and Y, which stand on each other in this order, with a tool of one length: a
     tilt of X moves the tip like a displacement, wherever it stands."""
-    axes = tuple(SimulatedAxis(name, "linear", WAYS[name]) for name in "ZXY")
+    axes = tuple(SimulatedAxis(name, "linear", way) for name, way in WAYS.items())
     chain = SimulatedChain(axes, work=(SimulatedAxis("C", "rotary", WAYS["Z"], sign=-1),))
     rng, text, rows = np.random.default_rng(4), "", []
-    for name in WAYS:
-        text += (
-            f'\n[[setups]]\nid = "laser-{name}"\nreading = "displacement"\ninstrument = "laser"\n'
-            f'standard_uncertainty_um = 0.3\ntool_point_mm = {list(TOOL)}\ndirection = "{name}"\n'
-        )
+    for name in "XYZ":
+        text += laser(name, TOOL, u_um=0.3, name=f"laser-{name}")
         for place in [*range(0, 401, 50), *range(400, -1, -50)]:
-            readings = {**dict.fromkeys((*WAYS, "C"), 0.0), name: float(place)}
+            readings = {**dict.fromkeys("XYZC", 0.0), name: float(place)}
             rows.append(
                 {"setup": f"laser-{name}", **readings, "reading_um": 1e3 * place + rng.normal(0.0, 0.3)}
             )

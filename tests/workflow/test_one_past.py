@@ -215,7 +215,7 @@ def _touched_at(db: Database, degrees: np.ndarray) -> None:
         ("touches", 40),
         ("one run without", 70),
         *(
-            pytest.param(source, weeks, marks=pytest.mark.slow)
+            pytest.param(source, weeks, marks=pytest.mark.all_seeds)
             for source, weeks in (
                 ("runs", 40),
                 ("runs", 70),

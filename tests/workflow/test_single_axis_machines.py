@@ -16,6 +16,7 @@ from monitor.discovery import explain
 from monitor.exceptions import DataError
 from monitor.methods.instruments.method import METHOD
 from monitor.readers import read_campaign
+from tests.simulator.instruments import laser
 
 NEST = """
 [[setups]]
@@ -26,16 +27,6 @@ instrument = "sensor nest"
 standard_uncertainty_um = 0.5
 tool_point_mm = [0.0, 0.0, {height}.0]
 work_point_mm = [0.0, 0.0, {height}.0]
-"""
-LASER = """
-[[setups]]
-id = "laser"
-reading = "displacement"
-instrument = "laser"
-standard_uncertainty_um = 0.5
-tool_point_mm = [0.0, 0.0, 0.0]
-work_point_mm = [0.0, 0.0, 0.0]
-direction = "X"
 """
 AXIS = """
 [[machine.{branch}_chain]]
@@ -55,7 +46,7 @@ def written(folder: Path, branch: str, kind: str) -> Path:
     axis = {"name": "C", "motion": "about", "along": "[0.0, 0.0, 1.0]"}
     if not turns:
         axis = {"name": "X", "motion": "along", "along": "[1.0, 0.0, 0.0]"}
-    setups = "".join(NEST.format(height=height) for height in (60, 210)) if turns else LASER
+    setups = "".join(NEST.format(height=height) for height in (60, 210)) if turns else laser()
     folder.mkdir()
     (folder / "campaign.toml").write_text(
         f'format = 1\ncampaign = "{folder.name}"\nmethod = "instruments"\n[machine]\nid = "M"\n'
