@@ -77,9 +77,9 @@ class Context:
     (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
     scale shapes and drivers where these probings are only planned or a part of them, None where these are it;
     ``approach`` (n, J) is the sign of the move that ended at a row where the readings say so and positions do not, else
-    0; ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that were
-    brought to a target; ``part_of`` are the probings of the campaign of which these are the rows ``rows`` (n,), in runs
-    that may have other numbers; None where these are all of them.
+    0; ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that
+    were brought to a target; ``part_of`` are the probings of the campaign of which these are the rows ``rows`` (n,), in
+    runs that may have other numbers; None where these are all of them.
     """
 
     chain: Chain

@@ -20,18 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from monitor.discovery import explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from tests.simulator.instruments import SimulatedAxis, SimulatedChain
+from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, laser
 
-WAYS = {"Z": (0.0, 0.0, 1.0), "X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0)}
-LASER = """
-[[setups]]
-id = "laser"
-reading = "displacement"
-instrument = "laser"
-standard_uncertainty_um = 0.5
-tool_point_mm = [0.0, 0.0, 0.0]
-direction = "X"
-"""
 TARGETS = np.linspace(0.0, 750.0, 31)
 #: Ways in mm beyond an end before the second reading there, and before the first target.
 TURNS = {"beyond both ends": (5.0, 5.0), "beyond the far end": (5.0, 0.0), "waits": (0.0, 0.0)}
@@ -63,7 +53,9 @@ def deviations(
         of_run = []
         for at, is_read in way(*turn, passes):
             if width is not None and at != before:
-                side = float(np.sign(at - before) if not width else np.clip(side + 2.0 * (at - before) / width, -1, 1))
+                side = float(
+                    np.sign(at - before) if not width else np.clip(side + 2.0 * (at - before) / width, -1, 1)
+                )
             before = at
             if is_read:
                 noise = rng.standard_t(3) / np.sqrt(3.0) if heavy else rng.normal()
@@ -81,7 +73,7 @@ def told(runs: list[list[tuple[float, float]]], folder: Path) -> str:
         for x, off in of_run
     ]
     days = [f"2026-03-{day:02d}T20:00:00+00:00" for day in range(2, 2 + len(runs))]
-    campaign = read_campaign(chain.write(folder / "laser", LASER, rows, started=days))
+    campaign = read_campaign(chain.write(folder / "laser", laser(), rows, started=days))
     problem = campaign_method(campaign).problem_of(campaign)
     missing = explain(campaign, problem, "instruments", rng=np.random.default_rng(1)).missing
     return " + ".join(each.effect for each in missing) or "nothing"

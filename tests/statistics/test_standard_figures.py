@@ -7,9 +7,9 @@ import statistics
 import numpy as np
 import pytest
 
+from monitor.approach import directions_of_approach
 from monitor.exceptions import InputError
 from monitor.statistics.standards.circles import circles
-from monitor.approach import directions_of_approach
 from monitor.statistics.standards.positioning import positioning
 
 NOISE, GAIN = 0.4, 1e-3

@@ -59,7 +59,7 @@ class ChainCandidate(Candidate[MachineEffect]):
 
     @property
     def behind(self) -> float:
-        """By how much its score stands behind that of a commoner cause which does the same at these poses: the drive's error, a play."""
+        """By how much its score stands behind that of a commoner cause which does the same at these poses."""
         return BEHIND * _less_common(self.effect)
 
     @property
@@ -183,8 +183,8 @@ class ChainScene:
 
 def _less_common(effect: MachineEffect) -> int:
     """How much less common a cause an error motion is than that of the drive of its axis, 0: a displacement across it
-    (1), a tilt (2); 0 for all others. What lags in proportion to the last move is less common than any play (3): between
-    moves of one length the two are one."""
+    (1), a tilt (2); 0 for all others. What lags in proportion to the last move is less common than any play (3):
+    between moves of one length the two are one."""
     if not isinstance(effect, ChainEffect) or effect.term.stage != MOTION:
         return 0
     lags = 3 if isinstance(effect.shape, Lag) else 0

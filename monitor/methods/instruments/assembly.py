@@ -26,8 +26,8 @@ from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.point import Point
-from monitor.methods.model import Model, chain_of
 from monitor.methods.instruments.turned_beyond import turned_beyond
+from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign, Setup
 from monitor.sources import SCALE
 

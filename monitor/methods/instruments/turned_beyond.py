@@ -36,7 +36,9 @@ def turned_beyond(context: Context, parts: Sequence[Part]) -> npt.NDArray[np.int
         tried = [by_moves, *_as_standards_have_it(part, joint, by_moves)]
         left = _left_over(part, joint, deviation, np.array(tried).T)
         likeliest = int(np.argmin(left))
-        freedom = len(deviation) - len(np.unique(_targets(part, joint))) - 2 * len(np.unique(part.rows.run)) - 1
+        freedom = (
+            len(deviation) - len(np.unique(_targets(part, joint))) - 2 * len(np.unique(part.rows.run)) - 1
+        )
         if freedom > 0 and freedom * np.log(left[0] / left[likeliest]) > LIKELIER:
             approach[part.at, joint] = np.where(tried[likeliest] != by_moves, tried[likeliest], 0)
     return approach if approach.any() else None
@@ -54,7 +56,7 @@ def _axis_of(part: Part) -> int | None:
 def _ideal(context: Context, part: Part) -> Array:
     """What a machine without errors shows to an instrument (m,)."""
     assert context.instruments is not None
-    return context.instruments.ideal[part.at, 0]
+    return np.asarray(context.instruments.ideal[part.at, 0])
 
 
 def _targets(part: Part, joint: int) -> npt.NDArray[np.int64]:
