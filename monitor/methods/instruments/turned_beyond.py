@@ -21,6 +21,8 @@ from monitor.records import Array
 
 #: Twice the logarithm of the likelihood ratio by which the readings have to say that a test turned beyond its ends.
 LIKELIER = 12.0
+#: What is written of a reading in mm: exact readings leave nothing.
+ROUNDING = 1e-6
 
 
 def turned_beyond(context: Context, parts: Sequence[Part]) -> npt.NDArray[np.int64] | None:
@@ -34,12 +36,12 @@ def turned_beyond(context: Context, parts: Sequence[Part]) -> npt.NDArray[np.int
         by_moves = context.travel[part.at, joint]
         deviation = part.rows.measured[:, 0] - _ideal(context, part)
         tried = [by_moves, *_as_standards_have_it(part, joint, by_moves)]
-        left = _left_over(part, joint, deviation, np.array(tried).T)
-        likeliest = int(np.argmin(left))
+        remaining = _left_over(part, joint, deviation, np.array(tried).T) + len(deviation) * ROUNDING**2
+        likeliest = int(np.argmin(remaining))
         freedom = (
             len(deviation) - len(np.unique(_targets(part, joint))) - 2 * len(np.unique(part.rows.run)) - 1
         )
-        if freedom > 0 and freedom * np.log(left[0] / left[likeliest]) > LIKELIER:
+        if freedom > 0 and freedom * np.log(remaining[0] / remaining[likeliest]) > LIKELIER:
             approach[part.at, joint] = np.where(tried[likeliest] != by_moves, tried[likeliest], 0)
     return approach if approach.any() else None
 
