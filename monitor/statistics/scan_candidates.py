@@ -30,7 +30,9 @@ SEASON_FROM = 0.1
 FITTED_FROM: dict[Base, float] = {"constant": COVERED, "line": COVERED, "season": SEASON_FROM}
 
 
-def base_columns(times: Array, base: Base, cycle: float | None, fitted_from: float | None = None) -> list[Array]:
+def base_columns(
+    times: Array, base: Base, cycle: float | None, fitted_from: float | None = None
+) -> list[Array]:
     """Columns (n,) beside a change: level, line and wave, the wave from ``fitted_from`` of its period on, else that of
     the base."""
     line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)

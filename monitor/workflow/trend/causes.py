@@ -122,8 +122,6 @@ def _condition(
     apart = _apart(part, values, beside, drift)
     if apart is not None:
         coefficient, inside = apart
-        # One of the two is there: the smaller of two p-values.
-        p_value = min(2.0 * min(coefficient.p_value, inside.p_value), 1.0)
     inseparable = [
         other for other, recorded in channels.items() if other != name and _together(values, recorded[mask])
     ]
