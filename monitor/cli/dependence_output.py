@@ -52,8 +52,9 @@ def _of_parameter(name: str, parameter: ParameterTrend) -> Iterator[str]:
 def _condition(name: str, effect: ConditionEffect) -> str:
     inseparable = f"; not told from {', '.join(effect.moves_with)}" if effect.moves_with else ""
     stated = f"{output.with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}"
-    if effect.within_days is not None:
-        stated += f" from day to day, within days {output.with_u(effect.within_days, effect.u_within_days, effect.unit)}"
+    if effect.within_days is not None and effect.u_within_days is not None:
+        within = output.with_u(effect.within_days, effect.u_within_days, effect.unit)
+        stated += f" from day to day, within days {within}"
     return f"{name}: {stated}{inseparable}"
 
 

@@ -35,7 +35,6 @@ def test_days_and_the_runs_within_them_that_contradict_each_other_have_a_number_
     assert effect.interval[0] < 2.2 < effect.interval[1]
     assert effect.u < 0.1
     assert abs(effect.within_days) < 4.0 * effect.u_within_days < 1.0
-    assert effect.p_value < 1e-6
     words = _condition("EY0C", effect)
     assert "with ambient_degC from day to day, within days" in words
 
