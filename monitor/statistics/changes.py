@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_positive, as_vector, check_history
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.days.day_steps import day_step_p_value
 from monitor.statistics.groups import eras, interleaved_columns
@@ -424,7 +424,7 @@ def find_changes(
     level, or non-finite values.
     """
     t = as_vector(times, "times", least=FEWEST_RUNS)
-    _check(values, t, u or {}, false_alarm)
+    check_history(values, t, u or {}, false_alarm)
     bounds = [
         0,
         *np.unique(np.searchsorted(t, np.sort(as_vector(events, "events", least=0)))).tolist(),
@@ -448,18 +448,3 @@ def find_changes(
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)
-
-
-def _check(
-    values: Mapping[str, npt.ArrayLike], t: Array, u: Mapping[str, npt.ArrayLike], false_alarm: float
-) -> None:
-    if (np.diff(t) < 0.0).any():
-        raise DataError(
-            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
-        )
-    if not values:
-        raise DataError("values holds no parameter; at least one is needed.")
-    as_probability(false_alarm, "false_alarm")
-    unknown = sorted(set(u) - set(values))
-    if unknown:
-        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")

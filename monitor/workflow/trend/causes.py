@@ -117,11 +117,8 @@ def _condition(
         )  # fmt: skip
     except DataError:
         return None
-    coefficient, inside = fit.coefficients[0], None
-    p_value = coefficient.p_value
-    apart = _apart(part, values, beside, drift)
-    if apart is not None:
-        coefficient, inside = apart
+    p_value = fit.coefficients[0].p_value
+    coefficient, inside, u_inside = _apart(fit.coefficients[0], part, values, beside, drift)
     inseparable = [
         other for other, recorded in channels.items() if other != name and _together(values, recorded[mask])
     ]
@@ -133,18 +130,18 @@ def _condition(
     return ConditionEffect(
         name, coefficient.value, coefficient.u, (low, high), unit, number(p_value),
         len(values), float(values.min()), float(values.max()), tuple(inseparable), None, beside.why_not,
-        None if inside is None else inside.value, None if inside is None else inside.u,
+        inside, u_inside,
     )  # fmt: skip
 
 
 def _apart(
-    part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
-) -> tuple[Coefficient, Coefficient] | None:
-    """The coefficients of a condition between days and within them where they contradict each other beyond chance: a
-    machine follows the weather for days, not what a thermometer shows from one run to the next, or the other way round.
-    One coefficient would be their mean, weighted by how well the scatter of days and of runs tells each."""
+    one: Coefficient, part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
+) -> tuple[Coefficient, float | None, float | None]:
+    """The coefficient of a condition between days, and that within them with its u, where these contradict each other
+    beyond chance; else ``one`` for both. A machine may follow the weather for days, not what a thermometer shows from
+    one run to the next: one coefficient is a mean, weighted by how well days and runs tell each."""
     if not np.array_equal(beside.labels, part.days):
-        return None
+        return one, None, None
     u = part.weights()
     weight = np.ones_like(values) if u is None else 1.0 / u**2
     day = np.unique(part.days, return_inverse=True)[1]
@@ -152,22 +149,22 @@ def _apart(
     inside = values - of_day
     least = 1e-6 * np.ptp(values)
     if np.ptp(of_day) <= least or np.ptp(inside) <= least:
-        return None
+        return one, None, None
     try:
         fit = dependence(
             part.values, part.t, {"between": of_day, "within": inside}, drift=drift, u=u, days=part.days,
             beside=beside.columns,
         )  # fmt: skip
     except DataError:
-        return None
+        return one, None, None
     between, within = fit.coefficients
     variance = np.array([between.u, within.u]) ** 2
     if not variance.sum() > 0.0:
-        return None
+        return one, None, None
     # Welch and Satterthwaite: what days and runs tell of them is independent.
     dof = variance.sum() ** 2 / float((variance**2 / np.array([between.dof, within.dof])).sum())
     p = 2.0 * scipy.special.stdtr(dof, -abs(between.value - within.value) / np.sqrt(variance.sum()))
-    return (between, within) if p < CONTRADICT else None
+    return (between, within.value, within.u) if p < CONTRADICT else (one, None, None)
 
 
 def _together(a: Array, b: Array) -> bool:
