@@ -51,7 +51,11 @@ def _of_parameter(name: str, parameter: ParameterTrend) -> Iterator[str]:
 
 def _condition(name: str, effect: ConditionEffect) -> str:
     inseparable = f"; not told from {', '.join(effect.moves_with)}" if effect.moves_with else ""
-    return f"{name}: {output.with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}{inseparable}"
+    stated = f"{output.with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}"
+    if effect.within_days is not None and effect.u_within_days is not None:
+        within = output.with_u(effect.within_days, effect.u_within_days, effect.unit)
+        stated += f" from day to day, within days {within}"
+    return f"{name}: {stated}{inseparable}"
 
 
 def _cycle(name: str, wave: Cycle) -> str:

@@ -17,13 +17,13 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_positive, as_vector, check_history
 from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.days.day_steps import day_step_p_value
 from monitor.statistics.groups import eras, interleaved_columns
 from monitor.statistics.plateaus import FEWEST_IN_ALL, MOST_IN_ALL, Plateau, PlateauScanner
 from monitor.statistics.scan import Scan, Scanner
-from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
+from monitor.statistics.scan_candidates import EDGE, SEASON_FROM, Base, Kind, base_columns
 from monitor.statistics.sums import label_groups
 from monitor.statistics.when_changed import when
 
@@ -75,6 +75,9 @@ class _Series:
     day: npt.NDArray[np.intp] | None
     cycle: float | None = None
     group: npt.NDArray[np.intp] | None = None
+    #: Part of the cycle from which on a change has to show beside its wave, too; None for that of the base
+    #: (``base_columns``).
+    fitted_from: float | None = None
 
     @cached_property
     def beside(self) -> Array | None:
@@ -86,7 +89,7 @@ class _Series:
     def plan(self) -> tuple[object, ...]:
         """What series that share a search have in common."""
         plan = (self.t, self.u, self.day, self.beside)
-        return tuple(None if column is None else column.tobytes() for column in plan)
+        return (self.fitted_from, *(None if column is None else column.tobytes() for column in plan))
 
     @property
     def may_return(self) -> bool:
@@ -96,11 +99,8 @@ class _Series:
 
     def fitted(self, base: Base) -> Array:
         """What is fitted (n, k) beside a change."""
-        t = self.t
-        columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
-        return np.column_stack(
-            [*columns, wave_columns(t, self.cycle), *([] if self.beside is None else [self.beside])]
-        )
+        columns = base_columns(self.t, base, self.cycle, self.fitted_from)
+        return np.column_stack([*columns, *([] if self.beside is None else [self.beside])])
 
     @property
     def searched(self) -> bool:
@@ -113,8 +113,9 @@ class _Series:
         day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
         group = None if self.group is None else self.group[start:stop]
         return _Series(
-            self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day), self.cycle, group
-        )
+            self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day), self.cycle, group,
+            self.fitted_from,
+        )  # fmt: skip
 
 
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
@@ -152,7 +153,9 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
         between = (float(series.t[0]), float(series.t[-1]))
     else:
         same = np.array([kind == best.kind for kind in best.kinds])
-        between = when(series.t, best.positions[same], best.deviance[same], 3 if base == "constant" else 4)
+        # The change has a size and a place.
+        fitted = series.fitted(base).shape[1] + 2
+        between = when(series.t, best.positions[same], best.deviance[same], fitted)
     return Change(
         series.name,
         best.kind,
@@ -218,8 +221,8 @@ def _beside_groups(best: Scan, series: _Series) -> Scan:
 OF_PLATEAUS = 0.1
 
 
-def _ends(series: _Series, plateau: Plateau, base: Base, offset: int) -> list[Change]:
-    """Both steps of the plateau, each beside the other."""
+def _ends(series: _Series, plateau: Plateau, offset: int) -> list[Change]:
+    """Both steps of the plateau, each beside the other, a line and a wave: what the search had beside them."""
     runs = np.arange(len(series.y))
     kind: Kind = "step"
     steps: list[Change] = []
@@ -230,7 +233,7 @@ def _ends(series: _Series, plateau: Plateau, base: Base, offset: int) -> list[Ch
             kind, edge.at, plateau.p_value / OF_PLATEAUS, plateau.shape, plateau.root, column[:, 0],
             (kind,) * len(edge.places), edge.places, edge.deviance,
         )  # fmt: skip
-        steps.append(_change(_with_beside(series, beside), step, base, offset))
+        steps.append(_change(_with_beside(series, beside), step, "season", offset))
     return steps
 
 
@@ -252,7 +255,9 @@ class _Search:
     def scanner(self, series: _Series, base: Base) -> Scanner:
         key = (base, *series.plan)
         if key not in self._kept:
-            self._kept[key] = Scanner(series.t, series.u, base, series.day, series.cycle, series.beside)
+            self._kept[key] = Scanner(
+                series.t, series.u, base, series.day, series.cycle, series.beside, series.fitted_from
+            )
         return self._kept[key]
 
     def plateau_scanner(self, series: _Series) -> PlateauScanner:
@@ -285,6 +290,16 @@ class _Search:
         return {name for name, shown in zip(support, wide, strict=True) if shown}
 
     def scan(self, series: _Series, base: Base, level: float) -> Scan:
+        if series.fitted_from is None:
+            return self._scan(series, base, level)
+        # What is found has to be so beside a wave of any size as well; what such a wave could hide is not sought.
+        usual = self._scan(replace(series, fitted_from=None), base, level)
+        if usual.p_value > level:
+            return usual
+        beside_wave = self._scan(series, base, level)
+        return replace(beside_wave, p_value=max(usual.p_value, beside_wave.p_value))
+
+    def _scan(self, series: _Series, base: Base, level: float) -> Scan:
         many = series.day is not None and int(series.day.max()) + 1 >= DAYS_THAT_SHOW
         wide = many or series.name in self.wide
         best = self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
@@ -316,7 +331,7 @@ class _Search:
         whole, level = level, level * (1.0 - self.share_of_plateaus(series))
         best = self.scan(series, "constant", level)
         if best.p_value > level:
-            return self.plateau(series, "constant", offset, whole)
+            return self.plateau(series, offset, whole)
         base: Base = "constant"
         trends: list[Change] = []
         best = _beside_groups(best, series)
@@ -332,7 +347,7 @@ class _Search:
             base = "line"
             best = self.scan(series, base, level)
             if best.p_value > level:
-                steps, slopes = self.plateau(series, base, offset, whole)
+                steps, slopes = self.plateau(series, offset, whole)
                 return steps, trends + slopes
         change = _change(series, best, base, offset)
         if best.kind == "slope":
@@ -356,9 +371,7 @@ class _Search:
             trends += slopes
         return changes, trends
 
-    def plateau(
-        self, series: _Series, base: Base, offset: int, level: float
-    ) -> tuple[list[Change], list[Change]]:
+    def plateau(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
         """Return the steps of a plateau, and what is found between them; nothing where a single step explains nearly as
         much."""
         level_here = level * self.share_of_plateaus(series)
@@ -370,8 +383,10 @@ class _Search:
         # A coefficient and a place more must earn their keep (Schwarz's criterion).
         if best.p_value > level_here or best.gain < 2.0 * np.log(len(series.y)):
             return [], []
-        steps = _ends(series, best, base, offset)
-        changes, trends = self.between(series, [step.index - offset for step in steps], offset, level)
+        steps = _ends(series, best, offset)
+        # The wave that stood beside the plateau may look like a trend of a piece that covers less of it.
+        beside_wave = replace(series, fitted_from=SEASON_FROM)
+        changes, trends = self.between(beside_wave, [step.index - offset for step in steps], offset, level)
         return steps + changes, trends
 
 
@@ -409,7 +424,7 @@ def find_changes(
     level, or non-finite values.
     """
     t = as_vector(times, "times", least=FEWEST_RUNS)
-    _check(values, t, u or {}, false_alarm)
+    check_history(values, t, u or {}, false_alarm)
     bounds = [
         0,
         *np.unique(np.searchsorted(t, np.sort(as_vector(events, "events", least=0)))).tolist(),
@@ -433,18 +448,3 @@ def find_changes(
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)
-
-
-def _check(
-    values: Mapping[str, npt.ArrayLike], t: Array, u: Mapping[str, npt.ArrayLike], false_alarm: float
-) -> None:
-    if (np.diff(t) < 0.0).any():
-        raise DataError(
-            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
-        )
-    if not values:
-        raise DataError("values holds no parameter; at least one is needed.")
-    as_probability(false_alarm, "false_alarm")
-    unknown = sorted(set(u) - set(values))
-    if unknown:
-        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")

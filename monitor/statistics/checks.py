@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -71,3 +71,19 @@ def as_probability(value: float, name: str) -> float:
     if not 0.0 < value < 1.0:
         raise DataError(f"{name} is {value}; it must lie between 0 and 1, both excluded.")
     return float(value)
+
+
+def check_history(
+    values: Mapping[str, npt.ArrayLike], t: Array, u: Mapping[str, npt.ArrayLike], false_alarm: float
+) -> None:
+    """Refuse a history of parameters whose times fall, or that has none, or a ``u`` of another."""
+    if (np.diff(t) < 0.0).any():
+        raise DataError(
+            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
+        )
+    if not values:
+        raise DataError("values holds no parameter; at least one is needed.")
+    as_probability(false_alarm, "false_alarm")
+    unknown = sorted(set(u) - set(values))
+    if unknown:
+        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")

@@ -19,7 +19,7 @@ import scipy
 
 from monitor.records import Array
 from monitor.statistics.groups import independent_columns
-from monitor.statistics.scan_candidates import COVERED, EDGE, Base, Kind, candidates, wave_columns
+from monitor.statistics.scan_candidates import EDGE, SEASON_FROM, Base, Kind, base_columns, candidates
 from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 
 #: Correlations of neighbours of which the likelihood is computed.
@@ -48,10 +48,8 @@ AT_ONCE = 32_768
 TAILED, TAIL_FREEDOM, MANY, FREEDOM_OF_MANY = 1.5, 4.0, 80, 3.5
 #: Amplitude of a yearly wave that is allowed for where a history is too short to show it, in scatters of an innovation
 #: (of a run, where runs are independent): without it 20, 30 and 38 weeks with such a wave are called in 2 to 3, 16 and
-#: 28 % at 1 % (docs/trials-statistics.md). Over less than this part of the period it moves nothing.
-SEASON, SEASON_FROM = 1.0, 0.1
-#: Part of the period from which on a wave is fitted, by what stands beside a change.
-FITTED_FROM: dict[Base, float] = {"constant": COVERED, "line": COVERED, "season": SEASON_FROM}
+#: 28 % at 1 % (docs/trials-statistics.md).
+SEASON = 1.0
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,8 @@ class Scanner:
     """Everything of the search that does not depend on the values: prepared once for one plan.
 
     ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that
-    is no change: fitted where the history covers it (``wave_columns``), else one of ``SEASON`` is allowed for; beside
-    the base ``season`` it is fitted from ``SEASON_FROM`` of it on.
+    is no change: fitted where the history covers it (``base_columns``), else one of ``SEASON`` is allowed for; with
+    ``fitted_from`` it is fitted from that part of it on.
     ``beside`` (n, k) are columns of which every series may have any amount: what groups of runs are off by.
     """
 
@@ -129,20 +127,19 @@ class Scanner:
         days: npt.NDArray[np.intp] | None = None,
         cycle: float | None = None,
         beside: Array | None = None,
+        fitted_from: float | None = None,
     ) -> None:
         self.columns, self.kinds, self.positions = candidates(times, base)
         n = len(times)
         root = np.ones(n) if u is None else 1.0 / u
         self.root = root / np.sqrt(np.mean(root**2))
-        line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
-        columns = [np.ones(n)] if base == "constant" else [np.ones(n), line]
-        columns += [] if beside is None else list(beside.T)
-        basis = np.column_stack([*columns, wave_columns(times, cycle, FITTED_FROM[base])])
+        columns = base_columns(times, base, cycle, fitted_from)
+        is_covered = len(columns) > (1 if base == "constant" else 2)
+        basis = np.column_stack([*columns, *([] if beside is None else beside.T)])
         if beside is not None:
             basis = basis[:, independent_columns(self.root[:, np.newaxis] * basis)]
         self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]
         self.free = n - basis.shape[1]
-        is_covered = basis.shape[1] > len(columns)
         self._phase = None
         if cycle is not None and not is_covered and np.ptp(times) >= SEASON_FROM * cycle:
             self._phase = 2.0 * np.pi / cycle * times

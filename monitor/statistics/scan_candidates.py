@@ -24,9 +24,27 @@ ONE_RUN = 0.75
 
 #: A wave is no change where the history covers this share of its period, with so many runs.
 COVERED, FEWEST_OF_WAVE = 0.82, 12
+#: Over less than this part of the period a wave of the size of an innovation moves nothing.
+SEASON_FROM = 0.1
+#: Part of the period from which on a wave is fitted, by what stands beside a change.
+FITTED_FROM: dict[Base, float] = {"constant": COVERED, "line": COVERED, "season": SEASON_FROM}
 
 
-def wave_columns(times: Array, cycle: float | None, covered: float = COVERED) -> Array:
+def base_columns(
+    times: Array, base: Base, cycle: float | None, fitted_from: float | None = None
+) -> list[Array]:
+    """Columns (n,) beside a change: level, line and wave, the wave from ``fitted_from`` of its period on, else that of
+    the base."""
+    line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
+    covered = FITTED_FROM[base] if fitted_from is None else fitted_from
+    return [
+        np.ones(len(times)),
+        *([] if base == "constant" else [line]),
+        *_wave_columns(times, cycle, covered).T,
+    ]
+
+
+def _wave_columns(times: Array, cycle: float | None, covered: float) -> Array:
     """Cosine and sine (n, 2) of a wave of the period ``cycle``; none (n, 0) where the history covers less of it."""
     if cycle is None or len(times) < FEWEST_OF_WAVE or float(np.ptp(times)) < covered * cycle:
         return np.empty((len(times), 0))

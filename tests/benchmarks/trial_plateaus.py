@@ -2,7 +2,8 @@
 
 ``python tests/benchmarks/trial_plateaus.py [SERIES]`` prints the tables of docs/trials-statistics.md, paired: the same
 series, searched for one change alone and for plateaus as well, at 1 % a series. ``... machines [MACHINES]`` asks as
-``trend`` does: thirteen parameters share 1 %.
+``trend`` does: thirteen parameters share 1 %. ``... ends [SERIES]`` prints how far the sizes of both ends are off, in
+their u, beside a drift and a season.
 """
 
 from __future__ import annotations
@@ -154,8 +155,37 @@ def machines(count: int) -> None:
         print(f"| {kind} | {weeks} | {count} | {rate(cells[0])} | {rate(cells[1])} |", flush=True)
 
 
+def ends(count: int) -> None:
+    """Print how far the sizes of the ends of a plateau of 15 in weeks 10 to 20 of 30 are off, in their u."""
+    print("| beside | both found | mean, first | last | beyond 2 u, % | last | median u |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for row, (drift, season) in enumerate(((0.0, 0.0), (3.0, 0.0), (12.0, 0.0), (0.0, 1.0), (0.0, 3.0))):
+        rng = np.random.default_rng([SEED, 200 + row])
+        week = np.arange(30)
+        off, u = [], []
+        for _ in range(count):
+            wave = season * np.cos(2.0 * np.pi * 7.0 / YEAR * week + rng.uniform(0.0, 2.0 * np.pi))
+            y = rng.normal(size=30) + 15.0 * ((week >= 10) & (week < 20)) + drift * week / 30.0 + wave
+            history = changes.find_changes(
+                {"y": y}, 7.0 * week, rng=np.random.default_rng(1), cycle=YEAR, false_alarm=LEVEL
+            )
+            step = {change.index: change for change in history.changes if change.kind == "step"}
+            if {10, 20} <= set(step):
+                off.append([(step[10].size - 15.0) / step[10].u, (step[20].size + 15.0) / step[20].u])
+                u.append(step[10].u)
+        mean, far = np.mean(off, axis=0), 100.0 * np.mean(np.abs(off) > 2.0, axis=0)
+        print(
+            f"| drift of {drift:g}, season of {season:g} | {len(off)} of {count} | {mean[0]:.2f} | {mean[1]:.2f} | "
+            f"{far[0]:.0f} | {far[1]:.0f} | {np.median(u):.2f} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     arguments = sys.argv[1:]
+    if arguments[:1] == ["ends"]:
+        ends(int(arguments[1]) if len(arguments) > 1 else 100)
+        return
     if arguments[:1] == ["machines"]:
         machines(int(arguments[1]) if len(arguments) > 1 else 400)
         return

@@ -8,8 +8,8 @@ import pytest
 from monitor.statistics import find_changes
 from monitor.statistics.changes import _Search, _Series
 from monitor.statistics.plateaus import FEWEST, PlateauScanner
-from monitor.statistics.scan import GRID
-from monitor.statistics.scan_candidates import EDGE
+from monitor.statistics.scan import GRID, Scanner
+from monitor.statistics.scan_candidates import EDGE, SEASON_FROM
 
 YEAR = 365.25
 
@@ -31,11 +31,64 @@ def test_a_change_that_was_put_right_again_is_found_with_both_its_steps(weeks, s
     t, y = weekly(weeks, start, stop, 15.0, seed=weeks + start)
     up, down = changes_of(t, y)
     assert (up.kind, up.index, down.kind, down.index) == ("step", start, "step", stop)
-    assert abs(up.size - 15.0) < 4.0 * up.u < 4.0
-    assert abs(down.size + 15.0) < 4.0 * down.u < 4.0
+    # Beside a wave of any size, which half of a year hardly tells from a plateau.
+    assert abs(up.size - 15.0) < 4.0 * up.u < 5.0
+    assert abs(down.size + 15.0) < 4.0 * down.u < 5.0
     assert up.interval == (t[start - 1], t[start])
     assert down.interval == (t[stop - 1], t[stop])
     assert up.p_value <= 0.01
+
+
+def off_by(moving, steps, *, trials=10):
+    """Sizes less the true ones over u (trials, 2) of plateaus of 30 weeks beside what moves besides."""
+    off = []
+    for seed in range(trials):
+        t, y = weekly(30, 10, 20, 15.0, seed=100 + seed)
+        found = {change.index: change for change in changes_of(t, y + moving(t))}
+        off.append([(found[at].size - size) / found[at].u for at, size in steps])
+    return np.array(off)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "moving",
+    [
+        pytest.param(lambda t: 12.0 * t / 210.0, id="drift"),
+        pytest.param(lambda t: 3.0 * np.cos(2.0 * np.pi * t / YEAR + 1.0), id="season"),
+    ],
+)
+def test_the_ends_of_a_plateau_are_as_large_as_they_are_beside_what_the_search_had_beside_them(moving):
+    off = off_by(moving, [(10, 15.0), (20, -15.0)])
+    # With the level alone beside them the means are 5.1 and 5.8 beside the drift, -5.0 and 1.5 beside the season.
+    assert np.abs(off.mean(axis=0)).max() < 1.0
+    assert np.mean(np.abs(off) < 2.0) > 0.7
+
+
+def test_the_base_of_the_search_and_of_a_size_have_the_same_columns():
+    t, y = weekly(30, 10, 20, 15.0, seed=1)
+    for base, fitted_from in (
+        ("constant", None),
+        ("line", None),
+        ("season", None),
+        ("constant", SEASON_FROM),
+    ):
+        series = _Series("EB0A", y, t, None, None, YEAR, fitted_from=fitted_from)
+        scanner = Scanner(t, None, base, None, YEAR, None, fitted_from)
+        fitted = series.fitted(base)
+        assert fitted.shape[1] == len(y) - scanner.free
+        np.testing.assert_allclose(scanner.plain @ (scanner.plain.T @ fitted), fitted, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_season_is_no_trend_between_the_ends_of_a_plateau():
+    with_a_trend = 0
+    for seed in range(12):
+        t, y = weekly(104, 30, 56, 15.0, seed=seed)
+        y = y + 4.0 * np.cos(2.0 * np.pi * t / YEAR + seed)
+        history = find_changes({"EB0A": y}, t, rng=np.random.default_rng(seed), cycle=YEAR, false_alarm=0.01)
+        assert [change.index for change in history.changes][:2] == [30, 56]
+        with_a_trend += bool(history.trends)
+    assert with_a_trend == 0
 
 
 def test_one_step_alone_is_one_change_and_the_same_with_and_without_plateaus():

@@ -149,7 +149,9 @@ class ConditionEffect:
 
     ``moves_with`` names conditions (or ``time``) that cannot be told apart from it; ``q_value`` is the false discovery
     rate over the conditions of all parameters. Beside several instruments it is what goes with the condition within
-    each; where that cannot be told, ``not_decided`` says why, and the numbers are without the instruments.
+    each; where that cannot be told, ``not_decided`` says why, and the numbers are without the instruments. Where days
+    and the runs within them contradict each other beyond chance, ``coefficient`` is that from day to day,
+    ``within_days`` the other one (else None), and ``p_value`` that of one coefficient for both.
     """
 
     channel: str
@@ -164,6 +166,8 @@ class ConditionEffect:
     moves_with: tuple[str, ...]
     q_value: float | None
     not_decided: Confounding | None = field(default=None, metadata={**WORDED, **OMITTED})
+    within_days: float | None = field(default=None, metadata=OMITTED)
+    u_within_days: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,13 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.confounding import Confounding, MeasuredAt
 from monitor.reporting.lacks import Cause, Lack, Part, refused
-from monitor.statistics import DependenceUnits, dependence
+from monitor.statistics import Coefficient, DependenceUnits, dependence
 from monitor.statistics.groups import group_columns, independent_columns, share_within
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
@@ -31,6 +32,8 @@ DAY_COVERAGE_H, YEAR_COVERAGE_D = 12.0, 300.0
 FEWEST_RUNS, FEWEST_OF_CYCLE = 6, {"day": 8, "year": 12}
 #: Channels that go together more closely than this cannot be told apart (their variances inflate tenfold).
 COLLINEAR = 0.95
+#: Coefficients within and between days contradict each other where chance would part them so far this seldom.
+CONTRADICT = 0.001
 #: Degrees of freedom that the campaigns of several instruments have to leave for a cause that campaigns differ in.
 ENOUGH = 2
 #: What stands for the instruments among the channels.
@@ -114,7 +117,8 @@ def _condition(
         )  # fmt: skip
     except DataError:
         return None
-    coefficient = fit.coefficients[0]
+    p_value = fit.coefficients[0].p_value
+    coefficient, inside, u_inside = _apart(fit.coefficients[0], part, values, beside, drift)
     inseparable = [
         other for other, recorded in channels.items() if other != name and _together(values, recorded[mask])
     ]
@@ -124,9 +128,43 @@ def _condition(
     per = "K" if channel == DEGREE_CELSIUS else channel.name
     unit = series.unit if channel == ONE else f"{series.unit}/{per}"
     return ConditionEffect(
-        name, coefficient.value, coefficient.u, (low, high), unit, number(coefficient.p_value),
+        name, coefficient.value, coefficient.u, (low, high), unit, number(p_value),
         len(values), float(values.min()), float(values.max()), tuple(inseparable), None, beside.why_not,
+        inside, u_inside,
     )  # fmt: skip
+
+
+def _apart(
+    one: Coefficient, part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
+) -> tuple[Coefficient, float | None, float | None]:
+    """The coefficient of a condition between days, and that within them with its u, where these contradict each other
+    beyond chance; else ``one`` for both. A machine may follow the weather for days, not what a thermometer shows from
+    one run to the next: one coefficient is a mean, weighted by how well days and runs tell each."""
+    if not np.array_equal(beside.labels, part.days):
+        return one, None, None
+    u = part.weights()
+    weight = np.ones_like(values) if u is None else 1.0 / u**2
+    day = np.unique(part.days, return_inverse=True)[1]
+    of_day = (np.bincount(day, weight * values) / np.bincount(day, weight))[day]
+    inside = values - of_day
+    least = 1e-6 * np.ptp(values)
+    if np.ptp(of_day) <= least or np.ptp(inside) <= least:
+        return one, None, None
+    try:
+        fit = dependence(
+            part.values, part.t, {"between": of_day, "within": inside}, drift=drift, u=u, days=part.days,
+            beside=beside.columns,
+        )  # fmt: skip
+    except DataError:
+        return one, None, None
+    between, within = fit.coefficients
+    variance = np.array([between.u, within.u]) ** 2
+    if not variance.sum() > 0.0:
+        return one, None, None
+    # Welch and Satterthwaite: what days and runs tell of them is independent.
+    dof = variance.sum() ** 2 / float((variance**2 / np.array([between.dof, within.dof])).sum())
+    p = 2.0 * scipy.special.stdtr(dof, -abs(between.value - within.value) / np.sqrt(variance.sum()))
+    return (between, within.value, within.u) if p < CONTRADICT else (one, None, None)
 
 
 def _together(a: Array, b: Array) -> bool:
