@@ -64,6 +64,16 @@ def poor_runs_refused(readings: Mapping[int, int], undetermined: Mapping[int, in
     )
 
 
+def stands_still(run: int, axes: Sequence[str]) -> str:
+    """Return that axes have one position in all rows of a run, and move in the other runs."""
+    its = joined_by_and(list(axes))
+    stand, move, columns = ("stands", "moves", "column") if len(axes) == 1 else ("stand", "move", "columns")
+    return (
+        f"in run {run} {its} {stand} still at all readings and {move} in the other runs: first look at the {columns} "
+        f"of {its} there"
+    )
+
+
 def poses_too_few(run: int | None, hardly: int) -> str:
     """Return that the poses of a run, or of every run, may be too few: as many unknowns are ``hardly`` told."""
     whose = "every run" if run is None else f"run {run}"

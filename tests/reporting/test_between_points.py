@@ -134,7 +134,16 @@ def test_a_map_of_linear_axes_alone_is_at_no_rotary_pose(
     make_record: Callable[..., CertificateRecord], language: str, said: str
 ) -> None:
     (plain,) = make_record(language=language, maps=1).volumetric
-    one_pose = replace(plain, poses=1)
-    assert said not in printed_map(one_pose, texts_of(language)).explained
-    linear = replace(one_pose, largest=replace(plain.largest, at=(("X", 10.0, "mm"),)))
+    of_0_2_0, turning, linear = (replace(plain, poses=1, turns=turns) for turns in (None, True, False))
+    assert said not in printed_map(of_0_2_0, texts_of(language)).explained
+    assert said not in printed_map(turning, texts_of(language)).explained
     assert said in printed_map(linear, texts_of(language)).explained
+
+
+def test_a_map_that_version_0_2_0_issued_keeps_its_words(
+    make_record: Callable[..., CertificateRecord],
+) -> None:
+    """The sentence of that release, by the text of its certificates."""
+    (plain,) = make_record(maps=1).volumetric
+    explained = str(printed_map(replace(plain, poses=1, turns=None), texts_of()).explained)
+    assert f") at {1} rotary poses. " in explained

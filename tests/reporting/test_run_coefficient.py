@@ -41,11 +41,23 @@ def test_the_name_of_a_coefficient_says_its_run(name: str, run: int | None) -> N
 @pytest.mark.parametrize(("language", "said"), [("en", "those of this run"), ("de", "die dieses Laufs")])
 def test_a_coefficient_of_the_run_is_no_mean_of_runs(language: str, said: str) -> None:
     """Was: no value of it is stored."""
-    effect = ModelEffect("EXX:reversal@each_run.run2", "µm", 0.05, 0.22, 1, 1)
+    effect = ModelEffect("EXX:reversal@each_run.run2", "µm", 0.05, 0.22, 1, 1, of_one_run=True)
     printed = printed_effects((effect,), texts_of(language))
     assert printed is not None
     assert said in printed.explained
     assert not printed.unknown
+
+
+def test_an_effect_of_one_run_that_version_0_2_0_issued_keeps_its_words() -> None:
+    """The sentences of that release: of all runs."""
+    effects = (
+        ModelEffect("EXX:reversal@run_time(2)", "µm", 0.05, 0.22, 3, 1, joint=True),
+        ModelEffect("EYY:reversal@run_time(2)", "µm", 0.05, 0.22, 3, 1),
+    )
+    printed = printed_effects(effects, texts_of())
+    assert printed is not None
+    assert "one number for all 3 runs on 1 days together" in printed.explained
+    assert "Value: mean of 3 runs on 1 days, each by itself" in printed.explained
 
 
 def test_a_run_left_out_is_not_among_those_compared() -> None:

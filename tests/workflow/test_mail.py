@@ -167,7 +167,8 @@ def document(tmp_path: Path) -> Callable[..., ReportAnswer]:
         row = FleetRow("HU40-T", "", "changed", "EB0C stepped by +15 ± 1 µrad", None, 0.12, "by 2026-03-20")
         return ReportAnswer(
             week="2026-W10", from_="2026-03-02", to="2026-03-08", machines=(row,), measured=1, ended=True,
-            alarms=tuple(alarms), refused_imports=(), message="", weekly_looks=WeeklyNotices(0.05, 0, 1, 0, 0.0, ()),
+            alarms=tuple(alarms), refused_imports=(), message="", answers=(),
+            weekly_looks=WeeklyNotices(0.05, 0, 1, 0, 0.0, ()),
             files=(str(tmp_path / "health-2026-W10.html"), str(pdf)),
         )  # fmt: skip
 

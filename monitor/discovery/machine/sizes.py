@@ -54,8 +54,8 @@ def size_of(candidate: ChainCandidate, coefficients: Array, covariance: Array) -
         if curve is not None:
             if isinstance(effect, ChainEffect) and isinstance(effect.shape, Sawtooth):
                 # One coefficient, the step of the teeth: that of the fitted model, of maps and of tables.
-                size_and_u = spread_or_length(effect, coefficients, covariance)
-                return Size(*size_and_u, _of_shape(candidate, beyond_base), curve=curve)
+                step, u = spread_or_length(effect, coefficients, covariance)
+                return Size(abs(step), u, _of_shape(candidate, beyond_base), curve=curve)
             # Parts of a free shape that nearly cancel are as large as they like: its size is what its curve shows.
             largest = int(np.abs(curve.size).argmax())
             amplitude, u = abs(float(curve.size[largest])), float(curve.u[largest])

@@ -16,7 +16,6 @@ from monitor.reporting.certificate.volumetric import printed_map
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.certificate.words import answer
 from monitor.reporting.refused import why_refused
-from monitor.reporting.run_coefficient import run_of
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
@@ -60,10 +59,9 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
 
 def _kind(effect: ModelEffect) -> str:
     """The text of what an effect with a value is: among the results or beside them, of all runs or of one."""
-    of_run = run_of(effect.name) is not None
     if effect.joint:
-        return "page.effects_joint_of_run" if of_run else "page.effects_joint"
-    return "page.effects_of_run" if of_run else "page.effects_explained"
+        return "page.effects_joint_of_run" if effect.of_one_run else "page.effects_joint"
+    return "page.effects_of_run" if effect.of_one_run else "page.effects_explained"
 
 
 def _model_effect(parent: ET.Element, effect: ModelEffect, version: DccVersion, texts: Texts) -> None:

@@ -34,7 +34,8 @@ class ModelEffect:
     With ``joint`` it is one of the results, the value of all runs together, or of its run where it is of one alone.
     Else the size is the mean of what ``runs`` runs on ``days`` days say by themselves, and ``outside`` says why.
     ``reversal_value`` (ISO 230-2) and ``u_reversal`` of a play, twice its amplitude; None of another effect. ``value``
-    is None where nothing is stored of it. ``lies`` is where a step lies; None of another effect.
+    is None where nothing is stored of it. ``lies`` is where a step lies; None of another effect. ``of_one_run``: it is
+    of the run alone and the page says so, which those of version 0.2.0 do not.
     """
 
     name: str
@@ -48,3 +49,4 @@ class ModelEffect:
     joint: bool = field(default=False, metadata=OMITTED)
     outside: Outside | None = field(default=None, metadata=OMITTED)
     lies: Lies | None = field(default=None, metadata=OMITTED)
+    of_one_run: bool = field(default=False, metadata=OMITTED)

@@ -10,7 +10,6 @@ from markupsafe import Markup, escape
 from monitor.reporting.certificate.model_effect import Lies, ModelEffect
 from monitor.reporting.certificate.tables import Number, aligned
 from monitor.reporting.numbers import round_result, round_to_place, round_uncertainty
-from monitor.reporting.run_coefficient import run_of
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 
@@ -83,8 +82,8 @@ def _explained(effects: tuple[ModelEffect, ...], texts: Texts) -> Markup:
 
 def _by_extent(effects: list[ModelEffect]) -> tuple[list[ModelEffect], list[str]]:
     """The effects of all runs, and the names of those of one run."""
-    of_all = [effect for effect in effects if run_of(effect.name) is None]
-    return of_all, [effect.name for effect in effects if run_of(effect.name) is not None]
+    of_all = [effect for effect in effects if not effect.of_one_run]
+    return of_all, [effect.name for effect in effects if effect.of_one_run]
 
 
 def place_in_words(name: str, lies: Lies, texts: Texts) -> str:

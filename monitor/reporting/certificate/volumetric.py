@@ -63,20 +63,17 @@ def _by_reason(volumetric: VolumetricResult, texts: Texts) -> dict[str, list[str
     return by_reason
 
 
-def _has_rotary_axes(volumetric: VolumetricResult) -> bool:
-    """Whether a place of the map has a reading in degrees."""
-    return any(unit == "°" for _, _, unit in volumetric.largest.at)
-
-
 def _region(volumetric: VolumetricResult, texts: Texts, k: str) -> str:
     """What the numbers mean, and of which region they are."""
     sign = texts.decimal_sign
     return texts(
-        "page.map_explained_one_pose" if volumetric.poses == 1 else "page.map_explained",
+        "page.map_explained"
+        if volumetric.poses > 1 or volumetric.turns is None
+        else "page.map_explained_one_pose",
         points=volumetric.points,
         each=volumetric.each,
         poses=volumetric.poses,
-        pose=texts("page.map_one_pose" if _has_rotary_axes(volumetric) else "page.map_no_rotary"),
+        pose=texts("page.map_one_pose" if volumetric.turns else "page.map_no_rotary"),
         ranges="; ".join(
             texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
             for axis, first, last in volumetric.ranges

@@ -37,7 +37,8 @@ class VolumetricResult:
     ``left_out`` are parameters that the map does not contain, and why in an English sentence;
     ``left_out_refusals`` are the refusals that they belong to, in their order, None where the sentence is all there is.
     ``between_points`` are the errors that the points do not follow, ``step_places`` the steps of whose place the range
-    alone is known; None where there are none, and in older records.
+    alone is known; None where there are none, and in older records. ``turns``: whether the machine has rotary axes;
+    None in records of version 0.2.0, whose page has the number of poses of either.
 
     The grid with the rotary axes at zero: ``readings_mm`` (n, 3) of ``axes``, ``vectors_um`` (n, 3) along X, Y and Z
     of the machine, ``expanded_um`` (n,) of their lengths.
@@ -63,6 +64,7 @@ class VolumetricResult:
     left_out_refusals: tuple[Refusal | None, ...] = ()
     between_points: tuple[BetweenPoints, ...] | None = field(default=None, metadata=OMITTED)
     step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
+    turns: bool | None = field(default=None, metadata=OMITTED)
 
     @property
     def refused(self) -> tuple[tuple[str, RefusedParameters], ...]:

@@ -74,6 +74,7 @@ def statement_of(
     limited = np.flatnonzero(np.isfinite(limits))
     names = [result.names[index] for index in limited]
     limit = stated.get(VOLUMETRIC)
+    volumetric_p = volumetric.p if volumetric is not None and not names else None
     if not names and (limit is None or volumetric is None):
         raise InputError(messages.no_tolerance(campaign, result.names, by_map=limit is not None))
     _check_process(spreads, names, campaign)
@@ -81,12 +82,13 @@ def statement_of(
     sentences = []
     if limit is not None and volumetric is not None:
         judged.append(_of_volumetric(rule, volumetric, limit, freedoms[VOLUMETRIC]))
-        sentences = _volumetric_in_words(rule, volumetric, texts)
+        sentences = _volumetric_in_words(rule, volumetric, texts, alone=not names)
     verdicts = [_stated(rule, each, spreads.get(each.name)) for each in judged]
-    sentences.insert(0, _basis(campaign, min(each.dof for each in judged), texts))
+    fewest = min(each.dof for each in judged if each.name != VOLUMETRIC or not names)
+    sentences.insert(0, _basis(campaign, fewest, texts, volumetric_alone=not names))
     sentences += _not_decided(stated, [each.name for each in judged], texts)
     return ConformityStatement(
-        *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged))),
+        *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged)), volumetric_p=volumetric_p),
         tuple(verdicts),
         joint,
         result.state,
@@ -148,10 +150,11 @@ def _stated(rule: str, judged: _Judged, spread: float | None) -> ConformityVerdi
     )
 
 
-def _volumetric_in_words(rule: str, volumetric: VolumetricResult, texts: Texts) -> list[str]:
-    """By what the limit of the volumetric error is decided."""
-    sentences = [texts("conformity.volumetric", points=volumetric.points)]
-    if rule == "guard":
+def _volumetric_in_words(rule: str, volumetric: VolumetricResult, texts: Texts, *, alone: bool) -> list[str]:
+    """By what the limit of the volumetric error is decided, beside parameters or ``alone``."""
+    what = "volumetric_alone" if alone else "volumetric"
+    sentences = [texts(f"conformity.{what}", points=volumetric.points)]
+    if rule == "guard" and not alone:
         p = written_probability(volumetric.p, texts.decimal_sign)
         sentences.append(texts("conformity.volumetric_guard", p=p))
     if volumetric.left_out:
@@ -171,16 +174,21 @@ def _not_decided(stated: Mapping[str, float], decided: Sequence[str], texts: Tex
     return sentences
 
 
-def _rule_in_words(rule: str, result: ResultSet, texts: Texts, wrong: float) -> tuple[str, str]:
-    """The rule, and the risk of a statement: ``wrong`` is the largest of the limits that are stated."""
+def _rule_in_words(
+    rule: str, result: ResultSet, texts: Texts, wrong: float, *, volumetric_p: float | None
+) -> tuple[str, str]:
+    """The rule, and the risk of a statement: ``wrong`` is the largest of the limits that are stated, ``volumetric_p``
+    the coverage probability of the volumetric error where it is decided alone."""
     sign = texts.decimal_sign
     wanted, failing, outside = (
         written_probability(round(probability, 4), sign) for probability in (WANTED, 1.0 - WANTED, wrong)
     )
-    covered, p = written_probability(COVERED, sign), written_probability(result.p, sign)
+    alone = volumetric_p is not None
+    covered = written_probability(COVERED, sign)
+    p = written_probability(result.p if volumetric_p is None else volumetric_p, sign)
     rule_text, risk = (
         texts(
-            f"conformity.{what}_{rule}",
+            f"conformity.{what}_{rule}{'_volumetric' if alone and rule == 'guard' else ''}",
             p=p, wanted=wanted, failing=failing, covered=covered, outside=outside, count=len(result.names),
         )
         for what in ("rule", "risk")
@@ -188,7 +196,16 @@ def _rule_in_words(rule: str, result: ResultSet, texts: Texts, wrong: float) -> 
     return rule_text, risk
 
 
-def _basis(campaign: str, dof: float, texts: Texts) -> str:
+def _basis(campaign: str, dof: float, texts: Texts, *, volumetric_alone: bool) -> str:
+    """From where the limits are, and the distribution of the probabilities; ``dof`` are the fewest of the parameters,
+    or those of the volumetric error where it is decided alone."""
+    if volumetric_alone:
+        what, freedom = (
+            ("normal", "")
+            if math.isinf(dof)
+            else ("student", texts.number(round_to_place(dof, decimal_of(0.1))))
+        )
+        return texts(f"conformity.basis_volumetric_{what}", campaign=campaign, dof=freedom)
     if math.isinf(dof):
         return texts("conformity.basis_normal", campaign=campaign)
     freedom = texts.number(round_to_place(dof, decimal_of(0.1)))

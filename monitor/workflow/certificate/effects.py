@@ -43,8 +43,15 @@ def effects_of(db: Database, evaluated: StatedUncertainty) -> tuple[ModelEffect,
         # The map says nothing of a smaller step either.
         if effect.value is not None and abs(effect.value) >= LEAST_STEP
         else effect
-        for effect in (*joint.values(), *(replace(effect, outside=outside) for effect in alone))
+        for effect in map(
+            _said_of_its_run, (*joint.values(), *(replace(each, outside=outside) for each in alone))
+        )
     )
+
+
+def _said_of_its_run(effect: ModelEffect) -> ModelEffect:
+    """An effect, said to be of one run where its name is that of one."""
+    return effect if run_of(effect.name) is None else replace(effect, of_one_run=True)
 
 
 def _alone(

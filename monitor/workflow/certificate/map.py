@@ -44,6 +44,7 @@ def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricRes
         left_out_refusals=tuple(map(refusal_of, mapped.left_out.values())),
         between_points=between_points(mapped) or None,
         step_places=step_places(mapped) or None,
+        turns=any(joint.turns and joint.kind != "spindle" for joint in mapped.errors.chain.joints),
         axes=drawn.axes,
         readings_mm=drawn.readings_mm,
         vectors_um=drawn.vectors_um,

@@ -11,6 +11,7 @@ from monitor.exceptions import (
     DataError,
     MistakenAxesError,
     MonitorError,
+    NotConvergedError,
     TooFewReadingsError,
     TooManyRowsError,
 )
@@ -21,7 +22,7 @@ from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
 from monitor.records import Campaign
 from monitor.row_files import rows_in, runs_in
-from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs
+from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs, standing_still
 from monitor.workflow.tool_frames import tool_frames
 
 
@@ -88,14 +89,19 @@ def _with_changes(
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
     names_no_reading = "First look at" not in str(refusal)
-    if names_no_reading and not any(mistake.enough for mistake in mistakes):
+    # A refusal that names an error of a run says what is wrong with it; how many poses it has does not.
+    is_lost = names_no_reading and isinstance(refusal, NotConvergedError)
+    if is_lost and not any(mistake.enough for mistake in mistakes):
         poor = refusal_of_poor_runs(campaign, problem_of)
         if poor is not None:
             return _with_files(poor, campaign)
     if mistakes:
         return _with_sentences(refusal, (*named, mistake_sentence(mistakes_found(mistakes))))
-    alike = hardly_told(campaign, problem_of) if names_no_reading else ()
-    said = (*alike, *column_doubts(campaign, tool_frames(campaign)))
+    by_plan = (
+        *(standing_still(campaign, problem_of) if names_no_reading else ()),
+        *(hardly_told(campaign, problem_of) if is_lost else ()),
+    )
+    said = (*by_plan, *column_doubts(campaign, tool_frames(campaign)))
     return _with_sentences(refusal, said) if said else refusal
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
 from monitor.exceptions import MonitorError, TooFewReadingsError
 from monitor.methods.chain.problem import ChainProblem, solve_problem
-from monitor.methods.chain.sufficiency import OpenUnknowns, open_at_start, readings_of_runs
+from monitor.methods.chain.sufficiency import OpenUnknowns, open_at_start, readings_of_runs, still_joints
 from monitor.readers.doubts.unit_doubts import runs_in_units
 from monitor.records import Campaign
-from monitor.reporting.run_left_out import poor_runs_refused, poses_too_few
+from monitor.reporting.run_left_out import poor_runs_refused, poses_too_few, stands_still
 from monitor.workflow.campaign_parts import without_runs
 
 
@@ -19,20 +19,43 @@ def refusal_of_poor_runs(
     campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
 ) -> TooFewReadingsError | None:
     """The refusal of a campaign that no machine of the file fits because of runs whose plan leaves unknowns open that
-    other runs determine, by the derivatives at the first guess; None where it fits without them no better."""
+    other runs determine, by the derivatives at the first guess; None where it fits without them no better, or where
+    one of them has as many readings as any: there is no rest of its poses to measure."""
     open_unknowns, readings = _at_start(campaign, problem_of)
-    fewest = min((each.count for each in open_unknowns), default=0)
-    poor = {
-        run: each.count - fewest
-        for run, each in zip(readings, open_unknowns, strict=True)
-        if each.count > fewest
-    }
-    if not poor or {odd.run for odd in runs_in_units(campaign)} & set(poor):
+    poor = _beyond_others(open_unknowns, readings)
+    if not poor or max(readings[run] for run in poor) == max(readings.values()):
+        return None
+    if {odd.run for odd in runs_in_units(campaign)} & set(poor):
         return None
     if not _fits(campaign, poor, problem_of):
         return None
     of_poor = {run: readings[run] for run in poor}
     return TooFewReadingsError(poor_runs_refused(of_poor, poor), of_poor, poor)
+
+
+def standing_still(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> tuple[str, ...]:
+    """A sentence for each run as long as any that leaves unknowns open which others determine, with the axes that stand
+    still in it alone."""
+    open_unknowns, readings = _at_start(campaign, problem_of)
+    sentences = []
+    for run in _beyond_others(open_unknowns, readings):
+        problem = problem_of(campaign)
+        still = {joint.name for joint in still_joints(problem, run)}
+        for other in set(readings) - {run}:
+            still -= {joint.name for joint in still_joints(problem, other)}
+        if still and readings[run] == max(readings.values()):
+            sentences.append(stands_still(run, sorted(still)))
+    return tuple(sentences)
+
+
+def _beyond_others(open_unknowns: Sequence[OpenUnknowns], readings: Mapping[int, int]) -> dict[int, int]:
+    """How many unknowns each run leaves open that other runs determine, of those that leave any."""
+    fewest = min((each.count for each in open_unknowns), default=0)
+    return {
+        run: each.count - fewest
+        for run, each in zip(readings, open_unknowns, strict=True)
+        if each.count > fewest
+    }
 
 
 def hardly_told(campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]) -> tuple[str, ...]:

@@ -135,13 +135,13 @@ def _condition(
 
 
 def _apart(
-    one: Coefficient, part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
+    common: Coefficient, part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
 ) -> tuple[Coefficient, float | None, float | None]:
     """The coefficient of a condition between days, and that within them with its u, where these contradict each other
-    beyond chance; else ``one`` for both. A machine may follow the weather for days, not what a thermometer shows from
-    one run to the next: one coefficient is a mean, weighted by how well days and runs tell each."""
+    beyond chance; else the ``common`` common. A machine may follow the weather for days, not what a thermometer shows from
+    one run to the next: a common coefficient is a mean, weighted by how well days and runs tell each."""
     if not np.array_equal(beside.labels, part.days):
-        return one, None, None
+        return common, None, None
     u = part.weights()
     weight = np.ones_like(values) if u is None else 1.0 / u**2
     day = np.unique(part.days, return_inverse=True)[1]
@@ -149,22 +149,22 @@ def _apart(
     inside = values - of_day
     least = 1e-6 * np.ptp(values)
     if np.ptp(of_day) <= least or np.ptp(inside) <= least:
-        return one, None, None
+        return common, None, None
     try:
         fit = dependence(
             part.values, part.t, {"between": of_day, "within": inside}, drift=drift, u=u, days=part.days,
             beside=beside.columns,
         )  # fmt: skip
     except DataError:
-        return one, None, None
+        return common, None, None
     between, within = fit.coefficients
     variance = np.array([between.u, within.u]) ** 2
     if not variance.sum() > 0.0:
-        return one, None, None
+        return common, None, None
     # Welch and Satterthwaite: what days and runs tell of them is independent.
     dof = variance.sum() ** 2 / float((variance**2 / np.array([between.dof, within.dof])).sum())
     p = 2.0 * scipy.special.stdtr(dof, -abs(between.value - within.value) / np.sqrt(variance.sum()))
-    return (between, within.value, within.u) if p < CONTRADICT else (one, None, None)
+    return (between, within.value, within.u) if p < CONTRADICT else (common, None, None)
 
 
 def _together(a: Array, b: Array) -> bool:
