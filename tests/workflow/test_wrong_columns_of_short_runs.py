@@ -20,11 +20,7 @@ virtual = load("virtual_campaigns", Path(__file__).resolve().parents[1] / "disco
 
 def refusal(axis: str, factor: float, shift_to: float | None, rows_of_run_2: int | None) -> DataError:
     """Of three runs of five days' plan the second has an axis in another unit, or standing still, or is cut."""
-    keep = (
-        None
-        if rows_of_run_2 is None
-        else lambda told: (told["run"] != 2) | (told["sequence"] <= rows_of_run_2)
-    )
+    last = np.inf if rows_of_run_2 is None else rows_of_run_2
     campaign: Campaign = virtual.virtual(
         5, [], days=1, runs_per_day=3, keep=lambda told: (told["run"] != 2) | (told["sequence"] <= last)
     )[0]
