@@ -138,7 +138,7 @@ def _apart(
     common: Coefficient, part: Series, values: Array, beside: _Beside, drift: Literal["beside", False]
 ) -> tuple[Coefficient, float | None, float | None]:
     """The coefficient of a condition between days, and that within them with its u, where these contradict each other
-    beyond chance; else the ``common`` common. A machine may follow the weather for days, not what a thermometer shows from
+    beyond chance; else the ``common`` one. A machine may follow the weather for days, not what a thermometer shows from
     one run to the next: a common coefficient is a mean, weighted by how well days and runs tell each."""
     if not np.array_equal(beside.labels, part.days):
         return common, None, None
