@@ -89,6 +89,15 @@ class Fit:
         return np.isfinite(self.problem.sigma) & ~self.left_out[:, None]
 
     @cached_property
+    def sources(self) -> npt.NDArray[np.int64]:
+        """The place (R, m) of every whitened number in the rows' numbers (n d,), -1 where there is none.
+
+        Calibrated quantities follow the probings of a run and do not depend on the effects.
+        """
+        numbers = np.arange(float(self.problem.sigma.size)).reshape(self.problem.sigma.shape) + 1.0
+        return self.problem.padded(numbers).astype(np.int64) - 1
+
+    @cached_property
     def nuisance(self) -> Nuisance:
         """The unknowns of single runs.
 

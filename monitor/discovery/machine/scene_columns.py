@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.search.candidate import SMALLEST_SHARE
@@ -135,18 +134,9 @@ class _Layout:
         return np.asarray(1.0 / self.fit.problem.sigma)
 
     @cached_property
-    def _sources(self) -> npt.NDArray[np.int64]:
-        """The place (R, m) of every whitened number in the rows' numbers (n d,), -1 where there is none.
-
-        Calibrated quantities follow the probings of a run and do not depend on the effects.
-        """
-        numbers = np.arange(float(self._weights.size)).reshape(self._weights.shape) + 1.0
-        return self.fit.problem.padded(numbers).astype(np.int64) - 1
-
-    @cached_property
     def _is_straight(self) -> bool:
         """Whether the rows are in the order of the whitened numbers: one run after another, all of one length."""
-        return np.array_equal(self._sources.reshape(-1), np.arange(self._weights.size))
+        return np.array_equal(self.fit.sources.reshape(-1), np.arange(self._weights.size))
 
     def projected(self, moved: Array) -> tuple[Array, Array]:
         """Whitened columns (k, M) of displacements (k, n d), less what every run's own unknowns can do, and their
@@ -154,12 +144,13 @@ class _Layout:
         runs, numbers = self._shape
         white = moved * self._weights.reshape(-1)
         projected = np.zeros((len(moved), runs, numbers))
-        target = projected[:, :, : self._sources.shape[1]]
+        sources = self.fit.sources
+        target = projected[:, :, : sources.shape[1]]
         if self._is_straight:
-            target[...] = white.reshape(len(moved), *self._sources.shape)
+            target[...] = white.reshape(len(moved), *sources.shape)
         else:
-            filled = self._sources >= 0
-            target[...] = np.where(filled, white[:, np.where(filled, self._sources, 0)], 0.0)
+            target[...] = white[:, np.maximum(sources, 0)]
+            target[:, sources < 0] = 0.0
         if self.fit.whitening is not None:
             projected = self.fit.whitening(projected)
         before = np.sqrt(np.einsum("krn,krn->k", projected, projected))

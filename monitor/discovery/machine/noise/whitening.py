@@ -79,8 +79,9 @@ class Whitening:
 
     def _numbers(self, readings: Array, like: Array) -> Array:
         """Numbers (..., R, N) with other readings (k, R, T, d)."""
-        numbers = np.array(like)
-        numbers[..., : self.rows.count] = readings.reshape(*like.shape[:-1], self.rows.count)
+        numbers = np.empty(like.shape)
+        self._readings(numbers)[...] = readings
+        numbers[..., self.rows.count :] = like[..., self.rows.count :]
         return numbers
 
     def _columns(self, readings: Array) -> Array:
