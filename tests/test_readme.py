@@ -112,7 +112,7 @@ def run_in_shell(example: Example, source: str, folder: Path) -> tuple[int, str]
 def run_script(source: str) -> int:
     """Run a script in this process; its exit status."""
     try:
-        exec(compile(source, "<example>", "exec"), {"__name__": "__main__"})
+        exec(compile(source, "<example>", "exec", dont_inherit=True), {"__name__": "__main__"})
     except SystemExit as ended:
         return int(ended.code or 0)
     except Exception:
