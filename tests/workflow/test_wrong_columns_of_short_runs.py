@@ -30,7 +30,7 @@ def refusal(axis: str, factor: float, shift_to: float | None, rows_of_run_2: int
     readings[axis][of_run] = factor * values if shift_to is None else shift_to
     mistaken = replace(campaign, probings=replace(campaign.probings, readings=readings))
     with (
-        pytest.raises(DataError, match="no error of a machine|did not converge") as refused,
+        pytest.raises(DataError, match=r"no error of a machine|did not converge") as refused,
         np.errstate(all="ignore"),
     ):
         solve_problem(problem_of(mistaken))
