@@ -287,16 +287,15 @@ def empties(seeds: range, runs: list[int], only: str) -> Iterator[str]:
         return
     yield "| noise | runs | false effects | seconds | named |"
     yield "| --- | --- | --- | --- | --- |"
-    for count in runs:
+    for plan, count in enumerate(runs):
         days, each = PLANS[count]
-        for name, options in NOISES.items():
+        for kind, (name, options) in enumerate(NOISES.items()):
             if only not in name:
                 continue
+            own = [20000 + seed + SEEDS_APART * (plan * len(NOISES) + kind) for seed in seeds]
             answers = [
-                told(
-                    virtual_campaigns.virtual(20000 + seed, days=days, runs_per_day=each, **options)[0], seed
-                )
-                for seed in seeds
+                told(virtual_campaigns.virtual(seed, days=days, runs_per_day=each, **options)[0], seed)
+                for seed in own
             ]
             false = [answer for answer in answers if answer.effects]
             named = sorted({answer.effects[0] for answer in false})[:4]
