@@ -85,11 +85,11 @@ def _known_with_signs(db: Database, touches: Probings) -> dict[int, str]:
     if not any(np.any((values == 0.0) & np.signbit(values)) for values in _measured(touches).values()):
         return {}
     prints = run_fingerprints(touches, signed_zeros=True)
-    known = db.rows(
+    stored = db.rows(
         "SELECT DISTINCT readings_sha256 FROM run_fingerprint WHERE readings_sha256 IN (SELECT unnest(?::VARCHAR[]))",
         [list(prints.values())],
     )
-    return {run: fingerprint for run, fingerprint in prints.items() if (fingerprint,) in known}
+    return {run: fingerprint for run, fingerprint in prints.items() if (fingerprint,) in stored}
 
 
 def _insert(db: Database, campaign_id: int, prints: dict[int, str]) -> None:

@@ -268,7 +268,7 @@ def test_runs_with_a_copied_moment_are_named() -> None:
         copied(3),
     )
     assert copied(3).endswith(
-        "Correct started_at in runs.csv: warm-up within the day, drifts and trends count from it"
+        "Correct started_at in runs.csv: warm-up of the day, drifts and trends count from it"
     )
     assert copied(3, 4).startswith("runs 2, 3, ... state the same started_at")
 

@@ -322,7 +322,7 @@ def _same_start(campaign: Campaign) -> Iterator[str]:
         yield (
             f"runs {named} state the same started_at, {first.started_at:%Y-%m-%d %H:%M} ({sum(map(len, alike))} of "
             f"{len(campaign.runs)} runs share theirs with another): one machine makes one run at a time. Was a header "
-            f"copied? Correct started_at in {runs_in(campaign)}: warm-up within the day, drifts and trends count from it"
+            f"copied? Correct started_at in {runs_in(campaign)}: warm-up of the day, drifts and trends count from it"
         )
 
 
