@@ -20,7 +20,8 @@ from monitor.discovery.search.products import Products
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
-from monitor.effects.shapes.free import HARMONICS, Free
+from monitor.effects.shape import DescribedShape
+from monitor.effects.shapes.free import HARMONICS, Follows, Free
 from monitor.records import Array
 
 # More parts than this of one shape are beyond what a plan can separate.
@@ -102,9 +103,30 @@ def with_nearest(
     shapes: Sequence[ChainCandidate],
     others: Sequence[ChainCandidate],
 ) -> ChainCandidate:
-    """A free shape and the best of ``shapes`` beside others, which is nearest to it."""
-    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    """A free shape and the best of ``shapes`` beside others, which is nearest to it; none that follows moves comes near
+    one without direction, unless there are no others."""
+    alike = [] if _has_direction(scene, free) else [shape for shape in shapes if not _is_of_moves(shape)]
+    weighed = weigh_beside(scene, alike or shapes, others)
+    nearest = max(weighed, key=lambda evidence: evidence.explained).candidate
     return replace(free, variant=replace(free.variant, nearest=nearest.family))
+
+
+def _has_direction(scene: ChainScene, free: ChainCandidate) -> bool:
+    """Whether a part of a free shape follows the direction of its axis."""
+    effect = free.effect
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Free)
+    return bool(
+        np.any(effect.shape.following(scene.fit.problem.context, effect.term.joint) == Follows.DIRECTION)
+    )
+
+
+def _is_of_moves(candidate: ChainCandidate) -> bool:
+    """Whether the shape of an effect follows how its axis came to a position."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect) and isinstance(effect.shape, DescribedShape) and effect.shape.of_moves
+    )
 
 
 def most_together(
