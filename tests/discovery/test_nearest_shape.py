@@ -53,3 +53,14 @@ def test_where_all_shapes_tell_the_direction_the_best_of_them_is_nearest(scene: 
     of_direction = [each for each in scene.candidates if "harmonic" not in each.family]
     nearest = of_parts(scene, "EBB", [SECOND_HARMONIC], of_direction, []).variant.nearest
     assert nearest in ("EBB:reversal", "EBB:windup30deg")
+
+
+def test_a_part_of_direction_that_is_no_more_than_noise_brings_none(virtual_campaigns: Any) -> None:
+    campaign, _ = virtual_campaigns.virtual(
+        3, [simulator().Effect("EBB:harmonic2", peak_um=5.0)], days=1, runs_per_day=2
+    )
+    problem = problem_of(campaign)
+    some = [Variant(text, parse_effect(text, problem.context.chain)) for text in SHAPES[2:] + SHAPES[:1]]
+    scene = scene_of(fit(problem), some)
+    free = of_parts(scene, "EBB", [SECOND_HARMONIC, SECOND_HARMONIC + 1, DIRECTION], scene.candidates, [])
+    assert free.variant.nearest == "EBB:harmonic1"

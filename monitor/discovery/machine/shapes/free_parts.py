@@ -13,6 +13,7 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import score_beside
+from monitor.discovery.machine.shapes.curves import follows
 from monitor.discovery.machine.shapes.waves import worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
@@ -105,20 +106,28 @@ def with_nearest(
 ) -> ChainCandidate:
     """A free shape and the best of ``shapes`` beside others, which is nearest to it; none that follows moves comes near
     one without direction, unless there are no others."""
-    alike = [] if _has_direction(scene, free) else [shape for shape in shapes if not _is_of_moves(shape)]
+    alike = (
+        [] if _has_direction(scene, free, others) else [shape for shape in shapes if not _is_of_moves(shape)]
+    )
     weighed = weigh_beside(scene, alike or shapes, others)
     nearest = max(weighed, key=lambda evidence: evidence.explained).candidate
     return replace(free, variant=replace(free.variant, nearest=nearest.family))
 
 
-def _has_direction(scene: ChainScene, free: ChainCandidate) -> bool:
-    """Whether a part of a free shape follows the direction of its axis."""
-    effect = free.effect
+def _has_direction(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a free shape beside others follows the direction of its axis, as its description says."""
+    effect, context = free.effect, scene.fit.problem.context
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Free)
-    return bool(
-        np.any(effect.shape.following(scene.fit.problem.context, effect.term.joint) == Follows.DIRECTION)
-    )
+    if Follows.DIRECTION not in effect.shape.following(context, effect.term.joint):
+        return False
+    beside = scene.remainders.beside(others)
+    columns = without(beside.basis, free.columns)
+    inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+    coefficients = inverse @ (columns.T @ beside.residual)
+    left = beside.residual - columns @ coefficients
+    variance = float(left @ left) / max(beside.degrees_of_freedom - len(coefficients), 1)
+    return Follows.DIRECTION in follows(context, effect, coefficients, variance * inverse)
 
 
 def _is_of_moves(candidate: ChainCandidate) -> bool:
