@@ -125,8 +125,8 @@ def _has_direction(scene: ChainScene, free: ChainCandidate, others: Sequence[Cha
     columns = without(beside.basis, free.columns)
     inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
     coefficients = inverse @ (columns.T @ beside.residual)
-    left = beside.residual - columns @ coefficients
-    variance = float(left @ left) / max(beside.degrees_of_freedom - len(coefficients), 1)
+    remaining = beside.residual - columns @ coefficients
+    variance = float(remaining @ remaining) / max(beside.degrees_of_freedom - len(coefficients), 1)
     return Follows.DIRECTION in follows(context, effect, coefficients, variance * inverse)
 
 
