@@ -11,6 +11,7 @@ from monitor.cli.dependence_output import dependences
 from monitor.cli.forecast_output import forecast_start
 from monitor.cli.rests_on_output import levels, steps_at_once
 from monitor.reporting.confounding import charted
+from monitor.reporting.lacks import NO_MAP_STORED
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -294,8 +295,7 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
         return
     if ahead.why is not None or ahead.predicted_interval_um is None:
         if ahead.limit_um is not None and ahead.why is not None:
-            yield str(ahead.why)
-            yield _mapped(ahead.mapped_um, ahead.limit_um)
+            yield from _not_foretold(str(ahead.why), ahead.mapped_um, ahead.limit_um)
         return
     low, high = ahead.predicted_interval_um
     beyond = None not in (ahead.latest_um, ahead.limit_um) and (ahead.latest_um or 0.0) > (
@@ -318,15 +318,14 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
         )
 
 
-def _mapped(worst: float | None, limit: float) -> str:
-    """The volumetric error where nothing is foretold: of the last map that is stored, as the fleet has it."""
+def _not_foretold(why: str, worst: float | None, limit: float) -> Iterator[str]:
+    """Why no volumetric error is foretold, and that of the last map that is stored, as the fleet has it."""
     if worst is None:
-        return (
-            f"the limit of the volumetric error, {_three(limit)} µm, is not judged: no map is stored; type "
-            "`monitor map CAMPAIGN`"
-        )
+        yield f"{why}; its limit, {_three(limit)} µm, is not judged: {NO_MAP_STORED}"
+        return
+    yield why
     verdict = "out of tolerance" if worst >= limit else "within it"
-    return f"volumetric error: {_three(worst)} µm at worst in the last map stored, limit {_three(limit)} µm: {verdict}"
+    yield f"volumetric error: {_three(worst)} µm at worst in the last map stored, limit {_three(limit)} µm: {verdict}"
 
 
 def _reaches(ahead: VolumetricForecast, beyond: bool, latest: str) -> str:

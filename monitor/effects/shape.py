@@ -6,7 +6,7 @@ of its coefficients. Another one is one more file of ``shapes`` or a plug-in of 
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -41,7 +41,12 @@ class Shape(Protocol):
 
 
 class DescribedShape(BuiltIn):
-    """A shape with its own words; here with what most have: one coefficient, in the unit of the term."""
+    """A shape with its own words; here with what most have: one coefficient, in the unit of the term.
+
+    ``of_moves`` says that it follows how the axis came to its positions, not these alone.
+    """
+
+    of_moves: ClassVar[bool] = False
 
     @property
     def labels(self) -> tuple[str, ...]:

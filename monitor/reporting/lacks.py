@@ -11,6 +11,9 @@ from enum import StrEnum
 
 from monitor.documents import OMITTED
 
+#: Why a limit of the volumetric error is not judged, and what judges it.
+NO_MAP_STORED = "no map is stored (monitor map CAMPAIGN)"
+
 
 class Part(StrEnum):
     """What is not there."""
@@ -45,6 +48,7 @@ class Cause(StrEnum):
     NO_LIMIT = "no_limit"
     NO_PARAMETER_DRIFTS = "no_parameter_drifts"
     NO_TOLERANCE = "no_tolerance"
+    NO_TOOL_PLACE = "no_tool_place"
     NO_WARM_UP_RUNS = "no_warm_up_runs"
     NONE_IN_REFERENCE = "none_in_reference"
     NOTHING_VARIES = "nothing_varies"
@@ -120,6 +124,7 @@ _CAUSES = {
     Cause.NO_LIMIT: "no limit is stated (volumetric in the machine's tolerances)",
     Cause.NO_PARAMETER_DRIFTS: "no parameter has a drift to extrapolate",
     Cause.NO_TOLERANCE: "the machine file states no tolerance for it",
+    Cause.NO_TOOL_PLACE: "it needs the place of the tool, which this method does not find; a map does not need it",
     Cause.NO_WARM_UP_RUNS: "no campaign of six runs or more has runs marked warm_up",
     Cause.NONE_IN_REFERENCE: "no run of the history lies in the reference period",
     Cause.NOTHING_VARIES: "no recorded condition varies over six runs or more",

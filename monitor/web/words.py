@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 from typing import TYPE_CHECKING
 
 from monitor.exceptions import MonitorError
@@ -229,6 +229,23 @@ def _when_beyond(row: FleetTableRow) -> str:
 def since(row: FleetTableRow) -> str:
     """Say since when a row holds, and what began then."""
     return "" if row.onset is None or row.onset_is is None else f"{day(row.onset)}, {row.onset_is}"
+
+
+def how_long_ago(last: str, today: date) -> str:
+    """Say how long before ``today`` a date as written (2026-03-06) is; nothing of one that is still to come."""
+    days = (today - date.fromisoformat(last)).days
+    if days < 0:
+        return ""
+    if days < 2:
+        return ("today", "yesterday")[days]
+    weeks, months, years = days // 7, int(12.0 * days / DAYS_PER_YEAR), int(days / DAYS_PER_YEAR)
+    span = (
+        counted(days, "day") if days < 14
+        else counted(weeks, "week") if months < 2
+        else counted(months, "month") if years < 2
+        else counted(years, "year")
+    )  # fmt: skip
+    return f"{span} ago"
 
 
 def _span(years: float) -> str:

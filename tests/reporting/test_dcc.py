@@ -53,7 +53,9 @@ def record(make_record: Make) -> CertificateRecord:
     return dataclasses.replace(
         made,
         country="DE",
-        conformity=ConformityStatement("a rule", "a risk", verdicts, 0.5, "as found", "a basis"),
+        conformity=ConformityStatement(
+            "a rule", "a risk", verdicts, "as found", "a basis", joint_probability=0.5
+        ),
         accreditation="none",
     )
 
@@ -61,6 +63,26 @@ def record(make_record: Make) -> CertificateRecord:
 @pytest.fixture(scope="module")
 def tree(record: CertificateRecord) -> ET.Element:
     return ET.fromstring(dcc_xml(record))
+
+
+@pytest.mark.parametrize("release", list(DccVersion))
+def test_a_statement_on_the_volumetric_error_alone_is_valid(make_record: Make, release: DccVersion) -> None:
+    pytest.importorskip("lxml.etree", reason="lxml validates XML schemas")
+    from lxml import etree
+
+    judged = ConformityVerdict("volumetric", "µm", 190.0, Verdict.CONDITIONAL_PASS, 0.76, 2.3)
+    record = dataclasses.replace(
+        make_record(13, maps=1),
+        country="DE",
+        dcc_version=release,
+        conformity=ConformityStatement("a rule", "a risk", (judged,), "as found", "a basis", together=True),
+    )
+    xml = dcc_xml(record)
+    schema = schema_of(release)
+    schema.assertValid(etree.fromstring(xml))
+    assert xml.count(b"<dcc:conformity>") == 1
+    assert b"conformity of volumetric error, as found" in xml
+    assert "≤ 190.0 µm, w = 2.3 µm, probability of conformity 0.76".encode() in xml
 
 
 @pytest.mark.parametrize("release", list(DccVersion))

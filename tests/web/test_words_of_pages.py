@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 import threading
+from datetime import date
 from typing import Any
 
 import pytest
 
 from monitor.web.users import Role, User
-from monitor.web.words import what_breaks
+from monitor.web.words import how_long_ago, what_breaks
 from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.plan.test_answer import TestAnswer as InstrumentTest
 from tests.web.test_pages import looked_at
@@ -47,6 +48,24 @@ def test_a_measurement_that_breaks_a_tie_is_named_with_its_axes() -> None:
     assert words == "measure 25 poses with the ball-bar with X −100 to 100 mm, C 0 to 90°"
 
 
+@pytest.mark.parametrize(
+    ("last", "words"),
+    [
+        ("2026-11-29", ""),
+        ("2026-11-28", "today"),
+        ("2026-11-27", "yesterday"),
+        ("2026-11-15", "13 days ago"),
+        ("2026-11-14", "2 weeks ago"),
+        ("2026-10-01", "8 weeks ago"),
+        ("2026-09-01", "2 months ago"),
+        ("2024-11-29", "23 months ago"),
+        ("2024-11-27", "2 years ago"),
+    ],
+)
+def test_the_age_of_a_last_run_is_said_in_words(last: str, words: str) -> None:
+    assert how_long_ago(last, date(2026, 11, 28)) == words
+
+
 def test_a_machine_whose_model_does_not_fit_is_not_called_usual(local: Any) -> None:
     """Its numbers ask for nothing, but they are those of a model that the latest comparison refuted."""
     looked_at(local, "/machine?name=HU40-T")
@@ -73,3 +92,8 @@ def test_a_page_that_waits_asks_whether_it_is_worth_to_be_loaded_again(local: An
     assert ticket.future.result(60.0)
     assert local.client.get(f"/work/state?number={ticket.number}").status_code == 200
     assert local.client.get("/work/state?number=99999").status_code == 200
+
+
+def test_the_fleet_says_how_long_ago_a_machine_was_measured(local: Any) -> None:
+    looked_at(local, "/machine?name=HU40-T")
+    assert re.search(r"last run \d+ \w+ ago, 20\d\d-\d\d-\d\d<", looked_at(local, "/"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import itertools
 import json
 import math
 import re
@@ -30,6 +31,7 @@ from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.tables import conformity_rows
 from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
 from monitor.reporting.pdf.layout_engine import engine_versions
+from monitor.reporting.pdf.render import certificate_html
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_campaign, load_certificate
 from monitor.workflow.campaign_parts import without_runs
@@ -37,7 +39,12 @@ from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.digital import write_digital
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
-from monitor.workflow.certificate.request import CertificateFileRequest, CertificateRequest, RemakeRequest
+from monitor.workflow.certificate.request import (
+    RULES,
+    CertificateFileRequest,
+    CertificateRequest,
+    RemakeRequest,
+)
 from monitor.workflow.certificate.results import results_of
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -290,7 +297,9 @@ def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(gua
     text = " ".join(" ".join(page.extract_text().split()) for page in pypdf.PdfReader(guarded).pages)
     assert re.search("Simultaneous guard band of all 13 parameters together, w = U = k ?q u", text)
     assert "Risk: all statements 'pass' hold at once with at least the coverage probability 95 %" in text
-    assert "Joint probability that all 3 parameters lie within their tolerances" in text
+    assert re.search(
+        r"With a joint probability of [<>]? ?[\d.]+.% all 3 parameters lie within their tolerances", text
+    )
     assert re.search(r"EXX ± 60\.0 \d+ µm/m", text)
     assert "conditional pass" in text
 
@@ -377,6 +386,35 @@ def test_by_the_guard_band_of_all_parameters_a_length_has_the_u_of_its_map(found
         assert conformity_rows(statement, texts_of()).count == 0
         for not_decided_here in ("joint", "hold at once", "parameters"):
             assert not_decided_here not in f"{statement.basis} {statement.rule} {statement.risk}"
+    assert statement.joint_probability is None
+    assert "joint_probability" not in to_document(statement)
+    for language, rule in itertools.product(("en", "de"), RULES):
+        texts = texts_of(language)
+        statement = statement_of(
+            alone, rule, texts, campaign="limited", freedoms={"volumetric": math.inf},
+            stated={"volumetric": 25.95}, volumetric=mapped,
+        )  # fmt: skip
+        assert "arameter" not in f"{statement.basis} {statement.rule} {statement.risk}"
+
+
+def test_a_statement_begins_with_its_probability_and_stands_on_one_page_as_one_of_before_does_not(
+    db: Database, tmp_path: Path, pdf_unread
+) -> None:
+    """In German it began with "Gemein-" on a line of its own: the line ended with a bold number."""
+    asked = {"laboratory": EXAMPLES / "laboratory-de.toml", "out": tmp_path, "issued_on": DAY, "draft": True}
+    with pdf_unread():
+        issue(db, CertificateRequest("limited", 20, number="D-1", conformity="guard", **asked))
+    stored = load_certificate(db, "D-1").record
+    record = from_document(CertificateRecord, {key: stored[key] for key in stored if key != "inputs"})
+    assert isinstance(record.conformity, ConformityStatement)
+    before = replace(record, conformity=replace(record.conformity, together=None))
+    for each, begins in (
+        (record, "Mit einer gemeinsamen Wahrscheinlichkeit von"),
+        (before, "Gemeinsame Wahr"),
+    ):
+        head, statement = certificate_html(each).split('<h2 id="break-conformity">')
+        assert f'<p class="explained">{begins}' in statement
+        assert head.rstrip().endswith('<section class="whole">') == (each is record)
 
 
 def test_jcgm106_9_5_the_global_risks_of_a_rule_are_those_of_drawn_machines(found: RunUncertainty) -> None:

@@ -46,3 +46,12 @@ def test_days_and_runs_that_agree_have_one_number(seed):
     assert effect.u_within_days is None
     assert abs(effect.coefficient - 2.2) < 4.0 * effect.u
     assert "from day to day" not in _condition("EY0C", effect)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_slope_of_days_that_one_for_both_hides_is_said(seed):
+    """Up from day to day and down within the days: one slope for both is next to none (p = 0.36 and 0.91)."""
+    effect = effect_of(1.0, -0.3, seed)
+    assert effect.within_days is not None
+    assert effect.coefficient == pytest.approx(1.0, abs=0.2)
+    assert effect.p_value < 1e-5

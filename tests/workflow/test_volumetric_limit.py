@@ -15,7 +15,8 @@ from monitor.documents import from_document, to_document
 from monitor.readers import read_campaign
 from monitor.reporting.health.page import _map
 from monitor.reporting.health.records import VolumetricMap
-from monitor.store import Database, import_campaign
+from monitor.reporting.lacks import Lack
+from monitor.store import Database, import_campaign, machine_history
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.map import probability_beyond, stated_map
@@ -23,6 +24,7 @@ from monitor.workflow.health.verdict import Conformity, state_of, with_volumetri
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.answer import VolumetricForecast
+from monitor.workflow.trend.volumetric import _vectors
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
 
@@ -119,12 +121,30 @@ def test_trend_judges_the_last_map_where_it_foretells_nothing(tmp_path, capsys):
 
     said("import", str(folder))
     said("identify", "five-days")
-    assert "150 µm, is not judged: no map is stored; type `monitor map CAMPAIGN`" in said("trend", "HU40-T")
+    assert "extrapolate; its limit, 150 µm, is not judged: no map is stored (monitor map CAMPAIGN)\n" in said(
+        "trend", "HU40-T"
+    )
     mapped = json.loads(said("map", "five-days", "--points", "2", "--json"))["worst"]["error_um"]
     assert f"{mapped:.0f} µm at worst in the last map stored, limit 150 µm: out of tolerance" in said(
         "trend", "HU40-T"
     )
     assert json.loads(said("trend", "HU40-T", "--json"))["volumetric_error"]["mapped_um"] == mapped
+
+
+def test_a_forecast_that_lacks_the_place_of_the_tool_says_that_a_map_does_not_need_it(tmp_path):
+    """The page said that the method does not find the place of the tool, and to compute a map."""
+    with Database(tmp_path / "m.duckdb") as db:
+        import_campaign(db, read_campaign(EXAMPLE.parent / "r-test"))
+        identify(db, IdentifyRequest("r-test"))
+        history = machine_history(db, "CENTRE-4")
+        why = _vectors(db, history, None, dict.fromkeys(history.parameters, 1.0))
+        assert volumetric_map(db, VolumetricRequest("r-test", points=2)).worst.error_um > 1.0
+    assert isinstance(why, Lack)
+    ahead = VolumetricForecast(limit_um=20.0, next_check=None, method="", why=why)
+    assert list(_volumetric(ahead, "")) == [
+        "no forecast of the volumetric error: it needs the place of the tool, which this method does not find; a map "
+        "does not need it; its limit, 20 µm, is not judged: no map is stored (monitor map CAMPAIGN)"
+    ]
 
 
 def test_a_report_of_before_the_limit_is_still_read(limited):

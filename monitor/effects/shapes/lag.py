@@ -18,6 +18,7 @@ from monitor.units import METRE, RADIAN, Unit
 class Lag(DescribedShape):
     """In proportion to the last move: a reading taken before the axis has settled, or a reading that trails."""
 
+    of_moves: ClassVar[bool] = True
     pattern: ClassVar[str] = r"lag"
 
     def columns(self, context: Context, joint: int) -> Array:

@@ -25,6 +25,7 @@ def has_reversal_value(effect: str) -> bool:
 class Reversal(DescribedShape):
     """Half the reversal error, with the sign of the axis's last travel."""
 
+    of_moves: ClassVar[bool] = True
     pattern: ClassVar[str] = r"reversal"
 
     def columns(self, context: Context, joint: int) -> Array:

@@ -28,6 +28,7 @@ class WindUp(DescribedShape):
 
     width: float
     width_unit: str = "mm"
+    of_moves: ClassVar[bool] = True
     pattern: ClassVar[str] = r"windup(?P<width>-?\d+(?:\.\d+)?)(?P<unit>mm|deg)"
 
     @classmethod

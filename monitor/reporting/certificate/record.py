@@ -155,16 +155,20 @@ class ConformityStatement:
 
     ``process`` says in words by which spread of the true values the global risks were found, None where by none.
     ``state``: to which results it applies; ``basis``: from where the tolerances are, and by which distribution the
-    probabilities were found (ISO/IEC 17025:2017, 7.8.6.2).
+    probabilities were found (ISO/IEC 17025:2017, 7.8.6.2). ``joint_probability`` is None where no parameter is judged,
+    1 in such records of before. ``together`` says that all of it stands on one page where it can, and that its words
+    begin with the joint probability: a line that a bold number does not fit into ends at its first hyphen. Records of
+    before do not say so.
     """
 
     rule: str
     risk: str
     verdicts: tuple[ConformityVerdict, ...]
-    joint_probability: float
+    joint_probability: float | None = field(default=None, kw_only=True, metadata=OMITTED)
     state: str
     basis: str
     process: str | None = field(default=None, metadata=OMITTED)
+    together: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

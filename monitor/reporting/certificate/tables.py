@@ -129,7 +129,7 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
     verdicts = statement.verdicts
     return PrintedConformity(
         rows,
-        _probability(statement.joint_probability, texts),
+        "" if statement.joint_probability is None else _probability(statement.joint_probability, texts),
         sum(verdict.name != VOLUMETRIC for verdict in statement.verdicts),
         bands=tuple(guard_band(verdict, texts) for verdict in verdicts)
         if any(verdict.guard_band is not None for verdict in verdicts)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from monitor.reporting.adjusting import SEE_FIRST, adjusting
+from monitor.reporting.health.change_first import change_first
 from monitor.reporting.health.comparison import MissingEffect
 from monitor.reporting.health.concern import (
     DRIFT_P,
@@ -275,7 +276,7 @@ def _beyond_since(health: MachineHealth, since: datetime) -> str:
 
 
 def to_do(health: MachineHealth) -> str:
-    """Return what to do on a machine, and by when to measure it again."""
+    """Return what to do on a machine, begun with what changed in the week, and by when to measure it again."""
     parameter = concern(health)
     name = "its errors" if parameter is None else _named(parameter)
     out = [_named(each) for each in out_of_tolerance(health)]
@@ -305,10 +306,10 @@ def to_do(health: MachineHealth) -> str:
     elif health.state is State.MODEL_FAILS and health.model is not None:
         action = "look at its page for where the model fails, and measure again"
     elif SEE_FIRST in action:
-        return _sentence(action)
+        return _sentence(change_first(health, action))
     elif is_due(health):
-        return _sentence(f"measure it again {_after_colon(str(health.next_check))}")
-    return _sentence(f"{action} {_when(health)}")
+        return _sentence(change_first(health, f"measure it again {_after_colon(str(health.next_check))}"))
+    return _sentence(change_first(health, f"{action} {_when(health)}"))
 
 
 def _fails_by_file(health: MachineHealth) -> bool:

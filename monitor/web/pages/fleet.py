@@ -6,6 +6,7 @@ import base64
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,7 @@ from monitor.web.words import (
     WITHOUT_NUMBERS,
     Urgency,
     how_far,
+    how_long_ago,
     since,
 )
 from monitor.workflow.fleet.attention import ATTENTION, Attention
@@ -261,6 +263,7 @@ def routes() -> APIRouter:
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows), attention_words=attention_words,
+            how_long_ago=how_long_ago, today=datetime.now(UTC).date(),
             states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
             refusal=refusal, state=state, plant=plant, since=period["since"], until=period["until"],
             plants=sorted({row.plant for row in rows if row.plant}),

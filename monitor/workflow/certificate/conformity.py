@@ -32,6 +32,8 @@ from monitor.units import MICROMETRE
 WANTED = 0.95
 #: Coverage probability of U in ILAC-G8:09/2019 and EA-4/02 M:2022: k = 2 for a normal distribution.
 COVERED = 0.9545
+#: Texts that speak of parameters, beside which stands one of the volumetric error alone.
+_OF_PARAMETERS = ("rule_guard", "risk_guard", "rule_iso14253", "rule_ilac")
 #: Halvings of an interval that find a limit of acceptance to 1e-12 of the tolerance.
 _HALVINGS = 40
 
@@ -90,10 +92,11 @@ def statement_of(
     return ConformityStatement(
         *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged)), volumetric_p=volumetric_p),
         tuple(verdicts),
-        joint,
         result.state,
         " ".join(sentences),
         _process_in_words(verdicts, spreads, texts),
+        joint_probability=joint,
+        together=True,
     )
 
 
@@ -106,14 +109,15 @@ def _check_process(process: Mapping[str, float], names: Sequence[str], campaign:
 
 def _of_parameters(
     rule: str, result: ResultSet, limited: npt.NDArray[np.intp], limits: Array, freedoms: Mapping[str, float]
-) -> tuple[list[_Judged], float]:
-    """The parameters ``limited`` of a result against their ``limits``, and the joint probability of conformity."""
+) -> tuple[list[_Judged], float | None]:
+    """The parameters ``limited`` of a result against their ``limits``, and the joint probability of conformity; None of
+    none."""
     # Loaded here: most certificates state no conformity.
     from monitor.uncertainty.conformity import conformity
 
     names = [result.names[index] for index in limited]
     if not names:
-        return [], 1.0
+        return [], None
     tolerance = limits[limited]
     dofs = np.array([freedoms[name] for name in names])
     within = conformity(
@@ -188,7 +192,7 @@ def _rule_in_words(
     p = written_probability(result.p if volumetric_p is None else volumetric_p, sign)
     rule_text, risk = (
         texts(
-            f"conformity.{what}_{rule}{'_volumetric' if alone and rule == 'guard' else ''}",
+            f"conformity.{what}_{rule}{'_volumetric' if alone and f'{what}_{rule}' in _OF_PARAMETERS else ''}",
             p=p, wanted=wanted, failing=failing, covered=covered, outside=outside, count=len(result.names),
         )
         for what in ("rule", "risk")

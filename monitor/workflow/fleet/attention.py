@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from monitor.reporting.lacks import NO_MAP_STORED
+
 
 class Attention(StrEnum):
     """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
@@ -17,7 +19,7 @@ class Attention(StrEnum):
     DAYS_DIFFER = "days differ much more than runs"
     AS_USUAL = "as usual"
     ONE_DAY = "one day only, nothing to compare it with"
-    UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
+    UNJUDGED = f"limit not judged: {NO_MAP_STORED}"
 
 
 class Onset(StrEnum):

@@ -100,8 +100,9 @@ def _held(piece: Series) -> Trend:
 
 def _vectors(
     db: Database, history: MachineHistory, model: str | None, levels: Mapping[str, float]
-) -> _Vectors:
-    """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value."""
+) -> _Vectors | Lack:
+    """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value; why
+    there are none where the method leaves the place of the tool open."""
     # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
     from monitor.discovery import fit
     from monitor.effects import ChainEffect
@@ -125,7 +126,7 @@ def _vectors(
     if not names:
         raise DataError("none of the parameters is an error of the machine's chain")
     if "tip x" not in problem.local_names:
-        raise DataError("the method does not find the place of the tool")
+        return Lack(Part.VOLUMETRIC_FORECAST, Cause.NO_TOOL_PLACE)
     tip = problem.local_names.index("tip x")
     unit_of = {name: effect.unit for effect in effects for name in effect.parameters(problem.context)}
     factors = np.array([unit_of[name].factor for name in names])
@@ -261,6 +262,8 @@ def volumetric_forecast(
         vectors = _vectors(db, history, question.model, levels)
     except DataError as error:
         return replace(none, why=refused(Part.VOLUMETRIC_FORECAST, error))
+    if isinstance(vectors, Lack):
+        return replace(none, why=vectors)
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
     correlation, shrunk, _ = statistics.residual_correlation(_residuals(parameters), parameters.days)
     ahead = statistics.forecast_longest(

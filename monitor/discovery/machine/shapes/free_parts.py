@@ -13,6 +13,7 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.bends import score_beside
+from monitor.discovery.machine.shapes.curves import follows
 from monitor.discovery.machine.shapes.waves import worth_keeping
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
@@ -20,7 +21,8 @@ from monitor.discovery.search.products import Products
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
-from monitor.effects.shapes.free import HARMONICS, Free
+from monitor.effects.shape import DescribedShape
+from monitor.effects.shapes.free import HARMONICS, Follows, Free
 from monitor.records import Array
 
 # More parts than this of one shape are beyond what a plan can separate.
@@ -102,9 +104,38 @@ def with_nearest(
     shapes: Sequence[ChainCandidate],
     others: Sequence[ChainCandidate],
 ) -> ChainCandidate:
-    """A free shape and the best of ``shapes`` beside others, which is nearest to it."""
-    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    """A free shape and the best of ``shapes`` beside others, which is nearest to it; none that follows moves comes near
+    one without direction, unless there are no others."""
+    alike = (
+        [] if _has_direction(scene, free, others) else [shape for shape in shapes if not _is_of_moves(shape)]
+    )
+    weighed = weigh_beside(scene, alike or shapes, others)
+    nearest = max(weighed, key=lambda evidence: evidence.explained).candidate
     return replace(free, variant=replace(free.variant, nearest=nearest.family))
+
+
+def _has_direction(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a free shape beside others follows the direction of its axis, as its description says."""
+    effect, context = free.effect, scene.fit.problem.context
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Free)
+    if Follows.DIRECTION not in effect.shape.following(context, effect.term.joint):
+        return False
+    beside = scene.remainders.beside(others)
+    columns = without(beside.basis, free.columns)
+    inverse: Array = np.asarray(np.linalg.pinv(columns.T @ columns, hermitian=True), dtype=np.float64)
+    coefficients = inverse @ (columns.T @ beside.residual)
+    remaining = beside.residual - columns @ coefficients
+    variance = float(remaining @ remaining) / max(beside.degrees_of_freedom - len(coefficients), 1)
+    return Follows.DIRECTION in follows(context, effect, coefficients, variance * inverse)
+
+
+def _is_of_moves(candidate: ChainCandidate) -> bool:
+    """Whether the shape of an effect follows how its axis came to a position."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect) and isinstance(effect.shape, DescribedShape) and effect.shape.of_moves
+    )
 
 
 def most_together(
