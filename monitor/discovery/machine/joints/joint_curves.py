@@ -23,7 +23,7 @@ from scipy import special
 from monitor.discovery.machine.evidence.held_out import of_numbers, pose_blocks, poses_of
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainVariant, scene_of
-from monitor.discovery.machine.shapes.gears import FEWEST_POSITIONS, HIGHEST, in_rows
+from monitor.discovery.machine.shapes.gears import ENOUGH_POSITIONS, HIGHEST, in_rows
 from monitor.discovery.machine.shapes.tables import occupied
 from monitor.discovery.search.candidate import Variant, side_by_side
 from monitor.discovery.search.plausible import nearly_cancelled
@@ -262,7 +262,7 @@ def _joints(fit: Fit, pose: npt.NDArray[np.int64]) -> list[_Joint]:
     joints = []
     for index, joint in enumerate(context.chain.joints):
         position = context.positions[first, index]
-        if joint.kind != "rotary" or len(np.unique(np.round(position, 6))) < FEWEST_POSITIONS:
+        if joint.kind != "rotary" or len(np.unique(np.round(position, 6))) < ENOUGH_POSITIONS:
             continue
         # Whole orders repeat after a turn; over a travel of two turns half orders do.
         step = 1.0 / np.ceil(float(np.ptp(position)) / (2.0 * np.pi) - 1e-9)
