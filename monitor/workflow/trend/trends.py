@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC
 
 import numpy as np
 
@@ -163,7 +162,7 @@ def _answer(
         methods=tuple(dict.fromkeys(history.method.tolist())),
         agreement=agreement(db, history, [event for event in events if event.kind != NOTE]),
         events=tuple(
-            RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
+            RecordedEvent(event.at.isoformat(), event.kind, event.description)
             for event in events
         ),
         notes=(
@@ -361,7 +360,7 @@ def _with_event_steps(
             parameter,
             event_steps=tuple(
                 StepAtEvent(
-                    step.event.at.astimezone(UTC).isoformat(), step.event.kind, step.event.description, step.size,
+                    step.event.at.isoformat(), step.event.kind, step.event.description, step.size,
                     step.u, step.unit, step.p_value, "days" if step.by_days else "runs", step.decided,
                     step.undecided, step.drift,
                 )
