@@ -19,6 +19,8 @@ import pytest
 
 import monitor
 
+pytestmark = pytest.mark.usefixtures("unsearched")
+
 PACKAGE = Path(monitor.__file__).parent
 CONTRIBUTING = Path(__file__).resolve().parents[1] / "CONTRIBUTING.md"
 
