@@ -72,6 +72,6 @@ def test_a_hole_that_is_off_alike_in_all_parts_recurs(
 @pytest.mark.slow
 def test_no_hole_of_sound_parts_recurs(tmp_path: Path, seeds: Callable[[int, int], range]) -> None:
     """Of 60 sets of parts without a hole that is off none has any."""
-    for seed in seeds(60, 5):
+    for seed in seeds(60, 15):
         turns = np.random.default_rng(seed).uniform(-3.0, 3.0, 2 + seed % 3).tolist()
         assert explained(tmp_path / f"{seed}", 100 + seed, turns, (0.0, 0.0)).recurring == ()

@@ -129,7 +129,7 @@ def test_rates_of_bad_points_and_of_readings_that_recur(
 ) -> None:
     """Of 40 plates each: two single rows of 8 um named, and nothing in noise alone."""
     named = alarms = 0
-    plates = seeds(40, 2)
+    plates = seeds(40, 5)
     for seed in plates:
         rng = np.random.default_rng(1000 + seed)
         off = [(int(ball), run) for ball, run in zip(rng.choice(36, 2, replace=False), (1, 3), strict=True)]
