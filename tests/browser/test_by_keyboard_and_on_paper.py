@@ -1,6 +1,6 @@
 """Pages by keyboard alone, and on paper.
 
-In a file of their own, so that they run beside those of ``test_every_page.py``, which take as long as all others.
+In a file of their own: a file stays with one worker, so these run beside those of ``test_every_page.py``.
 """
 
 from __future__ import annotations
