@@ -49,7 +49,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
     """Every mistake that is tried of whole columns and of names throughout."""
     machine, readings = campaign.machine, campaign.probings.readings
     linear = [axis for axis in readings if machine.is_linear(axis)]
-    turning = [axis for axis in readings if not machine.is_linear(axis) and np.ptp(readings[axis]) > 0]
+    turning = turning_axes(campaign)
     measured = measured_columns(campaign)
     directed = DIRECTION[0] in campaign.probings.channels
     if directed:
@@ -136,6 +136,17 @@ def turned_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial
         yield f"the sign of {axis} were the other way round{hint}", _of_readings(_scaled((axis,), -1.0))
     for axis in linear:
         yield f"the sign of {axis} were the other way round", _of_readings(_scaled((axis,), -1.0))
+
+
+def signs_of_turning(campaign: Campaign) -> Iterator[Trial]:
+    """The signs of the axes that turn and moved."""
+    return turned_axes([], turning_axes(campaign))
+
+
+def turning_axes(campaign: Campaign) -> list[str]:
+    """The axes that turn, as far as they moved."""
+    readings = campaign.probings.readings
+    return [axis for axis in readings if not campaign.machine.is_linear(axis) and np.ptp(readings[axis]) > 0]
 
 
 def _exchanged_channels(measured: Sequence[str], channels: Mapping[str, Array]) -> Iterator[Trial]:

@@ -18,6 +18,7 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     column_mistakes,
     direction_mistakes,
     reading_mistakes,
+    signs_of_turning,
 )
 from monitor.discovery.machine.mistakes.cures import Maker, Mistake, cured_rms, without_gross
 from monitor.discovery.machine.mistakes.run_mistakes import run_alone
@@ -59,8 +60,10 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
 
 def find_reading_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit) -> tuple[Mistake, ...]:
     """The mistakes of the columns of what was measured, as ``find_mistakes``: deviations of micrometres with another
-    sign leave no more than micrometres."""
-    return _cures(without_gross(campaign, fit), problem_of, fit, reading_mistakes)
+    sign leave no more than micrometres. Where one of them is enough, so may be the sign of an axis that turns."""
+    campaign = without_gross(campaign, fit)
+    of_columns = _cures(campaign, problem_of, fit, reading_mistakes)
+    return of_columns and (*_cures(campaign, problem_of, fit, signs_of_turning), *of_columns)
 
 
 def _cures(
