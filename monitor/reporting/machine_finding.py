@@ -97,7 +97,8 @@ class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
     more is left than any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how. ``unseen``:
-    the tests of all residuals together do not show what is missing. ``not_followed`` are errors that the model has in a
+    the tests of all residuals together do not show what is missing; ``tolerated``: they do, but by so little that the
+    statement may be wrong. ``not_followed`` are errors that the model has in a
     shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
     ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
     explains the measurements without what was left out, and the tests of all residuals deny it."""
@@ -114,6 +115,7 @@ class MachineFinding:
     scattering: Sequence[Scattering] = ()
     unlike_runs: Sequence[RunUnlike] = ()
     unseen: bool = False
+    tolerated: bool = False
     not_followed: Sequence[str] = ()
     recurring: int = 0
     unchecked: bool = False
@@ -130,10 +132,20 @@ UNSEEN = (
     "The test of all residuals together, which `monitor compare` judges by, agrees with noise: what is named here is "
     "small beside their scatter, and stands out only where it is looked for by itself."
 )
+# What is said instead where they do not agree with it, but the statement may be wrong by as much.
+TOLERATED = (
+    "All residuals together, by which `monitor compare` judges, are larger than stated, not by chance, but by less "
+    "than the quarter that a statement may be wrong: what is named here stands out where it is looked for by itself."
+)
 # What is said of a comparison that these tests alone judge.
 TOGETHER = (
     "by all residuals together; `monitor explain {campaign}` also looks for single effects, which may be too small for "
     "this test"
+)
+# What is said besides where the residual is larger than stated, but the statement may be wrong by as much.
+LARGER = (
+    "the residual is larger than the stated uncertainty leaves ({p}), by less than the quarter that a statement may be "
+    "wrong"
 )
 # What is said where an error is in the model in an unknown shape.
 NOT_FOLLOWED = (
@@ -286,7 +298,7 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         rivals = f"{', '.join(named)} and {more} more" if more else ", ".join(named)
         sentences.append(f"These data cannot tell it apart from {rivals}.")
     if finding.unseen:
-        sentences.append(UNSEEN)
+        sentences.append(TOLERATED if finding.tolerated else UNSEEN)
     if further:
         sentences.append(f"It also lacks {joined_by_and(further)}.")
     if doubtful:

@@ -42,7 +42,8 @@ def mistakes(folder: Path, sign: int) -> list[str]:
     folder.mkdir()
     (folder / "campaign.toml").write_text(FILE.format(sign=sign), encoding="utf-8")
     (folder / "runs.csv").write_text(
-        "run,started_at,day,warm_up,ambient_degC\n1,2026-03-02T08:00:00+00:00,1,false,20.0\n", encoding="utf-8"
+        "run,started_at,day,warm_up,ambient_degC\n1,2026-03-02T08:00:00+00:00,1,false,20.0\n",
+        encoding="utf-8",
     )
     lines = [
         f"1,{row + 1},{6.0 * row:.1f},sphere,{angle[row]:.4f},{x:.3f},{y:.3f},{z:.3f}"
@@ -56,7 +57,7 @@ def mistakes(folder: Path, sign: int) -> list[str]:
 
 
 def test_the_sign_of_the_axis_is_among_what_mirrors_the_readings(tmp_path):
-    """A mirrored circle is one of columns exchanged, of one with the other sign, and of an axis that turns backwards."""
+    """Columns exchanged, one with the other sign and an axis that turns backwards mirror a circle alike."""
     assert mistakes(tmp_path, -1) == []
     first, *others = mistakes(tmp_path, 1)
     assert first == "the sign of C were the other way round (`sign` of C in campaign.toml)"

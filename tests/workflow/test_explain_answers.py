@@ -12,7 +12,13 @@ from monitor.discovery import Verdict
 from monitor.documents import from_document
 from monitor.exceptions import InputError
 from monitor.reporting.adjusting import remedy_holds_for
-from monitor.reporting.machine_finding import UNSEEN, MachineFinding, MissingEffect, machine_sentences
+from monitor.reporting.machine_finding import (
+    TOLERATED,
+    UNSEEN,
+    MachineFinding,
+    MissingEffect,
+    machine_sentences,
+)
 from monitor.reporting.runs_that_tell import runs_that_tell
 from monitor.store import Database, load_analysis
 from monitor.workflow.explain.compare import compare
@@ -76,6 +82,9 @@ def test_an_effect_that_all_residuals_together_do_not_show_is_said_to_be_small(u
     finding = MachineFinding(False, [missing], 0, (), (), 8, (), False, (), unseen=unseen)
     sentence = "The model lacks EXA:harmonic4: axial displacement of the A axis."
     assert machine_sentences(finding) == (f"{sentence} {UNSEEN}" if unseen else sentence)
+    # "agrees with noise" was said beside a residual that exceeds its statement with p = 4e-16.
+    larger = replace(finding, tolerated=True)
+    assert machine_sentences(larger) == (f"{sentence} {TOLERATED}" if unseen else sentence)
 
 
 def test_what_may_be_more_of_an_unknown_shape_is_not_said_to_hold() -> None:

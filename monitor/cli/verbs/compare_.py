@@ -11,7 +11,7 @@ from monitor.cli.contradiction_output import against_others, chance, likely_mist
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.records import Verdict
-from monitor.reporting.machine_finding import TOGETHER
+from monitor.reporting.machine_finding import LARGER, TOGETHER
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import (
     CompareAnswer,
@@ -53,6 +53,8 @@ def run(options: Namespace) -> int:
     residual_output.summary(answer.comparison)
     if isinstance(answer.comparison, MachineComparison) and answer.comparison.verdict is Verdict.EXPLAINED:
         output.say(TOGETHER.format(campaign=answer.comparison.campaign))
+        if answer.comparison.exceeds_statement:
+            output.say(LARGER.format(p=output.stated("p", answer.comparison.excess_over_statement_p)))
     if answer.instruments_disagree is not None:
         _disagreement(answer.comparison.campaign, answer.instruments_disagree)
     if answer.against_others is not None:

@@ -355,7 +355,10 @@ def _worst(fleet: Fleet) -> str:
     first, *others = urgent
     location = f" ({first.location})" if first.location else ""
     more = f"; also {_names(others)}" if others else ""
-    if any(row.state is first.state and not row.probability_out for row in others) and not first.probability_out:
+    if (
+        any(row.state is first.state and not row.probability_out for row in others)
+        and not first.probability_out
+    ):
         more += f" (no tolerance says which with {first.state} is the worst)"
     return f"{first.machine}{location}: {first.state}{more}."
 

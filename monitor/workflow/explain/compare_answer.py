@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.documents import INLINED, OMITTED, Said
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
@@ -103,6 +104,11 @@ class MachineComparison(InMicrometres):
     def expected_rms(self) -> float:
         """The RMS that the stated uncertainty would leave, in ``unit``."""
         return self.expected_rms_um
+
+    @property
+    def exceeds_statement(self) -> bool:
+        """Whether the residual is larger than stated beyond chance, be it by less than a statement may be wrong."""
+        return self.excess_over_statement_p < LACK_OF_FIT_LEVEL
 
 
 @dataclass(frozen=True)

@@ -340,6 +340,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 hopeless=is_hopeless(explanation),
                 mistakes=mistakes_found(explanation.mistakes),
                 unseen=explanation.together is Verdict.EXPLAINED,
+                tolerated=comparison.exceeds_statement,
                 not_followed=explanation.not_followed,
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,

@@ -122,8 +122,8 @@ class DatedChange:
 
 @dataclass(frozen=True)
 class StepAtEvent:
-    """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` by the clock of the
-    shop, with its offset.
+    """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` by the clock of
+    the shop, with its offset.
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
     then it is not ``decided`` whether it is a step, nor where days that follow each other explain it, nor where one or

@@ -161,10 +161,7 @@ def _answer(
         campaigns=tuple(dict.fromkeys(history.campaign.tolist())),
         methods=tuple(dict.fromkeys(history.method.tolist())),
         agreement=agreement(db, history, [event for event in events if event.kind != NOTE]),
-        events=tuple(
-            RecordedEvent(event.at.isoformat(), event.kind, event.description)
-            for event in events
-        ),
+        events=tuple(RecordedEvent(event.at.isoformat(), event.kind, event.description) for event in events),
         notes=(
             *map(str, same_hours(history)),
             *_simulated(db, history),
