@@ -19,6 +19,8 @@ import pytest
 import monitor
 from monitor.cli.parser import VERBS, verb_parser
 
+pytestmark = pytest.mark.usefixtures("unsearched")
+
 PACKAGE = Path(monitor.__file__).parent
 COMMAND_LINE = Path(__file__).resolve().parents[1] / "docs" / "command-line.md"
 #: Options that all verbs have; the document says so once.

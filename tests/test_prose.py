@@ -15,6 +15,8 @@ import pytest
 
 import monitor
 
+pytestmark = pytest.mark.usefixtures("unsearched")
+
 WORKFLOW = Path(monitor.__file__).parent / "workflow"
 #: So many words are prose; names of kinds, questions and columns have fewer.
 FEWEST_WORDS = 4

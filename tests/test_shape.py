@@ -17,6 +17,8 @@ import pytest
 
 import monitor
 
+pytestmark = pytest.mark.usefixtures("unsearched")
+
 PACKAGE = Path(monitor.__file__).parent
 MOST_BRANCHES = 15
 MOST_PARAMETERS = 10
@@ -47,10 +49,10 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 @functools.cache
-def parsed(package: Path) -> list[tuple[str, ast.Module]]:
-    """Return the path of every file below the package, and its syntax tree."""
+def parsed(package: Path) -> list[tuple[str, list[ast.AST]]]:
+    """Return the path of every file below the package, and the nodes of its syntax tree."""
     return [
-        (path.relative_to(package).as_posix(), ast.parse(path.read_text(encoding="utf-8")))
+        (path.relative_to(package).as_posix(), list(ast.walk(ast.parse(path.read_text(encoding="utf-8")))))
         for path in sorted(package.rglob("*.py"))
     ]
 
@@ -64,8 +66,8 @@ def no_longer_parsed() -> Iterator[None]:
 
 def functions(package: Path) -> Iterator[tuple[str, Function]]:
     """Yield the file of every function, method and function inside a function, and its node."""
-    for file, tree in parsed(package):
-        for node in ast.walk(tree):
+    for file, nodes in parsed(package):
+        for node in nodes:
             if isinstance(node, _FUNCTIONS):
                 yield file, node
 
@@ -129,14 +131,14 @@ def too_long(package: Path) -> list[str]:
 def patched(package: Path) -> list[str]:
     """Return every assignment to a name of an imported module that is not ours, and to ``sys.modules``."""
     faults = []
-    for file, tree in parsed(package):
+    for file, nodes in parsed(package):
         modules = {
             (name.asname or name.name).partition(".")[0]
-            for node in ast.walk(tree)
+            for node in nodes
             if isinstance(node, ast.Import)
             for name in node.names
         }
-        for node in ast.walk(tree):
+        for node in nodes:
             targets = node.targets if isinstance(node, ast.Assign) else []
             for target in targets:
                 held = target.value if isinstance(target, ast.Attribute | ast.Subscript) else None
@@ -150,8 +152,8 @@ def patched(package: Path) -> list[str]:
 def vague_names(package: Path) -> list[str]:
     """Return every name of a variable, field or parameter that does not say what it holds."""
     faults = []
-    for file, tree in parsed(package):
-        for node in ast.walk(tree):
+    for file, nodes in parsed(package):
+        for node in nodes:
             if isinstance(node, ast.arg):
                 name = node.arg
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):

@@ -19,6 +19,8 @@ import pytest
 
 import monitor
 
+pytestmark = pytest.mark.usefixtures("unsearched")
+
 PACKAGE = Path(monitor.__file__).parent
 CONTRIBUTING = Path(__file__).resolve().parents[1] / "CONTRIBUTING.md"
 
@@ -120,10 +122,18 @@ def imported(path: Path, package: Path) -> tuple[tuple[int, str], ...]:
     return tuple(_imported(path, package))
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Every statement below a node: expressions, which are most of a tree, hold none."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
+            yield child
+            yield from statements(child)
+
+
 def _imported(path: Path, package: Path) -> Iterator[tuple[int, str]]:
     relative = path.relative_to(package.parent)
     here = relative.parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
+    for node in statements(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -28,7 +28,7 @@ from monitor.store.curves import (
     is_curve_number,
     stored_curve_content,
 )
-from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
+from monitor.store.import_notes import keep_fingerprints, keep_notes
 from monitor.store.past import campaign_runs
 
 
@@ -103,7 +103,7 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
         _insert_runs(db, campaign_id, campaign.runs)
         campaign_runs.insert_runs(db, campaign_id)
         probings.insert(db, campaign_id, rows)
-        keep_fingerprints(db, campaign_id, run_fingerprints(campaign.probings))
+        keep_fingerprints(db, campaign_id, campaign.probings)
         _record(db, campaign.name, campaign_id, content)
         keep_notes(db, campaign_id, notes)
     return imported

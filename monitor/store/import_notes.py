@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.records import Probings
+from monitor.records import Array, Probings
 from monitor.store import audit, probings
 from monitor.store.connection import Database
 from monitor.store.record_json import as_imported, machine_record
@@ -30,16 +30,13 @@ ROWS_AT_ONCE = 50_000
 MOST_CAMPAIGNS, MOST_PAIRS = 5, 5
 
 
-def run_fingerprints(touches: Probings) -> dict[int, str]:
+def run_fingerprints(touches: Probings, *, signed_zeros: bool = False) -> dict[int, str]:
     """The hash of targets and readings by run, of every run with ``FEWEST_PROBINGS`` or more.
 
-    Times and recorded conditions (temperatures) are left out: who copies a run may give it others.
+    Times and recorded conditions (temperatures) are left out: who copies a run may give it others. So is the sign of a
+    zero, which a workbook does not keep; with ``signed_zeros`` it counts, as it did until November 2026.
     """
-    measured = {**touches.readings} | {
-        name: values
-        for name, values in touches.channels.items()
-        if name.rpartition("_")[2] not in CONDITION_SUFFIXES
-    }
+    measured = _measured(touches)
     order = np.argsort(touches.run, kind="stable")
     runs, starts = np.unique(touches.run[order], return_index=True)
     prints = {}
@@ -52,15 +49,24 @@ def run_fingerprints(touches: Probings) -> dict[int, str]:
             fingerprint.update(("\0" * bool(start) + "\0".join(targets)).encode())
         for name in sorted(measured):
             fingerprint.update(
-                name.encode() + b"\0" + np.asarray(measured[name][rows], dtype="<f8").tobytes()
+                name.encode() + b"\0" + audit.bits(measured[name][rows], signed_zeros=signed_zeros)
             )
         prints[int(run)] = fingerprint.hexdigest()
     return prints
 
 
-def keep_fingerprints(db: Database, campaign_id: int, prints: dict[int, str]) -> None:
+def _measured(touches: Probings) -> dict[str, Array]:
+    """Readings, and channels that are no recorded conditions, by name."""
+    return {**touches.readings} | {
+        name: values
+        for name, values in touches.channels.items()
+        if name.rpartition("_")[2] not in CONDITION_SUFFIXES
+    }
+
+
+def keep_fingerprints(db: Database, campaign_id: int, touches: Probings) -> None:
     """Add the hashes of a campaign's runs, and those of campaigns that came in before there were any."""
-    _insert(db, campaign_id, prints)
+    _insert(db, campaign_id, run_fingerprints(touches) | _known_with_signs(db, touches))
     older = db.rows(
         "SELECT campaign_id, campaign, machine_description FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
         "AND campaign_id NOT IN (SELECT campaign_id FROM run_fingerprint) ORDER BY campaign_id",
@@ -71,6 +77,19 @@ def keep_fingerprints(db: Database, campaign_id: int, prints: dict[int, str]) ->
             described = machine_record(machine)
         record = probings.as_record(probings.select(db, number), described)
         _insert(db, number, run_fingerprints(record))
+
+
+def _known_with_signs(db: Database, touches: Probings) -> dict[int, str]:
+    """The hashes with the signs of zeros, by run, of those that the database holds so from before November 2026: stored
+    hashes are in the audit and stay, and the same file is a copy of them all the same."""
+    if not any(np.any((values == 0.0) & np.signbit(values)) for values in _measured(touches).values()):
+        return {}
+    prints = run_fingerprints(touches, signed_zeros=True)
+    stored = db.rows(
+        "SELECT DISTINCT readings_sha256 FROM run_fingerprint WHERE readings_sha256 IN (SELECT unnest(?::VARCHAR[]))",
+        [list(prints.values())],
+    )
+    return {run: fingerprint for run, fingerprint in prints.items() if (fingerprint,) in stored}
 
 
 def _insert(db: Database, campaign_id: int, prints: dict[int, str]) -> None:

@@ -60,9 +60,7 @@ def history(
 
 
 def main(count: int) -> None:
-    print(
-        "days  day component  between  within  apart  one for both, %: 5, 1, 0.1  as trend has it: 5, 1, 0.1"
-    )
+    print("days  day component  between  within  apart  one for both, below 5, 1, 0.1 %  as trend has it")
     for number, (days, kind, between, within) in enumerate(SETTINGS):
         below, apart = np.zeros((2, 3), dtype=int), 0
         for seed in range(count if not between else max(count // 10, 1)):

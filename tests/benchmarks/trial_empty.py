@@ -145,7 +145,9 @@ def campaigns(options: argparse.Namespace) -> Iterator[tuple[int, str, list[str]
             kinds = [name for _ in range(first, min(first + PORTION, options.seeds)) for name in names]
             noises = []
             for index, name in enumerate(kinds):
-                rng = np.random.default_rng((options.first + first + index // len(names), count))
+                seed = options.first + first + index // len(names)
+                # Draws of its own for each noise: the sum over all counts independent campaigns.
+                rng = np.random.default_rng((seed, count, list(NOISES).index(name)))
                 sizes = 1e-3 * NOISES[name](rng, plan.run)
                 if name.startswith("rounded"):
                     sizes = np.round(plan.readings + sizes, 3) - plan.readings

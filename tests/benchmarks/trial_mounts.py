@@ -49,7 +49,7 @@ def noise(rng: np.random.Generator, count: int, rho: float, heavy: bool) -> np.n
 def trial(mount: str, seed: int, hidden: int, rho: float, heavy: bool) -> tuple[list[str], float]:
     """The effects that are found, and the seconds of processor time."""
     axes, latitude, along, limits = MOUNTS[mount]
-    rng = np.random.default_rng((seed, hidden))
+    rng = np.random.default_rng((seed, hidden, list(MOUNTS).index(mount)))
     height = np.deg2rad(rng.uniform(20.0, 60.0) if latitude is None else latitude)
     gravity = (-np.cos(height), 0.0, -np.sin(height))
     down, tool = np.array(gravity), np.array(along)
@@ -99,6 +99,7 @@ def main() -> None:
     """Print a line for every mount and number of hidden effects."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=40)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--rho", type=float, default=0.0)
     parser.add_argument("--heavy", action="store_true")
     options = parser.parse_args()
@@ -109,9 +110,8 @@ def main() -> None:
     for mount in MOUNTS:
         for hidden in (0, 1, 2):
             wanted = [FLEXURE, REFRACTION][:hidden]
-            results = [
-                trial(mount, seed, hidden, options.rho, options.heavy) for seed in range(options.seeds)
-            ]
+            seeds = range(options.first, options.first + options.seeds)
+            results = [trial(mount, seed, hidden, options.rho, options.heavy) for seed in seeds]
             exact = sum(found == wanted for found, _ in results)
             first = sum(found[:hidden] == wanted for found, _ in results)
             false = sum(len([effect for effect in found if effect not in wanted]) for found, _ in results)
@@ -120,7 +120,7 @@ def main() -> None:
                 f"| {mount} | {hidden} | {len(results)} | {exact} | {first} | {false} | "
                 f"{np.mean(seconds):.2f} (at most {max(seconds):.2f}) |"
             )
-            for seed, (found, _) in enumerate(results):
+            for seed, (found, _) in zip(seeds, results, strict=True):
                 if found != wanted:
                     print(f"  seed {seed}: {', '.join(found) or 'nothing'}", file=sys.stderr)
 

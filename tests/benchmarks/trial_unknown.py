@@ -107,6 +107,10 @@ FAMILIES: dict[str, tuple[tuple[str, ...], str, Curve]] = {
 }
 
 
+# More seeds than anyone asks for of one family.
+SEEDS_APART = 1000
+
+
 def autoregressive(rho: float) -> Callable[[np.random.Generator, np.ndarray], np.ndarray]:
     """Noise whose neighbours in a run have the correlation rho."""
 
@@ -233,13 +237,15 @@ def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iter
         "| finds | finds, knowing the error | finds, one more unknown | seconds | else |"
     )
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
-    for peak in peaks:
+    for strength, peak in enumerate(peaks):
         all_alone, all_rival, all_able, count, powers = 0, 0, 0, 0, np.zeros(3)
-        for name, (right, _, _) in FAMILIES.items():
+        for family, (name, (right, _, _)) in enumerate(FAMILIES.items()):
             if only not in name:
                 continue
-            campaigns = [visible(seed, name, peak, runs) for seed in seeds]
-            answers = [told(campaign, seed) for (campaign, _), seed in zip(campaigns, seeds, strict=True)]
+            # Noise of its own for each: the same one under all families would make their intervals too short.
+            own = [seed + SEEDS_APART * (strength * len(FAMILIES) + family) for seed in seeds]
+            campaigns = [visible(seed, name, peak, runs) for seed in own]
+            answers = [told(campaign, seed) for (campaign, _), seed in zip(campaigns, own, strict=True)]
             errors = [[text.partition(":")[0] for text in answer.effects] for answer in answers]
             alone = [bool(named) and set(named) <= set(right) for named in errors]
             led = sum(bool(named) and named[0] in right for named in errors)
@@ -281,16 +287,15 @@ def empties(seeds: range, runs: list[int], only: str) -> Iterator[str]:
         return
     yield "| noise | runs | false effects | seconds | named |"
     yield "| --- | --- | --- | --- | --- |"
-    for count in runs:
+    for plan, count in enumerate(runs):
         days, each = PLANS[count]
-        for name, options in NOISES.items():
+        for kind, (name, options) in enumerate(NOISES.items()):
             if only not in name:
                 continue
+            own = [20000 + seed + SEEDS_APART * (plan * len(NOISES) + kind) for seed in seeds]
             answers = [
-                told(
-                    virtual_campaigns.virtual(20000 + seed, days=days, runs_per_day=each, **options)[0], seed
-                )
-                for seed in seeds
+                told(virtual_campaigns.virtual(seed, days=days, runs_per_day=each, **options)[0], seed)
+                for seed in own
             ]
             false = [answer for answer in answers if answer.effects]
             named = sorted({answer.effects[0] for answer in false})[:4]

@@ -75,7 +75,7 @@ def test_sigkill_in_the_middle_of_import(
     folders = [examples / name for name in RUNS]
     whole_time = duration(lambda: started("--db", tmp_path / "first.duckdb", "import", *folders))
     seen = []
-    for place in seeds(len(FRACTIONS), 2):
+    for place in seeds(len(FRACTIONS), 1):
         path = tmp_path / f"{place}.duckdb"
         start = started("--db", path, "import", *folders)
         status = killed(start, FRACTIONS[place] * whole_time, signal.SIGKILL)
@@ -93,7 +93,7 @@ def test_sigkill_in_the_middle_of_identify(started: Any, db: Path, seeds: Any) -
     with Database(db) as opened:
         before = dict(opened.rows(count))
     whole_time = duration(lambda: started("--db", db, "identify"))
-    for place in seeds(len(FRACTIONS), 2):
+    for place in seeds(len(FRACTIONS), 1):
         status = killed(started("--db", db, "identify"), FRACTIONS[place] * whole_time, signal.SIGKILL)
         assert status in (0, -signal.SIGKILL)
         assert len(whole(db)) == 3
@@ -123,7 +123,7 @@ def test_sigkill_in_the_middle_of_a_certificate(
     ]
     whole_time = duration(lambda: started(*issue))
     random_places = random.Random(7)
-    for _ in seeds(3, 2):
+    for _ in seeds(3, 1):
         status = killed(started(*issue), random_places.uniform(0.5, 1.0) * whole_time, signal.SIGKILL)
         assert status in (0, -signal.SIGKILL)
         assert len(whole(db)) == 3

@@ -90,7 +90,7 @@ def _copied(killed: Path, folder: Path) -> Path:
 
 #: Those that read the tables, views and files in ways of their own; some have their turn in ``make slow``, the others,
 #: which read as one of these does, in ``make trials``.
-QUICK, SLOW = ("campaigns", "trend", "verify", "backup"), ("runs", "fleet", "certificate", "export")
+QUICK, SLOW = ("campaigns", "verify"), ("trend", "backup", "runs", "fleet", "certificate", "export")
 
 
 def _turn(verb: str) -> tuple[pytest.MarkDecorator, ...]:

@@ -27,10 +27,11 @@ def script() -> Any:
     return _script()
 
 
+#: The series of the tests that ``make test`` runs; ``make slow`` has all.
+QUICK = ("enso", "mpc61", "mpc62", "mpc633", "randn", "randu", "soulen", "zarr13")
+
+
 @pytest.fixture(scope="session")
 def told(script: Any, thorough: bool) -> dict[str, Any]:
-    """Explain and history of every series, all the way from a folder to the database; without the two longest ones.
-
-    Half of the processor time is theirs; ``make slow`` has them.
-    """
-    return script.tell(None if thorough else tuple(set(script.series()) - {"lew", "dziuba1"}))
+    """Explain and history of every series, or of ``QUICK``, all the way from a folder to the database."""
+    return script.tell(None if thorough else QUICK)

@@ -21,8 +21,8 @@ def names(found):
 @pytest.mark.parametrize(
     ("effect", "options"),
     [
-        ("EYY:cyclic16mm", {"direction": (1.0, -0.4)}),
-        ("EB0C@run_time", {}),
+        pytest.param("EYY:cyclic16mm", {"direction": (1.0, -0.4)}, marks=pytest.mark.slow),
+        pytest.param("EB0C@run_time", {}, marks=pytest.mark.slow),
         ("stem:gravity", {"targets": ("3",)}),
         # Of their kinds the labelled campaigns and other tests have one each.
         pytest.param("artefact:expansion@run_time", {}, marks=pytest.mark.all_seeds),

@@ -44,6 +44,7 @@ def names(found):
     return {found.effect, *(rival.effect for rival in found.rivals)}
 
 
+@pytest.mark.slow
 def test_poses_tell_the_table_from_the_pivot(virtual_campaigns, explained, campaign_with):
     """In the cold-cold plan C turns three times as far as B: run-out of C and of B coincide, until they part."""
     sim = simulator()

@@ -49,6 +49,7 @@ def test_a_base_that_drifts_beside_resting_reflectors_is_no_drift_of_the_tracker
     assert all("0J1@" in effect for effect in effects)
 
 
+@pytest.mark.slow
 def test_a_base_that_settles_beside_resting_reflectors_is_no_drift_of_the_tracker(tmp_path: Path) -> None:
     """Was told tracker:shift@warmup: the base was asked at time constants of a grid, the tracker at its best one."""
     effects = named(tmp_path, 2, "base that settles")

@@ -13,8 +13,9 @@ from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, las
 TARGETS = np.linspace(0.0, 500.0, 11)
 
 
-def context(folder, beyond_mm, first_from_mm, play_um, seed=3):
-    """The context of three runs there and back with both ends read twice; a play operator of its own."""
+def context(folder, beyond_mm, first_from_mm, play_um, seed=3, *, other_axis_mm=0.0):
+    """The context of three runs there and back with both ends read twice; a play operator of its own. ``other_axis_mm``
+    is the scatter of the positions of an axis that stands."""
     rng = np.random.default_rng(seed)
     chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in WAYS.items()))
     rows = []
@@ -29,7 +30,12 @@ def context(folder, beyond_mm, first_from_mm, play_um, seed=3):
             before = x
             if is_read:
                 reading = 1e3 * x - side * play_um / 2.0 + rng.normal(0.0, 0.3)
-                rows.append({"run": run, "setup": "laser", "X": x, "Y": 0.0, "Z": 0.0, "reading_um": reading})
+                y = float(rng.normal(0.0, other_axis_mm))
+                rows.append({"run": run, "setup": "laser", "X": x, "Y": y, "Z": 0.0, "reading_um": reading})
+    return _context_of(folder, chain, rows)
+
+
+def _context_of(folder, chain, rows):
     days = [f"2026-03-0{day}T20:00:00+00:00" for day in (2, 3, 4)]
     campaign = read_campaign(chain.write(folder / "laser", laser(), rows, started=days))
     return campaign_method(campaign).problem_of(campaign).context
@@ -59,3 +65,38 @@ def test_a_play_over_a_width_has_turned_over_where_a_row_was_approached_anew(tmp
     found = context(tmp_path, 5.0, 5.0, play_um=5.0)
     effect = parse_effect("EXX:windup20mm", found.chain)
     np.testing.assert_allclose(effect.shape.columns(found, 1)[10:12, 0], [1.0, -1.0])
+
+
+def test_an_axis_that_stands_may_show_positions_that_scatter(tmp_path):
+    """The third decimal of an encoder is no move."""
+    travel = context(tmp_path, 5.0, 5.0, play_um=5.0, other_axis_mm=1e-3).travel[:22, 1]
+    np.testing.assert_array_equal(travel, [1.0] * 11 + [-1.0] * 11)
+
+
+def no_play(folder, error_um, targets=TARGETS, pause_s=0.0):
+    """The context of three runs that read both ends twice, the second time after a pause; ``error_um`` is of position,
+    last move and seconds."""
+    rng = np.random.default_rng(5)
+    chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in WAYS.items()))
+    rows = []
+    for run in (1, 2, 3):
+        seconds, move, before = 0.0, 0.0, float(targets[0])
+        for index, x in enumerate([*targets, *targets[::-1]]):
+            seconds += 20.0 + pause_s * (index == len(targets))
+            move = float(x) - before if index != len(targets) else 0.0
+            before = float(x)
+            reading = 1e3 * x + error_um(x, move, seconds) + rng.normal(0.0, 0.3)
+            row = {"run": run, "setup": "laser", "time_s": seconds, "X": x, "Y": 0.0, "Z": 0.0}
+            rows.append({**row, "reading_um": reading})
+    return _context_of(folder, chain, rows)
+
+
+def test_a_lag_is_not_taken_for_a_play_that_turned(tmp_path):
+    """It vanishes where the axis stood; steps of several lengths tell it from a play."""
+    targets = TARGETS + np.random.default_rng(1).uniform(-8.0, 8.0, len(TARGETS))
+    assert no_play(tmp_path, lambda x, move, seconds: 0.1 * move, targets).approach is None
+
+
+def test_what_drifted_in_a_long_pause_at_an_end_is_no_play_that_turned(tmp_path):
+    """A zero that moved by 4 um while the axis stood is what the turned side of a play would be."""
+    assert no_play(tmp_path, lambda x, move, seconds: 4.0 * (seconds > 500.0), pause_s=600.0).approach is None

@@ -251,6 +251,28 @@ def test_a_whole_file_in_inches_makes_no_row_a_gross_reading(altered: Callable[.
     assert gross_doubts(campaign) == ()
 
 
+def test_runs_with_a_copied_moment_are_named() -> None:
+    campaign = read_campaign(EXAMPLES / "five-days")
+    assert isinstance(campaign, Campaign)
+
+    def copied(*numbers: int) -> str:
+        """What is said where runs state the moment of run 2."""
+        moment = campaign.runs[1].started_at
+        runs = [replace(run, started_at=moment) if run.run in numbers else run for run in campaign.runs]
+        (sentence,) = doubts(replace(campaign, runs=tuple(runs)))
+        return sentence
+
+    of_all = len(campaign.runs)
+    assert re.match(
+        rf"runs 2 and 3 state the same started_at, \d{{4}}-\d\d-\d\d \d\d:\d\d \(2 of {of_all} runs share",
+        copied(3),
+    )
+    assert copied(3).endswith(
+        "Correct started_at in runs.csv: warm-up of the day, drifts and trends count from it"
+    )
+    assert copied(3, 4).startswith("runs 2, 3, ... state the same started_at")
+
+
 def test_a_run_that_is_still_to_come_is_named_with_what_to_do(altered: Callable[..., Path]) -> None:
     folder = altered("tilting-table")
     runs = folder / "runs.csv"

@@ -145,6 +145,7 @@ def test_refused_parameters_are_named_without_numbers(make_record: Make) -> None
     assert "EX0C1" not in pages[1]
 
 
+@pytest.mark.slow
 def test_the_same_record_gives_the_same_bytes_in_another_process(
     usual: bytes, make_record: Make, tmp_path: Path
 ) -> None:

@@ -149,7 +149,8 @@ class SimulatedChain:
         days: Sequence[int] | None = None,
     ) -> Path:
         """Write the folder: ``rows`` hold run, the readings by axis and the columns of the instruments; every run is a
-        day of its own unless ``days`` says otherwise."""
+        day of its own unless ``days`` says otherwise, and every row a minute after the one before unless it has
+        ``time_s``."""
         folder.mkdir(parents=True)
         (folder / "campaign.toml").write_text(self.toml(folder.name, setups), encoding="utf-8")
         runs = ["run,started_at,day,warm_up,ambient_degC"]
@@ -159,11 +160,13 @@ class SimulatedChain:
             for run, (moment, day) in enumerate(zip(started, numbers, strict=True), start=1)
         ]
         (folder / "runs.csv").write_text("\n".join(runs) + "\n", encoding="utf-8")
-        others = list(dict.fromkeys(name for row in rows for name in row if name not in ("run", "setup")))
+        others = list(
+            dict.fromkeys(name for row in rows for name in row if name not in ("run", "setup", "time_s"))
+        )
         others = [name for name in others if name not in {axis.name for axis in self.all_axes}]
         lines = [",".join(["run,sequence,time_s,setup", *(axis.column for axis in self.all_axes), *others])]
         for number, row in enumerate(rows):
-            cells = [row.get("run", 1), number + 1, 60.0 * number, row["setup"]]
+            cells = [row.get("run", 1), number + 1, row.get("time_s", 60.0 * number), row["setup"]]
             cells += [repr(float(row[axis.name])) for axis in self.all_axes]
             cells += ["" if row.get(name) is None else _cell(row[name]) for name in others]
             lines.append(",".join(map(str, cells)))

@@ -296,6 +296,42 @@ def test_campaigns_from_before_the_hashes_are_compared_too(
     assert len(campaign_notes(db, "two")) == 1
 
 
+def signed(campaign: Campaign, zero: float) -> Campaign:
+    """The campaign with a ``zero`` of either sign as its first reading of X."""
+    x = campaign.probings.readings["X"].copy()
+    x[0] = zero
+    return replace(
+        campaign, probings=replace(campaign.probings, readings={**campaign.probings.readings, "X": x})
+    )
+
+
+def test_the_sign_of_a_zero_makes_no_other_measurement(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    """A workbook writes 0 where a program writes -0.0."""
+    import_campaign(db, signed(long_campaign(make_campaign, "csv"), -0.0))
+    import_campaign(db, signed(long_campaign(make_campaign, "xlsx"), 0.0))
+    (note,) = campaign_notes(db, "xlsx")
+    assert note.startswith("2 runs of xlsx equal those of campaign csv in every reading")
+
+
+def test_hashes_from_before_in_which_the_sign_counts_stay_and_are_found_again(
+    db: Database, make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = signed(long_campaign(make_campaign, "before"), -0.0)
+    with monkeypatch.context() as as_before:
+        as_before.setattr(
+            "monitor.store.import_notes.run_fingerprints",
+            lambda touches, **_: run_fingerprints(touches, signed_zeros=True),
+        )
+        import_campaign(db, before)
+    stored = db.rows("SELECT * FROM run_fingerprint ORDER BY ALL")
+    import_campaign(db, replace(before, name="again"))
+    (note,) = campaign_notes(db, "again")
+    assert note.startswith("2 runs of again equal those of campaign before in every reading")
+    assert db.rows("SELECT * FROM run_fingerprint WHERE campaign_id = 1 ORDER BY ALL") == stored
+
+
 def test_the_hash_of_a_run_does_not_depend_on_how_much_of_it_is_hashed_at_a_time(
     make_campaign: Callable[..., Campaign], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -20,7 +20,7 @@ from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.reading import Plain
 from monitor.methods.instruments.readings.vector import VectorReading
 from monitor.records import Array, Setup
-from monitor.units import UNIT_WORDS, mistaken_for_mm
+from monitor.units import DEGREE, UNIT_WORDS, mistaken_for_mm
 
 # mm. A work point is stated to some millimetres. Positions in inches, with another sign or of another column put it a
 # hundred away, and the fit follows them: the errors come out as of a machine of another size.
@@ -44,6 +44,11 @@ class _Trial:
     columns: npt.NDArray[np.int64]
     factors: Array
 
+    @property
+    def shrinks(self) -> bool:
+        """Whether the axes move less with it undone."""
+        return bool(np.any(np.abs(self.factors) < 1.0))
+
 
 @dataclass(frozen=True)
 class _Cure:
@@ -62,12 +67,20 @@ class _Stay:
     part: Part
     number: int
 
+    def positions(self, trial: _Trial) -> Array:
+        """The positions (m, J) of the axes with a mistake undone."""
+        return self.part.rows.positions[:, trial.columns] * trial.factors
+
     def vectors(self, trial: _Trial) -> Array:
         """Where a machine without errors puts the tool point from the stated work point, less what was read, (m, 3)
         mm."""
-        positions = self.part.rows.positions[:, trial.columns] * trial.factors
-        part = replace(self.part, rows=replace(self.part.rows, positions=positions))
+        part = replace(self.part, rows=replace(self.part.rows, positions=self.positions(trial)))
         return nominal(part) - read_in_work(part)
+
+    def travel(self, trial: _Trial) -> float:
+        """The RMS distance, mm, of the places of the linear axes from their mean with a mistake undone."""
+        linear = [not joint.turns for joint in self.part.rows.chain.joints]
+        return _wanders(self.positions(trial)[:, linear])
 
 
 def mistaken_axes(parts: Iterable[Part], numbers: npt.NDArray[np.int64], *, everywhere: bool) -> str | None:
@@ -120,7 +133,10 @@ def _stays(part: Part, numbers: npt.NDArray[np.int64]) -> Iterator[_Stay]:
 
 
 def _tried(stays: Sequence[_Stay], trial: _Trial, most: float) -> _Cure | None:
-    """A trial as a cure; None where the tool point wanders by more than ``most`` with it undone."""
+    """A trial as a cure; None where the tool point wanders by more than ``most`` with it undone. Of axes that hardly
+    move with it undone it has to stay within a part of what they do: one that never moved stays, whatever is wrong."""
+    if trial.shrinks:
+        most = min(most, LEFT_BY_MISTAKE * max(stay.travel(trial) for stay in stays))
     wanders, off = 0.0, float("nan")
     for stay in stays:
         vectors = stay.vectors(trial)
@@ -145,7 +161,7 @@ def _best(cures: Sequence[_Cure]) -> list[_Cure]:
 
 
 def _wanders(vectors: Array) -> float:
-    """The RMS distance of points (m, 3) from their mean."""
+    """The RMS distance of points (m, d) from their mean."""
     return float(np.sqrt(np.mean(np.sum((vectors - vectors.mean(axis=0)) ** 2, axis=1))))
 
 
@@ -186,6 +202,12 @@ def _units(joints: Sequence[Joint], moved: Sequence[int]) -> Iterator[_Trial]:
     for unit in mistaken_for_mm() if linear else ():
         factors = dict.fromkeys(linear, unit.factor)
         yield _trial(f"{columns} {verb} {UNIT_WORDS[unit]}", joints, factors=factors)
+    turning = [index for index in moved if joints[index].turns]
+    together = [turning] if len(turning) > 1 else []
+    for group in (*together, *([index] for index in turning)):
+        columns = _joined(sorted(_column(joints[index]) for index in group))
+        factors = dict.fromkeys(group, 1.0 / DEGREE.factor)
+        yield _trial(f"{columns} {'were' if len(group) > 1 else 'was'} in radians", joints, factors=factors)
 
 
 def _trial(

@@ -65,6 +65,7 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
             _temperatures(campaign),
             _pressure_and_humidity(campaign),
             _days(campaign),
+            _same_start(campaign),
             _to_come(campaign),
             repeated_rows(campaign),
             zero_rows(campaign, frames),
@@ -306,6 +307,22 @@ def _days(campaign: Campaign) -> Iterator[str]:
             f"{len(began) - 1} such): are the numbers in the column day those of days? What days differ by is "
             f"estimated from them; runs of one date have one number, so give run {later.run} day {earlier.day} in "
             f"{runs_in(campaign)}"
+        )
+
+
+def _same_start(campaign: Campaign) -> Iterator[str]:
+    """Runs that cannot have begun at one moment, on one machine."""
+    by_moment: dict[datetime, list[Run]] = {}
+    for run in campaign.runs:
+        by_moment.setdefault(run.started_at, []).append(run)
+    alike = [runs for runs in by_moment.values() if len(runs) > 1]
+    if alike:
+        first, second, *more = alike[0]
+        named = f"{first.run}, {second.run}, ..." if more else f"{first.run} and {second.run}"
+        yield (
+            f"runs {named} state the same started_at, {first.started_at:%Y-%m-%d %H:%M} ({sum(map(len, alike))} of "
+            f"{len(campaign.runs)} runs share theirs with another): one machine makes one run at a time. Was a header "
+            f"copied? Correct started_at in {runs_in(campaign)}: warm-up of the day, drifts and trends count from it"
         )
 
 

@@ -151,8 +151,8 @@ class ConditionEffect:
     rate over the conditions of all parameters. Beside several instruments it is what goes with the condition within
     each; where that cannot be told, ``not_decided`` says why, and the numbers are without the instruments. Where days
     and the runs within them contradict each other beyond chance, ``coefficient`` is that from day to day,
-    ``within_days`` the other one (else None), and ``p_value`` that of one coefficient for both, or twice that from day to
-    day where this is less.
+    ``within_days`` the other one (else None), and ``p_value`` that of one coefficient for both, or twice that from day
+    to day where this is less.
     """
 
     channel: str

@@ -121,8 +121,8 @@ def _condition(
     p_value = fit.coefficients[0].p_value
     coefficient, inside, u_inside = _apart(fit.coefficients[0], part, values, beside, drift)
     if inside is not None:
-        # A slope of days that one for both hides is said at the price of two tests. What one for both showed stays: days
-        # and runs contradict each other by chance so seldom that nothing is paid for it.
+        # A slope of days that one for both hides is said at the price of two tests. What one for both showed stays:
+        # days and runs contradict each other by chance so seldom that nothing is paid for it.
         p_value = min(p_value, 2.0 * coefficient.p_value)
     inseparable = [
         other for other, recorded in channels.items() if other != name and _together(values, recorded[mask])

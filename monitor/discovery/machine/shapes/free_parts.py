@@ -123,10 +123,10 @@ def _has_direction(scene: ChainScene, free: ChainCandidate, others: Sequence[Cha
         return False
     beside = scene.remainders.beside(others)
     columns = without(beside.basis, free.columns)
-    inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+    inverse: Array = np.asarray(np.linalg.pinv(columns.T @ columns, hermitian=True), dtype=np.float64)
     coefficients = inverse @ (columns.T @ beside.residual)
-    left = beside.residual - columns @ coefficients
-    variance = float(left @ left) / max(beside.degrees_of_freedom - len(coefficients), 1)
+    remaining = beside.residual - columns @ coefficients
+    variance = float(remaining @ remaining) / max(beside.degrees_of_freedom - len(coefficients), 1)
     return Follows.DIRECTION in follows(context, effect, coefficients, variance * inverse)
 
 
