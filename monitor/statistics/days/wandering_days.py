@@ -48,12 +48,14 @@ def slope_as_far(
             root = np.linalg.cholesky(covariance)
             both = scipy.linalg.solve_triangular(root, np.column_stack([design, values]), lower=True)
             triangle = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
-            diagonal, left = np.abs(np.diag(triangle))[:-1], triangle[-1, -1] ** 2
-            if not (left > 0.0 and diagonal.min() > 0.0):
+            diagonal, remainder = np.abs(np.diag(triangle))[:-1], triangle[-1, -1] ** 2
+            if not (remainder > 0.0 and diagonal.min() > 0.0):
                 return 1.0
-            variance = np.array([left / free * (of_days @ covariance @ of_days), u**2])
+            variance = np.array([remainder / free * (of_days @ covariance @ of_days), u**2])
             freedom = variance.sum() ** 2 / float((variance**2 / np.array([free, dof])).sum())
             tail.append(2.0 * scipy.special.stdtr(freedom, -apart / np.sqrt(variance.sum())))
-            evidence.append(-np.log(np.diag(root)).sum() - np.log(diagonal).sum() - 0.5 * free * np.log(left))
+            evidence.append(
+                -np.log(np.diag(root)).sum() - np.log(diagonal).sum() - 0.5 * free * np.log(remainder)
+            )
     likelihood = np.exp(np.array(evidence) - max(evidence))
     return float(np.average(tail, weights=likelihood))
