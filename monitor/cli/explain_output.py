@@ -109,7 +109,9 @@ def _remaining(explanation: MachineExplanation) -> None:
             f"machine {um(remaining.resting_rms_um)} µm"
         )
     expected = um(explanation.comparison.expected_rms_um)
-    output.say(f"with all of this in the model: RMS {um(remaining.rms_um)} µm, expected {expected} µm{parts}")
+    output.say(
+        f"with what the model lacks added to it: RMS {um(remaining.rms_um)} µm, expected {expected} µm{parts}"
+    )
 
 
 def _curve(explanation: CurveExplanation) -> None:

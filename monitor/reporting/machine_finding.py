@@ -199,8 +199,10 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"{mistake_sentence(finding.mistakes)} Nothing was changed, and no effect was looked for: "
             f"{what_to_do(finding.mistakes)}"
         )
-    sentences = _missing_sentences(finding)
-    sentences += _left_out(finding)
+    moved = [_moved(move) for move in finding.moves]
+    # Where nothing is missing, what moved is the finding.
+    moved_first = finding.explained and not finding.missing
+    sentences = (moved if moved_first else []) + _missing_sentences(finding) + _left_out(finding)
     for each in finding.scattering:
         sentences.append(
             f"{each.target_word} {each.target} scatters {each.times:.1f} times as much as the others "
@@ -208,12 +210,8 @@ def machine_sentences(finding: MachineFinding) -> str:
             "by so much less."
         )
     sentences += [_unlike(each) for each in finding.unlike_runs]
-    for move in finding.moves:
-        verb = "stepped" if move.stepped else "moved"
-        at = f"at run {move.run}"
-        if move.sequence is not None:
-            at = f"within run {move.run}, from sequence {move.sequence} on"
-        sentences.append(f"{move.subject} {verb} by {move.size:.1f} {move.unit} {at}.")
+    if not moved_first:
+        sentences += moved
     sentences += [LIMITS[limit].format(most=finding.most_bad_points) for limit in finding.limits]
     if finding.unfitted:
         sentences.append(
@@ -223,6 +221,16 @@ def machine_sentences(finding: MachineFinding) -> str:
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
+
+
+def _moved(move: Move) -> str:
+    """What moved or stepped, by how much and when."""
+    # The name of a parameter stays as it is written.
+    subject = move.subject if move.stepped else f"{move.subject[:1].upper()}{move.subject[1:]}"
+    at = f"at run {move.run}"
+    if move.sequence is not None:
+        at = f"within run {move.run}, from sequence {move.sequence} on"
+    return f"{subject} {'stepped' if move.stepped else 'moved'} by {move.size:.1f} {move.unit} {at}."
 
 
 def _left_out(finding: MachineFinding) -> list[str]:
@@ -277,7 +285,7 @@ def _with_rivals(missing: MissingEffect) -> str:
 def _missing_sentences(finding: MachineFinding) -> list[str]:
     if not finding.missing:
         return [
-            "Nothing is missing that this plan can see."
+            f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
             if finding.explained
             else "The model does not explain the measurements, but no effect of the catalogue explains more."
             if not finding.not_followed

@@ -123,7 +123,9 @@ def test_one_explanation_measures_by_one_root_mean_square(typed: Any, tmp_path: 
     remaining, expected = document["remaining"]["rms_um"], document["expected_rms_um"]
     assert [effect["effect"] for effect in document["missing"]] == ["EXX:reversal"]
     assert f"expected {expected:.2f} µm from the stated uncertainty" in said
-    assert f"with all of this in the model: RMS {remaining:.2f} µm, expected {expected:.2f} µm" in said
+    assert (
+        f"with what the model lacks added to it: RMS {remaining:.2f} µm, expected {expected:.2f} µm" in said
+    )
 
 
 def test_the_circles_of_a_ball_bar_say_about_which_centre(typed: Any, tmp_path: Path) -> None:

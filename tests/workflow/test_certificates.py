@@ -30,6 +30,7 @@ from monitor.reporting.certificate.record import CertificateRecord, ConformitySt
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.tables import conformity_rows
 from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
+from monitor.reporting.certificate.words import answer
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.pdf.render import certificate_html
 from monitor.reporting.texts import texts_of
@@ -394,7 +395,11 @@ def test_by_the_guard_band_of_all_parameters_a_length_has_the_u_of_its_map(found
             alone, rule, texts, campaign="limited", freedoms={"volumetric": math.inf},
             stated={"volumetric": 25.95}, volumetric=mapped,
         )  # fmt: skip
-        assert "arameter" not in f"{statement.basis} {statement.rule} {statement.risk}"
+        words = f"{statement.basis} {answer(statement, texts)}"
+        for of_several in ("arameter", "single", "einzeln", "verdicts", "Aussagen"):
+            assert of_several not in words
+        before = replace(statement, together=None)
+        assert ("The verdicts stand" in answer(before, texts)) == (language == "en")
 
 
 def test_a_statement_begins_with_its_probability_and_stands_on_one_page_as_one_of_before_does_not(

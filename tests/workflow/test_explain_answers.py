@@ -17,6 +17,7 @@ from monitor.reporting.machine_finding import (
     UNSEEN,
     MachineFinding,
     MissingEffect,
+    Move,
     machine_sentences,
 )
 from monitor.reporting.runs_that_tell import runs_that_tell
@@ -73,6 +74,19 @@ def test_the_coefficients_of_a_curve_are_restored_from_what_was_stored(measured:
 def test_a_rate_is_checked_with_the_request() -> None:
     with pytest.raises(InputError, match="the false discovery rate must lie between 0 and 1, not 1"):
         ExplainRequest("any", rate=1.0)
+
+
+def test_what_moved_comes_first_where_nothing_is_missing() -> None:
+    """Was: "Nothing is missing that this plan can see. ball 2 moved by ..."."""
+    ball = Move("ball 2", False, 9.13, "µm", 3, 36)
+    zero = Move("eb0c", True, 15.1, "µrad", 13, None)
+    nothing = MachineFinding(True, [], 0, [ball, zero], (), 8, (), False, ())
+    assert machine_sentences(nothing) == (
+        "Ball 2 moved by 9.1 µm within run 3, from sequence 36 on. eb0c stepped by 15.1 µrad at run 13. "
+        "Nothing else is missing that this plan can see."
+    )
+    missing = MissingEffect("EXA:harmonic4", "axial displacement of the A axis", None, False, ())
+    assert machine_sentences(replace(nothing, missing=[missing])).startswith("The model lacks EXA:harmonic4")
 
 
 @pytest.mark.parametrize("unseen", [True, False])

@@ -12,7 +12,9 @@ def answer(value: str | date | NotApplicable | ConformityStatement | None, texts
     """What the laboratory answered to an item, as one text."""
     if isinstance(value, ConformityStatement):
         rule = f"{value.rule[:1].upper()}{value.rule[1:]}"
-        return texts("conformity.stated", rule=rule, risk=value.risk)
+        # Records of before ``together`` speak of verdicts where there is one, too.
+        is_one = value.together and len(value.verdicts) == 1
+        return texts(f"conformity.stated{'_one' if is_one else ''}", rule=rule, risk=value.risk)
     if isinstance(value, NotApplicable):
         return texts("record.not_applicable", statement=value.statement)
     return texts.day(value) if isinstance(value, date) else value or ""

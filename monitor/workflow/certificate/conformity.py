@@ -32,8 +32,8 @@ from monitor.units import MICROMETRE
 WANTED = 0.95
 #: Coverage probability of U in ILAC-G8:09/2019 and EA-4/02 M:2022: k = 2 for a normal distribution.
 COVERED = 0.9545
-#: Texts that speak of parameters, beside which stands one of the volumetric error alone.
-_OF_PARAMETERS = ("rule_guard", "risk_guard", "rule_iso14253", "rule_ilac")
+#: Texts that hold as they are where the volumetric error is decided alone; of the others one of it stands beside.
+_OF_EITHER = ("rule_simple", "rule_probability")
 #: Halvings of an interval that find a limit of acceptance to 1e-12 of the tolerance.
 _HALVINGS = 40
 
@@ -192,7 +192,7 @@ def _rule_in_words(
     p = written_probability(result.p if volumetric_p is None else volumetric_p, sign)
     rule_text, risk = (
         texts(
-            f"conformity.{what}_{rule}{'_volumetric' if alone and f'{what}_{rule}' in _OF_PARAMETERS else ''}",
+            f"conformity.{what}_{rule}{'_volumetric' if alone and f'{what}_{rule}' not in _OF_EITHER else ''}",
             p=p, wanted=wanted, failing=failing, covered=covered, outside=outside, count=len(result.names),
         )
         for what in ("rule", "risk")

@@ -19,6 +19,7 @@ from monitor.records import Array
 from monitor.reporting.confounding import Confounding, MeasuredAt
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Coefficient, DependenceUnits, dependence
+from monitor.statistics.days.wandering_days import slope_as_far
 from monitor.statistics.groups import group_columns, independent_columns, share_within
 from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import date
@@ -168,7 +169,35 @@ def _apart(
     # Welch and Satterthwaite: what days and runs tell of them is independent.
     dof = variance.sum() ** 2 / float((variance**2 / np.array([between.dof, within.dof])).sum())
     p = 2.0 * scipy.special.stdtr(dof, -abs(between.value - within.value) / np.sqrt(variance.sum()))
-    return (between, within.value, within.u) if p < CONTRADICT else (common, None, None)
+    if p >= CONTRADICT or _by_wandering(part, of_day, within, beside, drift=bool(drift)) >= CONTRADICT:
+        return common, None, None
+    return between, within.value, within.u
+
+
+def _by_wandering(part: Series, of_day: Array, within: Coefficient, beside: _Beside, *, drift: bool) -> float:
+    """Probability that days which wander part the slope of the days so far from that ``within`` them."""
+    day = np.unique(part.days, return_inverse=True)[1]
+    u = part.weights()
+    weight = np.ones_like(of_day) if u is None else 1.0 / u**2
+    total = np.asarray(np.bincount(day, weight), dtype=np.float64)
+
+    def mean(column: Array) -> Array:
+        return np.asarray(np.bincount(day, weight * column) / total)
+
+    times = mean(part.t)
+    others = [] if beside.columns is None else [mean(column) for column in beside.columns.T]
+    columns = np.column_stack([np.ones_like(total), *([times - times.mean()] if drift else []), *others])
+    design = np.column_stack([columns[:, independent_columns(columns)], mean(of_day)])
+    order = np.argsort(times, kind="stable")
+    return slope_as_far(
+        mean(part.values)[order],
+        times[order],
+        design[order],
+        total[order],
+        within.value,
+        within.u,
+        within.dof,
+    )
 
 
 def _together(a: Array, b: Array) -> bool:
