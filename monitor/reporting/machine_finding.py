@@ -121,6 +121,11 @@ class MachineFinding:
     unchecked: bool = False
     contradicted: bool = False
 
+    @property
+    def together(self) -> str:
+        """What the tests of all residuals say of an effect that they do not show by themselves."""
+        return TOLERATED if self.tolerated else UNSEEN
+
 
 # What is said first where more is left than any effect leaves, and no simple exchange brings it down.
 GROSS = (
@@ -306,7 +311,7 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         rivals = f"{', '.join(named)} and {more} more" if more else ", ".join(named)
         sentences.append(f"These data cannot tell it apart from {rivals}.")
     if finding.unseen:
-        sentences.append(TOLERATED if finding.tolerated else UNSEEN)
+        sentences.append(finding.together)
     if further:
         sentences.append(f"It also lacks {joined_by_and(further)}.")
     if doubtful:
