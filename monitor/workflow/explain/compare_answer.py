@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.documents import INLINED, OMITTED, Said
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
@@ -108,6 +107,9 @@ class MachineComparison(InMicrometres):
     @property
     def exceeds_statement(self) -> bool:
         """Whether the residual is larger than stated beyond chance, be it by less than a statement may be wrong."""
+        # Loaded here: the lists of models, which know of comparisons, need no search.
+        from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
+
         return self.excess_over_statement_p < LACK_OF_FIT_LEVEL
 
 
