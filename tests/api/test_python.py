@@ -133,7 +133,9 @@ def test_an_answer_without_rows_is_its_sentence(db: mm.Database) -> None:
     nothing = db.campaign("five-days").explain()
     assert nothing.missing == ()
     assert "DataFrame" not in repr(nothing)
-    assert "Nothing is missing that this plan can see" in repr(nothing)
+    assert "EB0C stepped by 15.2 µrad at run 13. Nothing else is missing that this plan can see." in repr(
+        nothing
+    )
     page = nothing._repr_html_()
     assert "<table" not in page
     assert "<svg" in page
