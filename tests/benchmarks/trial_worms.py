@@ -20,17 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from monitor.discovery import explain
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
+from tests.simulator.instruments import SimulatedAxis, SimulatedChain, Z
 
-FILE = """format = 1
-campaign = "table"
-method = "instruments"
-[machine]
-id = "table"
-[[machine.work_chain]]
-name = "C"
-kind = "rotary"
-about = "Z"
-sign = -1
+TABLE = SimulatedChain((), (SimulatedAxis("C", "rotary", Z, sign=-1),))
+AUTOCOLLIMATOR = """
 [[setups]]
 id = "autocollimator"
 reading = "angle"
@@ -60,12 +53,9 @@ def told(rng: np.random.Generator, order: int | None, play: float, kind: str, fo
     step = 360.0 / float(rng.choice([each for each in steps if order is None or each > 2 * order + 1]))
     size, phase = float(rng.uniform(6.0, 12.0)), float(rng.uniform(0.0, 2.0 * np.pi))
     there = np.arange(0.0, 360.0 + step / 2.0, step)
-    lines, runs = (
-        ["run,sequence,time_s,setup,c_deg,reading_urad"],
-        ["run,started_at,day,warm_up,ambient_degC"],
-    )
-    for run in range(1, int(rng.choice([1, 2, 4])) + 1):
-        runs.append(f"{run},2026-03-{run + 1:02d}T08:00:00+00:00,{run},false,20.0")
+    rows: list[dict[str, object]] = []
+    runs = int(rng.choice([1, 2, 4]))
+    for run in range(1, runs + 1):
         at = np.concatenate([there, there[::-1], there, there[::-1]])
         side = np.repeat([1.0, -1.0, 1.0, -1.0], len(there))
         first_again = np.arange(1, 4) * len(there)
@@ -74,14 +64,12 @@ def told(rng: np.random.Generator, order: int | None, play: float, kind: str, fo
         if order is not None:
             error = error + size * np.cos(order * np.radians(at) + phase)
         read = error + float(rng.normal(0.0, 10.0)) + noise(rng, len(at), kind)
-        lines += [
-            f"{run},{row + 1},{6.0 * row:.1f},autocollimator,{angle:.4f},{number:.3f}"
+        rows += [
+            {"run": run, "setup": "autocollimator", "time_s": 6.0 * row, "C": angle, "reading_urad": number}
             for row, (angle, number) in enumerate(zip(at, read, strict=True))
         ]
-    folder.joinpath("campaign.toml").write_text(FILE, encoding="utf-8")
-    folder.joinpath("probings.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    folder.joinpath("runs.csv").write_text("\n".join(runs) + "\n", encoding="utf-8")
-    campaign = read_campaign(folder)
+    days = [f"2026-03-{day:02d}T08:00:00+00:00" for day in range(2, 2 + runs)]
+    campaign = read_campaign(TABLE.write(folder / "table", AUTOCOLLIMATOR, rows, started=days))
     problem = campaign_method(campaign).problem_of(campaign)
     missing = explain(campaign, problem, "instruments", rng=np.random.default_rng(1)).missing
     return [each.effect for each in missing]

@@ -6,12 +6,14 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from monitor.cli.folder_patterns import in_full
 from monitor.cli.identify_output import _doing_the_same
 from monitor.exceptions import InputError
 from monitor.workflow.true_values import TRUTH, TrueValue, write_truth
+from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain, laser
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -152,3 +154,29 @@ def test_identify_says_that_readings_refute_the_model(typed: Any, tmp_path: Path
         said = typed("identify", name, db=db).out
         assert (f"the readings of {name} refute the model samba beyond noise" in said) == refuted
         assert "times what the stated uncertainties leave" not in said
+
+
+@pytest.mark.parametrize(("noise_um", "is_larger"), [(0.58, True), (0.5, False)])
+def test_a_residual_larger_than_stated_is_said_where_a_statement_may_be_wrong_by_as_much(
+    typed: Any, tmp_path: Path, noise_um: float, *, is_larger: bool
+) -> None:
+    """Eight runs of a laser that states 0.5 um: what scatters by 0.58 was "explained" without a word."""
+    rng, db = np.random.default_rng(6), tmp_path / "x.duckdb"
+    chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in WAYS.items()))
+    rows = [
+        {
+            "run": run,
+            "setup": "laser",
+            "X": x,
+            "Y": 0.0,
+            "Z": 0.0,
+            "reading_um": 1e3 * x + rng.normal(0.0, noise_um),
+        }
+        for run in range(1, 9)
+        for x in np.linspace(0.0, 500.0, 51)
+    ]
+    days = [f"2026-03-{day:02d}T20:00:00+00:00" for day in range(2, 10)]
+    typed("import", chain.write(tmp_path / "laser", laser(), rows, started=days), db=db)
+    said = typed("compare", "laser", db=db).out
+    assert "verdict: explained" in said
+    assert ("the residual is larger than the stated uncertainty leaves (p < 0.0001)" in said) is is_larger

@@ -126,6 +126,15 @@ def test_the_six_questions_are_answered_in_plain_words_on_page_one() -> None:
     assert "find out what was done or happened then" in page.lower()
 
 
+def test_machines_that_no_tolerance_orders_are_in_no_order() -> None:
+    """The first by the alphabet stood as the worst, of robots with 57 and 83 um behind it."""
+    one, other = machine("A", "model fails"), machine("B", "model fails")
+    assert (
+        "Worst machine? A (hall 1): model fails; also B (no tolerance says which with model fails is the worst)."
+        in pages_of(other, one, GOOD)[0]
+    )
+
+
 def test_a_quiet_week_says_so() -> None:
     page = pages_of(GOOD)[0]
     assert "Worst machine? None: no machine that was measured needs attention." in page

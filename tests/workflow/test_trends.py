@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -216,6 +216,14 @@ def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
     at_once = sorted((one["kind"], one["description"]) for one in document["events"])
     assert at_once == [("note", "ball screw inspected"), ("repair", "ball screw changed")]
     assert {one["at"] for one in document["events"]} == {at.isoformat()}
+
+
+def test_an_event_of_midnight_has_the_day_of_the_shop(made: Database) -> None:
+    """Midnight of the 5th at +01:00 stood on the page of the machine as the 4th, the day of UTC."""
+    add_machine(made, "midnight", {"EX0B": np.random.default_rng(4).normal(size=(20, 2))})
+    at = datetime(2026, 3, 5, tzinfo=timezone(timedelta(hours=1)))
+    record_event(made, "midnight", at, "crash", "spindle hit the vice")
+    assert [event["at"] for event in trends(made, "midnight")["events"]] == ["2026-03-05T00:00:00+01:00"]
 
 
 def test_charts_begin_anew_at_a_recorded_event_and_see_what_comes_after_it(made: Database) -> None:
