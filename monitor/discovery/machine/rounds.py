@@ -17,9 +17,9 @@ from monitor.discovery.machine.joints.robot_search import (
     search_beside_curves,
 )
 from monitor.discovery.machine.missing import told_apart
-from monitor.discovery.machine.noise.correlation import Correlation, caution
+from monitor.discovery.machine.noise.correlation import Correlation, caution, is_next_slower
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
-from monitor.discovery.machine.search import search_chain
+from monitor.discovery.machine.search import search_chain, still_found
 from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -60,7 +60,8 @@ class Limit(StrEnum):
 class ChainRound:
     """The findings of a round: ``under`` is the fit with them and the ``suspects``; ``unable`` are those that could not
     be fitted, ``unfitted`` the families of earlier rounds that could not; ``sides`` is what plays do where nobody knows
-    on which side they are."""
+    on which side they are; ``whole`` says that all was searched, nothing taken from a round under noise that hardly
+    differs."""
 
     scene: ChainScene
     result: ChainScan
@@ -71,6 +72,7 @@ class ChainRound:
     unfitted: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
     sides: tuple[MachineEffect, ...] = ()
+    whole: bool = True
 
     @property
     def effects(self) -> list[MachineEffect]:
@@ -203,10 +205,10 @@ class _Rounds:
         """The effects under the present suspects and correlation, and the fit with those that can be fitted."""
         conditions = self.suspects.conditions, self.correlation, self.sides, *self.unfitted
         if conditions not in self.before.rounds:
-            searched = self._round()
+            searched = self._round(self._near())
             if sides := self._new_sides(searched):
                 self.sides += sides
-                searched = self._round()
+                searched = self._round(searched if self._is_able(searched) else None)
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
             self.before.rounds[conditions] = replace(searched, scene=replace(searched.scene))
         self.sides = self.before.rounds[conditions].sides
@@ -222,20 +224,47 @@ class _Rounds:
         sides = unknown_sides(searched.scene, candidates, self.search.rate)
         return tuple(side for side in sides if side.term not in errors)
 
-    def _round(self) -> ChainRound:
-        """Search effects under the present conditions."""
+    def _near(self) -> ChainRound | None:
+        """What a whole search found under the same conditions but for noise that hardly differs and is less cautious;
+        None where there was none."""
+        conditions = self.suspects.conditions, self.sides, (*self.unfitted,)
+        for earlier in self.before.rounds.values():
+            noise = earlier.scene.fit.whitening
+            is_next = noise is not None and is_next_slower(noise.correlation, self.correlation)
+            same = conditions == (earlier.suspects.conditions, earlier.sides, earlier.unfitted)
+            if is_next and same and self._is_able(earlier):
+                return earlier
+        return None
+
+    def _is_able(self, earlier: ChainRound) -> bool:
+        """Whether all was searched in a round, and what it found could be fitted."""
+        return earlier.whole and not earlier.unable and not self.beside_curves
+
+    def _round(self, near: ChainRound | None) -> ChainRound:
+        """Search effects under the present conditions; what was found under ``near`` ones is what is found, where a
+        scan that begins with it neither adds to it nor takes from it."""
         problem, suspects = self.search.problem, self.suspects
         out, single = suspects.left_out(problem), [*suspects.effects(problem), *self.sides]
         current = self.first
         if self.sides or not suspects.same_as(self.initial):
             current = fit(with_effects(suspects.weighed(problem), single), out, self.first)
-        scene, result = self._scan(current.with_correlation(self.correlation))
+        noisy = current.with_correlation(self.correlation)
+        again = None if near is None else self._again(noisy, near)
+        scene, result = again or self._scan(noisy)
         result, refined = told_apart(scene, result)
         effects = [finding.candidate.effect for finding in refined]
         under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
         unable = tuple(finding.candidate.family for finding in refined if finding.candidate.effect in without)
         return ChainRound(
-            scene, result, refined, suspects, under, unable, tuple(self.unfitted), sides=self.sides
+            scene,
+            result,
+            refined,
+            suspects,
+            under,
+            unable,
+            (*self.unfitted,),
+            sides=self.sides,
+            whole=again is None,
         )
 
     def judged(self, current: ChainRound) -> ChainRound | None:
@@ -267,6 +296,14 @@ class _Rounds:
         if self.beside_curves:
             return search_beside_curves(under, self._able, self.search.rate)
         return search_chain(scene_of(under, self._able), self.search.drivers, self.search.rate)
+
+    def _again(self, under: Fit, near: ChainRound) -> tuple[ChainScene, ChainScan] | None:
+        """The findings of a near round under a fit with a scene of all that was searched there; None where they are not
+        what a scan that begins with them finds."""
+        scene = scene_of(under, [each.variant for each in near.scene.candidates])
+        variants = [each.variant for each in near.result.candidates]
+        result = still_found(scene, variants, self.search.drivers, self.search.rate)
+        return None if result is None else (scene, result)
 
     @property
     def _able(self) -> list[ChainVariant]:

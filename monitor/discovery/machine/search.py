@@ -16,6 +16,7 @@ from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.beside_steps import with_those_beside_steps
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
+from monitor.discovery.machine.shapes.free_parts import is_free, parts_anew, parts_of
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.long_waves import without_longest
 from monitor.discovery.machine.shapes.one_instead import one_instead
@@ -30,7 +31,7 @@ from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
 from monitor.discovery.machine.suspects.wander import with_base_instead
-from monitor.discovery.search.scan import by_error_taken_away, scan
+from monitor.discovery.search.scan import by_error_taken_away, except_for, scan
 from monitor.effects.artefact.station import Moved
 
 # More orders of gears, drifts, and moves of a station than these are noise that none explains.
@@ -46,6 +47,27 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
     searched, result = drive_first(searched, standing_out(searched, result))
     return searched, by_error_taken_away(searched, result)
+
+
+def still_found(
+    scene: ChainScene, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
+) -> ChainScan | None:
+    """What a scan that begins with these variants finds, where it is these and nothing else, free shapes of the parts
+    that are chosen anew; else None."""
+    candidates = {each.effect.text: each for each in scene.candidates}
+    # Searched values that an earlier scan chose between those of the candidates are none of these.
+    apart = [variant for variant in variants if variant.effect.text not in candidates]
+    candidates |= {each.effect.text: each for each in scene_of(scene.fit, apart).candidates}
+    begin = [candidates[variant.effect.text] for variant in variants]
+    result = standing_out(scene, scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate, begin=begin))
+    same = {each.effect.text for each in result.candidates} == {variant.effect.text for variant in variants}
+    if not same or any(
+        parts_anew(scene, free, except_for(result.candidates, index)) != parts_of(free)
+        for index, free in enumerate(result.candidates)
+        if is_free(free)
+    ):
+        return None
+    return by_error_taken_away(scene, result)
 
 
 def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:

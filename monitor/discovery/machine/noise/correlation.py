@@ -59,6 +59,16 @@ def caution(correlation: Correlation | None) -> tuple[float, float]:
     return (0.0, 0.0) if correlation is None else (correlation.rho * correlation.share, correlation.rho)
 
 
+def is_next_slower(before: Correlation, correlation: Correlation | None) -> bool:
+    """Whether a correlation is one step of the grid slower than one ``before``, or has one step more of the dependent
+    part, or both: what runs hardly determine (`CORRELATIONS`)."""
+    if correlation is None or before.frame != correlation.frame or before == correlation:
+        return False
+    slower = CORRELATIONS.index(correlation.rho) - CORRELATIONS.index(before.rho)
+    more = SHARES.index(before.share) - SHARES.index(correlation.share)
+    return slower in (0, 1) and more in (0, 1)
+
+
 @dataclass(frozen=True)
 class Filters:
     """The filters of Kalman of C correlations for runs in which the touches ``weighted`` (R, T) were read, each of them

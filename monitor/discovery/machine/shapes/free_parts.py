@@ -98,6 +98,21 @@ def of_parts_alone(scene: ChainScene, symbol: str, parts: Sequence[int]) -> Chai
     return scene_of(scene.fit, [Variant(f"{symbol}:free", effect)]).candidates[0]
 
 
+def parts_of(free: ChainCandidate) -> list[int]:
+    """The parts of a free shape, from 0, in rising order."""
+    effect = free.effect
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Free)
+    return sorted(part - 1 for part in effect.shape.parts)
+
+
+def parts_anew(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:
+    """The parts of the error of a free shape that are worth keeping beside others, from 0, in rising order."""
+    effect = free.effect
+    assert isinstance(effect, ChainEffect)
+    return sorted(parts_worth_keeping(scene, whole_basis(scene, effect.term.symbol, free), others))
+
+
 def with_nearest(
     scene: ChainScene,
     free: ChainCandidate,

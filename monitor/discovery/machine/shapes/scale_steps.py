@@ -10,7 +10,7 @@ told.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from types import UnionType
@@ -23,6 +23,7 @@ from monitor.discovery.machine.shapes.free_parts import PRICE, parts_worth_keepi
 from monitor.discovery.machine.shapes.shown_cycles import is_told
 from monitor.discovery.machine.shapes.step_widths import OneStep, are_sharp, at_widths_of_their_own, by_width
 from monitor.discovery.machine.shapes.steps_seen import MOST_STEPS, NEAR_WIDTHS, StepsSeen
+from monitor.discovery.search.candidate import side_by_side
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
@@ -70,6 +71,21 @@ class StepsOfError(StepsSeen):
             (places, width, self.candidate(places, width))
             for places, width in ((self._places(width), width) for width in self.widths)
         ]
+
+    @cached_property
+    def _together(self) -> ChainCandidate:
+        """The steps at once of the first search with the plays and the powers of the error, as columns of one."""
+        whole = self._wholes[0][2]
+        beside = self._of_shape(Reversal | WindUp | Poly)
+        return replace(whole, columns=side_by_side(len(whole.columns), [whole, *beside]))
+
+    def rough(self, others: Sequence[ChainCandidate]) -> ChainCandidate | None:
+        """Those steps at once, plays and powers of the error that explain most beside others, more of them than
+        `beside` tells, as one effect; None where it has no steps."""
+        if not len(self.gaps):
+            return None
+        parts = parts_worth_keeping(self.scene, self._together, others, choice=0.0)
+        return replace(self._together, columns=self._together.columns[:, parts])
 
     def _of_shape(self, kind: type[Shape] | UnionType) -> list[ChainCandidate]:
         """The candidates of this error of some kinds of shape that follow no driver and are seen."""

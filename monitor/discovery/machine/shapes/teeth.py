@@ -27,6 +27,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Variant
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.memory import Memory
 from monitor.effects import ChainEffect
 from monitor.effects.shapes import Cyclic, Sawtooth
 from monitor.effects.shapes.sawtooth import sawtooths
@@ -130,13 +131,32 @@ class TeethOfError:
         profiles = self._profiles.of(sawtooths(self._reading, shapes[:, 0], shapes[:, 1]))
         return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[falls_twice], profiles)
 
+    @cached_property
+    def _on_grid(self) -> Memory[list[_Weighed]]:
+        return Memory()
+
+    def _weighed_on_grid(self, others: Sequence[ChainCandidate]) -> list[_Weighed]:
+        """The sawtooths of the grid beside others, the most convincing first."""
+        return self._on_grid.answer(others, None, lambda: self._weighed(self._grid, others))
+
+    def rough(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+        """The sawtooth of the grid and the plain cycle that say most beside others, before they are looked for between;
+        none where the error is among these or nothing is seen of any."""
+        if self.effect.term.symbol in map(error_of, others):
+            return []
+        weighed = self._weighed_on_grid(others)
+        if not weighed or weighed[0].score <= 0.0:
+            return []
+        cycles = [each.candidate for each in weigh_beside(self.scene, self._cycles, others)[:1]]
+        return [self._candidate(*weighed[0].shape), *cycles]
+
     def beside(self, others: Sequence[ChainCandidate]) -> list[ChainCandidate]:
         """The error as the sawtooth that says most beside others, or as the plain cycle of so many periods where that
         says as much, alone; none where it is among them, where nothing is seen of any, or where it foretells no poses.
         """
         if self.effect.term.symbol in map(error_of, others):
             return []
-        weighed = self._weighed(self._grid, others)
+        weighed = self._weighed_on_grid(others)
         if not weighed or weighed[0].score <= 0.0:
             return []
         wide = 1.5 * STEP_OF_TEETH, 1.5 / EDGES

@@ -7,7 +7,7 @@ Where the flexible competitor of an error says more than its shapes of the catal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 from monitor.discovery.machine.compare import lack_of_fit
@@ -15,6 +15,7 @@ from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.bends import bends_instead, foretells_poses, score_beside
 from monitor.discovery.machine.shapes.cycles import cycle_instead
+from monitor.discovery.machine.shapes.edges import edges_of
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import (
     PRICE,
@@ -37,7 +38,6 @@ from monitor.discovery.machine.shapes.inside_shapes import (
     with_those_outside,
 )
 from monitor.discovery.machine.shapes.refined_instead import refined_instead
-from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
 from monitor.discovery.machine.shapes.shown_cycles import is_told
 from monitor.discovery.machine.shapes.slight_shapes import (
     best_wave,
@@ -48,7 +48,6 @@ from monitor.discovery.machine.shapes.slight_shapes import (
 )
 from monitor.discovery.machine.shapes.steps_instead import steps_instead
 from monitor.discovery.machine.shapes.tables import ChainScan
-from monitor.discovery.machine.shapes.teeth import TeethOfError, teeth_of
 from monitor.discovery.machine.shapes.waves import many_periods, waves_instead
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
 from monitor.discovery.search.evidence import Pool, weigh_beside
@@ -342,18 +341,18 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
     for symbol, (shapes, whole) in errors.items():
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
-        sharp = _Sharp(teeth_of(scene, shapes[0]), steps_of(scene, shapes[0]))
+        edges = edges_of(scene, shapes[0])
         for count in counts:
             leading, gone = ordered[:count], ordered[count:]
-            edged = sharp.beside(leading, with_steps=symbol in promising[count])
+            of_others = [each for each in gone if error_of(each) != symbol]
+            # One goes in any case: where edges take the place of their error's other shapes, these do.
+            beside_edges = of_others if len(of_others) < len(gone) else gone[:-1]
+            edged = edges.beside(leading, beside_edges, worth, with_steps=symbol in promising[count])
             for new in [*_of_error(scene, whole, leading, gone[:-1], worth), *edged]:
                 has_edges = any(new is some for some in edged)
                 # What rounded edges leave is no other error.
                 beside = [*leading, *new, *([whole] if has_edges else [])]
-                of_others = [each for each in gone if error_of(each) != symbol]
-                # One goes in any case: where edges take the place of their error's other shapes, these do.
-                may_stay = of_others if has_edges and len(of_others) < len(gone) else gone[:-1]
-                staying = standing_beside(scene, beside, may_stay)
+                staying = standing_beside(scene, beside, beside_edges if has_edges else gone[:-1])
                 price = has_edges * price_of_powers(scene, new)
                 score = priced(scene, [*leading, *new, *staying]) - price
                 if score > worth and _foretells_if_free(scene, new, leading):
@@ -376,19 +375,6 @@ def _named(
 ) -> list[ChainCandidate]:
     """A free shape with what comes nearest to it; others as they are."""
     return [with_nearest(scene, new[0], shapes, leading)] if is_free(new[0]) else new
-
-
-@dataclass(frozen=True)
-class _Sharp:
-    """What has edges of one error: its teeth and its steps, None where it has none."""
-
-    teeth: TeethOfError | None
-    steps: StepsOfError | None
-
-    def beside(self, leading: Sequence[ChainCandidate], *, with_steps: bool) -> list[list[ChainCandidate]]:
-        """The teeth and, if asked for, the steps that say most beside leading effects, as far as there are any."""
-        asked = (self.teeth, self.steps if with_steps else None)
-        return [some for each in asked if each is not None and (some := each.beside(leading))]
 
 
 def _promising(

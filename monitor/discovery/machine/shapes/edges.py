@@ -1,0 +1,79 @@
+"""What has edges of one error, teeth or steps, asked for only where it may be worth as much as what was found.
+
+To find the places of steps and the pitch and edge of a sawtooth takes longest of all shapes. What they say at most is
+known before: what a rough search explains, with what may stay beside them, and a leeway for what a fine one finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.machine.shapes.free_parts import most_together
+from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
+from monitor.discovery.machine.shapes.teeth import TeethOfError, teeth_of
+from monitor.discovery.search.evidence import weigh_beside
+
+# By so much the score of steps, and that of teeth with their own once more, may be above what is known before: of
+# PLACEHOLDER.
+LEEWAY_OF_STEPS, LEEWAY_OF_TEETH = 20.0, 80.0
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The teeth and the steps of one error, None where it has none."""
+
+    scene: ChainScene
+    teeth: TeethOfError | None
+    steps: StepsOfError | None
+
+    def beside(
+        self,
+        leading: Sequence[ChainCandidate],
+        may_stay: Sequence[ChainCandidate],
+        worth: float,
+        *,
+        with_steps: bool,
+    ) -> list[list[ChainCandidate]]:
+        """The teeth and, if asked for, the steps that say most beside leading effects, as far as there are any that
+        with these and with what ``may_stay`` may have a score above ``worth``."""
+        asked: list[list[ChainCandidate]] = []
+        if self.teeth is not None and self._teeth_may(self.teeth, leading, may_stay, worth):
+            asked.append(self.teeth.beside(leading))
+        if self.steps is not None and with_steps and self._steps_may(self.steps, leading, may_stay, worth):
+            asked.append(self.steps.beside(leading))
+        return [some for some in asked if some]
+
+    def _teeth_may(
+        self,
+        teeth: TeethOfError,
+        leading: Sequence[ChainCandidate],
+        may_stay: Sequence[ChainCandidate],
+        worth: float,
+    ) -> bool:
+        """Whether the sawtooth of the grid or the plain cycle that says most, once more, may be worth it."""
+        return any(
+            most_together(self.scene, rough.candidate, leading, may_stay) + rough.score + LEEWAY_OF_TEETH
+            > worth
+            for rough in weigh_beside(self.scene, teeth.rough(leading), leading)
+        )
+
+    def _steps_may(
+        self,
+        steps: StepsOfError,
+        leading: Sequence[ChainCandidate],
+        may_stay: Sequence[ChainCandidate],
+        worth: float,
+    ) -> bool:
+        """Whether many steps at once, powers and plays at the price of one step may be worth it."""
+        rough = steps.rough(leading)
+        if rough is None:
+            return False
+        most = most_together(self.scene, rough, leading, may_stay) - steps.price(1, leading)
+        return most + LEEWAY_OF_STEPS > worth
+
+
+def edges_of(scene: ChainScene, shape: ChainCandidate) -> Edges:
+    """What has edges of the error of which a candidate is a shape."""
+    return Edges(scene, teeth_of(scene, shape), steps_of(scene, shape))
