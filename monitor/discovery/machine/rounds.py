@@ -17,7 +17,7 @@ from monitor.discovery.machine.joints.robot_search import (
     search_beside_curves,
 )
 from monitor.discovery.machine.missing import told_apart
-from monitor.discovery.machine.noise.correlation import Correlation, caution, is_next_slower
+from monitor.discovery.machine.noise.correlation import Correlation, caution, is_next
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain, still_found
 from monitor.discovery.machine.shapes.free_parts import price_of_parts
@@ -225,14 +225,14 @@ class _Rounds:
         return tuple(side for side in sides if side.term not in errors)
 
     def _near(self) -> ChainRound | None:
-        """What a whole search found under the same conditions but for noise that hardly differs and is less cautious;
-        None where there was none."""
+        """What a whole search found under the same conditions but for noise that hardly differs; None where there was
+        none."""
         conditions = self.suspects.conditions, self.sides, (*self.unfitted,)
         for earlier in self.before.rounds.values():
             noise = earlier.scene.fit.whitening
-            is_next = noise is not None and is_next_slower(noise.correlation, self.correlation)
             same = conditions == (earlier.suspects.conditions, earlier.sides, earlier.unfitted)
-            if is_next and same and self._is_able(earlier):
+            near = noise is not None and is_next(noise.correlation, self.correlation)
+            if same and near and self._is_able(earlier):
                 return earlier
         return None
 
@@ -301,8 +301,7 @@ class _Rounds:
         """The findings of a near round under a fit with a scene of all that was searched there; None where they are not
         what a scan that begins with them finds."""
         scene = scene_of(under, [each.variant for each in near.scene.candidates])
-        variants = [each.variant for each in near.result.candidates]
-        result = still_found(scene, variants, self.search.drivers, self.search.rate)
+        result = still_found(scene, (near.scene, near.result), self.search.drivers, self.search.rate)
         return None if result is None else (scene, result)
 
     @property

@@ -16,7 +16,7 @@ from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.beside_steps import with_those_beside_steps
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
-from monitor.discovery.machine.shapes.free_parts import is_free, parts_anew, parts_of
+from monitor.discovery.machine.shapes.free_parts import parts_anew
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.long_waves import without_longest
 from monitor.discovery.machine.shapes.one_instead import one_instead
@@ -31,7 +31,7 @@ from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
 from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
 from monitor.discovery.machine.suspects.station_moves import may_be_a_move, station_moves
 from monitor.discovery.machine.suspects.wander import with_base_instead
-from monitor.discovery.search.scan import by_error_taken_away, except_for, scan
+from monitor.discovery.search.scan import by_error_taken_away, scan
 from monitor.effects.artefact.station import Moved
 
 # More orders of gears, drifts, and moves of a station than these are noise that none explains.
@@ -50,22 +50,19 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
 
 
 def still_found(
-    scene: ChainScene, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
+    scene: ChainScene, near: tuple[ChainScene, ChainScan], drivers: Sequence[str], rate: float
 ) -> ChainScan | None:
-    """What a scan that begins with these variants finds, where it is these and nothing else, free shapes of the parts
-    that are chosen anew; else None."""
+    """What a scan that begins with the findings in a ``near`` scene of the same candidates finds, where it is these and
+    nothing else, and parts of free shapes would be chosen as there; else None."""
     candidates = {each.effect.text: each for each in scene.candidates}
     # Searched values that an earlier scan chose between those of the candidates are none of these.
-    apart = [variant for variant in variants if variant.effect.text not in candidates]
+    apart = [each.variant for each in near[1].candidates if each.effect.text not in candidates]
     candidates |= {each.effect.text: each for each in scene_of(scene.fit, apart).candidates}
-    begin = [candidates[variant.effect.text] for variant in variants]
+    begin = [candidates[each.effect.text] for each in near[1].candidates]
     result = standing_out(scene, scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate, begin=begin))
-    same = {each.effect.text for each in result.candidates} == {variant.effect.text for variant in variants}
-    if not same or any(
-        parts_anew(scene, free, except_for(result.candidates, index)) != parts_of(free)
-        for index, free in enumerate(result.candidates)
-        if is_free(free)
-    ):
+    if {id(each) for each in result.candidates} != {id(each) for each in begin}:
+        return None
+    if parts_anew(scene, begin) != parts_anew(near[0], near[1].candidates):
         return None
     return by_error_taken_away(scene, result)
 

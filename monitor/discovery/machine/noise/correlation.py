@@ -59,14 +59,14 @@ def caution(correlation: Correlation | None) -> tuple[float, float]:
     return (0.0, 0.0) if correlation is None else (correlation.rho * correlation.share, correlation.rho)
 
 
-def is_next_slower(before: Correlation, correlation: Correlation | None) -> bool:
-    """Whether a correlation is one step of the grid slower than one ``before``, or has one step more of the dependent
-    part, or both: what runs hardly determine (`CORRELATIONS`)."""
-    if correlation is None or before.frame != correlation.frame or before == correlation:
+def is_next(correlation: Correlation | None, other: Correlation | None) -> bool:
+    """Whether two correlations are one step of the grid apart, in the correlation, in the share, or in both: what runs
+    hardly determine (`CORRELATIONS`)."""
+    if correlation is None or other is None or correlation.frame != other.frame or correlation == other:
         return False
-    slower = CORRELATIONS.index(correlation.rho) - CORRELATIONS.index(before.rho)
-    more = SHARES.index(before.share) - SHARES.index(correlation.share)
-    return slower in (0, 1) and more in (0, 1)
+    slower = CORRELATIONS.index(correlation.rho) - CORRELATIONS.index(other.rho)
+    more = SHARES.index(correlation.share) - SHARES.index(other.share)
+    return abs(slower) <= 1 and abs(more) <= 1
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.products import Products
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
+from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shape import DescribedShape
 from monitor.effects.shapes.free import HARMONICS, Follows, Free
@@ -98,19 +99,17 @@ def of_parts_alone(scene: ChainScene, symbol: str, parts: Sequence[int]) -> Chai
     return scene_of(scene.fit, [Variant(f"{symbol}:free", effect)]).candidates[0]
 
 
-def parts_of(free: ChainCandidate) -> list[int]:
-    """The parts of a free shape, from 0, in rising order."""
-    effect = free.effect
-    assert isinstance(effect, ChainEffect)
-    assert isinstance(effect.shape, Free)
-    return sorted(part - 1 for part in effect.shape.parts)
-
-
-def parts_anew(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:
-    """The parts of the error of a free shape that are worth keeping beside others, from 0, in rising order."""
-    effect = free.effect
-    assert isinstance(effect, ChainEffect)
-    return sorted(parts_worth_keeping(scene, whole_basis(scene, effect.term.symbol, free), others))
+def parts_anew(scene: ChainScene, selected: Sequence[ChainCandidate]) -> list[list[int]]:
+    """The parts that are worth keeping of the error of each free shape among selected effects, beside the others."""
+    return [
+        sorted(
+            parts_worth_keeping(
+                scene, whole_basis(scene, free.effect.term.symbol, free), except_for(selected, index)
+            )
+        )
+        for index, free in enumerate(selected)
+        if is_free(free) and isinstance(free.effect, ChainEffect)
+    ]
 
 
 def with_nearest(

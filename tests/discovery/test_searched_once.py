@@ -1,0 +1,89 @@
+"""What is not searched twice: what stands under conditions that hardly differ, and edges that cannot be worth it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.noise.correlation import Correlation, is_next
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.search import search_chain, still_found
+from monitor.discovery.machine.shapes import edges
+from monitor.discovery.machine.shapes.variants import variants_of
+from monitor.effects import parse_effect
+from monitor.methods.samba.method import problem_of
+
+TEXTS = ("EXX:poly2", "EYX:poly2", "ECC:harmonic2", "EXC:harmonic2", "EXX:reversal", "EZZ:poly3")
+
+
+@pytest.fixture(scope="module")
+def searched(virtual_campaigns):
+    """A scene of white noise with two hidden effects, its variants, and what a search finds."""
+    simulator = virtual_campaigns.simulator()
+    hidden = [simulator.Effect("EYX:poly2", peak_um=6.0), simulator.Effect("EXC:harmonic2", peak_um=6.0)]
+    campaign, _ = virtual_campaigns.virtual(5, hidden, days=1, runs_per_day=4)
+    fitted = fit(problem_of(campaign).for_search())
+    chain = fitted.problem.context.chain
+    variants = [variant for text in TEXTS for variant in variants_of(parse_effect(text, chain))]
+    return (fitted, variants, *search_chain(scene_of(fitted, variants), (), 0.01))
+
+
+@pytest.mark.parametrize(
+    "noise", [Correlation(0.1, 0.1), Correlation(0.1, 0.2)], ids=["hardly correlated", "a little more"]
+)
+def test_what_a_scan_neither_adds_to_nor_takes_from_is_found_again(searched, noise):
+    fitted, variants, scene, result = searched
+    under = scene_of(fitted.with_correlation(noise), variants)
+    again = still_found(under, (scene, result), (), 0.01)
+    assert again is not None
+    names = [each.effect.text for each in again.candidates]
+    assert sorted(names) == sorted(each.effect.text for each in result.candidates)
+    _, anew = search_chain(under, (), 0.01)
+    assert names == [each.effect.text for each in anew.candidates]
+
+
+@pytest.mark.parametrize("change", ["one less", "one more"])
+def test_what_a_scan_adds_to_or_takes_from_is_searched_anew(searched, change):
+    _, _, scene, result = searched
+    findings = result.findings[:1]
+    if change == "one more":
+        candidate = next(each for each in scene.candidates if each.effect.text == "EZZ:poly3")
+        evidence = replace(result.findings[0].evidence, candidate=candidate)
+        findings = (*result.findings, replace(result.findings[0], evidence=evidence))
+    assert still_found(scene, (scene, replace(result, findings=findings)), (), 0.01) is None
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        ((0.6, 0.8), (0.7, 0.8), True),
+        ((0.7, 0.89), (0.6, 0.8), True),
+        ((0.6, 0.8), (0.8, 0.8), False),
+        ((0.6, 1.0), (0.6, 0.97), False),
+        ((0.6, 0.8), (0.6, 0.8), False),
+    ],
+)
+def test_noise_hardly_differs_one_step_of_the_grid_apart(first, second, expected):
+    assert is_next(Correlation(*first), Correlation(*second)) is expected
+    assert not is_next(None, Correlation(*second))
+    assert not is_next(Correlation(*first, frame=1), Correlation(*second))
+
+
+@pytest.mark.slow
+def test_edges_that_cannot_be_worth_it_change_no_answer(virtual_campaigns, monkeypatch):
+    """A step in a scale beside an effect of the catalogue, with and without the bound."""
+    simulator = virtual_campaigns.simulator()
+    step = simulator.Effect("EXX:curve", peak_um=5.0, curve=lambda q, travel, now: np.tanh((q - 12.0) / 4.0))
+    hidden = [step, simulator.Effect("EZZ:poly3", peak_um=6.0)]
+    campaign, _ = virtual_campaigns.virtual(11, hidden, days=1, runs_per_day=4)
+    answers = []
+    for leeways in ((edges.LEEWAY_OF_STEPS, edges.LEEWAY_OF_TEETH), (np.inf, np.inf)):
+        monkeypatch.setattr(edges, "LEEWAY_OF_STEPS", leeways[0])
+        monkeypatch.setattr(edges, "LEEWAY_OF_TEETH", leeways[1])
+        answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))
+        answers.append([(each.effect, each.amplitude) for each in answer.missing])
+    assert answers[0] == answers[1]
+    assert {effect.partition(":")[0] for effect, _ in answers[0]} == {"EXX", "EZZ"}
