@@ -229,7 +229,7 @@ class Context:
     def run_order(self) -> Array:
         """From 0 at a run's first row to 1 at its last, by their order (n,)."""
         order = np.zeros(len(self))
-        for rows in self.stretches:
+        for rows in (np.flatnonzero(self.run == number) for number in np.unique(self.run)):
             order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
         return order
 
