@@ -20,12 +20,18 @@ from monitor.discovery.machine.shapes.refine import Refined, refine, refine_all
 from monitor.discovery.machine.shapes.step_places import Between, steps_between
 from monitor.discovery.machine.shapes.tables import ChainScan
 from monitor.discovery.machine.shapes.variants import each_run, part_of_bend
-from monitor.discovery.machine.sizes import peak_of, peaks_of_errors, seen_as_turn, size_of, spread_or_length
+from monitor.discovery.machine.sizes import (
+    all_but_cancels,
+    peak_of,
+    peaks_of_errors,
+    seen_as_turn,
+    size_of,
+    spread_or_length,
+)
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
-from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects import ChainEffect
@@ -181,9 +187,7 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
         size, u = length_of(sizes.estimate[part], sizes.covariance[part, part])
         is_small = len(findings) > 1 and u > 0 and abs(size) / u < SMALLEST_RATIO
         removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
-        peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
-        cancels = nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings)
-        if is_small or cancels:
+        if is_small or all_but_cancels(scene, candidates[index], sizes.estimate[part], removed):
             weak.append(index)
     return max(weak, key=lambda index: -findings[index].evidence.score, default=None)
 

@@ -18,6 +18,7 @@ from monitor.discovery.machine.scene_columns import raw_columns
 from monitor.discovery.machine.shapes.curves import Curve, beyond_base, curve_of, without_powers
 from monitor.discovery.search.amplitudes import length_of
 from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.effects import ChainEffect, Context, parse_effect
 from monitor.effects.drivers import Always, EachRun
 from monitor.effects.effect import ChainBasis
@@ -104,6 +105,20 @@ def peak_of(scene: ChainScene, candidate: ChainCandidate, raw: Array, coefficien
     Powers of a position are counted from the zero of the axis, which may lie far from where it stood.
     """
     return min(_largest(scene, each @ coefficients) for each in (raw, _beyond_powers(scene, candidate, raw)))
+
+
+def all_but_cancels(
+    scene: ChainScene, candidate: ChainCandidate, coefficients: Array, explained: float
+) -> bool:
+    """Whether an effect with coefficients (k,) is many times as large as what it takes of the error, ``explained`` in
+    squares of sigma: others nearly cancel it. Of a power of a position what the base takes up is not counted."""
+    removed = scene.fit.sigma**2 * explained
+    whole = float(np.linalg.norm(candidate.raw @ coefficients, axis=1).max())
+    if not nearly_cancelled(whole, removed, scene.fit.readings):
+        return False
+    beyond = _beyond_powers(scene, candidate, candidate.raw) @ coefficients
+    peak = float(np.linalg.norm(beyond, axis=1).max())
+    return nearly_cancelled(peak, removed, scene.fit.readings)
 
 
 def peaks_of_errors(

@@ -22,6 +22,7 @@ from monitor.discovery.machine.shapes.inside_shapes import bending_sight, standi
 from monitor.discovery.machine.shapes.refine import refine
 from monitor.discovery.machine.shapes.shown_cycles import is_cycle, is_shown
 from monitor.discovery.machine.shapes.variants import with_drivers
+from monitor.discovery.machine.sizes import all_but_cancels
 from monitor.discovery.machine.suspects.wander import is_drift_of_machine, tracker_wander
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
@@ -36,7 +37,6 @@ from monitor.discovery.search.evidence import (
     weigh_in,
 )
 from monitor.discovery.search.memory import Memory
-from monitor.discovery.search.plausible import nearly_cancelled
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
@@ -262,10 +262,10 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
             candidate = self.at_best_value([*others, candidate], len(others))
         size = candidate.columns.shape[1]
         fitted = amplitudes(self.scene, [*others, candidate])
-        peak = float(np.linalg.norm(candidate.raw @ fitted.estimate[-size:], axis=1).max())
-        removed = self.scene.fit.sigma**2 * self._explained(others, candidate)
-        if nearly_cancelled(peak, removed, self.scene.fit.readings):
+        explained = self._explained(others, candidate)
+        if all_but_cancels(self.scene, candidate, fitted.estimate[-size:], explained):
             return False
+        removed = self.scene.fit.sigma**2 * explained
         if is_cycle(candidate) and not is_shown(candidate, fitted.estimate[-size:], removed):
             return False
         sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])

@@ -14,9 +14,9 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.sizes import all_but_cancels
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh_beside
-from monitor.discovery.search.plausible import nearly_cancelled
 
 
 def bends_instead(
@@ -53,8 +53,7 @@ def _all_but_cancel(
     for index, (power, size) in enumerate(zip(powers, sizes, strict=True)):
         beside = [*others, *powers[:index], *powers[index + 1 :]]
         removed = weigh_beside(scene, [power], beside)[0].explained
-        peak = float(np.linalg.norm(power.raw[..., 0] * size, axis=1).max())
-        if nearly_cancelled(peak, scene.fit.sigma**2 * removed, scene.fit.readings):
+        if all_but_cancels(scene, power, np.array([size]), removed):
             return True
     return False
 
