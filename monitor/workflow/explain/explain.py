@@ -53,6 +53,7 @@ from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, explained_refusals, machine_problem
 from monitor.workflow.identify.notes import elsewhere_under
 from monitor.workflow.instruments.against_others import contradiction_in
+from monitor.workflow.instruments.too_well import read_too_well
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, label, resolve_for, subject_of
 from monitor.workflow.tool_frames import tool_frames
@@ -138,8 +139,10 @@ def explained(
     answer = with_plans(answer, explanation.missing, campaign, model)
     answer = _with_blank_rows(with_measurements(answer, campaign, as_model(model)), campaign)
     if not explanation.mistakes:
+        too_well = read_too_well(final, campaign_method(campaign).instruments)
+        first = () if too_well is None else (doubt_sentence(too_well),)
         doubted = map(doubt_sentence, result_doubts(campaign, tool_frames(campaign)))
-        answer = replace(answer, answer=" ".join((answer.answer, *doubted)))
+        answer = replace(answer, answer=" ".join((*first, answer.answer, *doubted)))
     # Where several may be the wrong one, or none alone, the effects come first.
     if beside is not None and (is_explained or len(beside.suspects) == 1):
         answer = replace(answer, against_others=beside)

@@ -56,13 +56,11 @@ from monitor.workflow.explain.shared_answer import (
 )
 from monitor.workflow.explain.ties import ties_of
 from monitor.workflow.identify.answer import Estimate, LikelyMistake, reversal_value
+from monitor.workflow.instruments.too_well import TOO_WELL
 from monitor.workflow.uncertainty.machine_frame import refers_to
 
 #: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.
 HOPELESS_TIMES = 100.0
-#: Residuals of less than this part of what is stated: few owners state ten times what their probe does, and readings in
-#: inches, of which nothing else says so, fit 25 times too well.
-TOO_WELL = 0.1
 #: A power of the position, without a driver.
 POWER = re.compile(r"(?P<error>\w+):poly\d+")
 #: The numbers of a residual that is a vector.
