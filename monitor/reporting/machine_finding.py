@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -194,6 +194,17 @@ def fits_too_well(times: float) -> str:
     return (
         f"the readings fit {times:.0f} times better than their stated standard uncertainty: look whether lengths are "
         "in another unit (inches fit 25 times too well) or the stated value is too large"
+    )
+
+
+def setups_fit_too_well(better: Mapping[str, float]) -> str:
+    """The clause about setups whose readings fit so many times ``better`` than they state, by their ids."""
+    least, largest = (f"{limit(better.values()):.0f}" for limit in (min, max))
+    times = least if least == largest else f"{least} to {largest}"
+    return (
+        f"the readings of setup{'s' if len(better) > 1 else ''} {joined_by_and([*better])} fit {times} times better "
+        "than their stated standard uncertainty: in another unit than their column says (mm for µm is 1000 times, "
+        "inches for mm 25 times) they show nothing of the machine; else the stated value is too large"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from monitor.discovery import Fit
 from monitor.methods.method import Instruments, Unable
-from monitor.reporting.messages import joined_by_and
+from monitor.reporting.machine_finding import setups_fit_too_well
 
 #: Residuals of less than this part of what is stated: few owners state ten times what their probe does, and readings in
 #: inches, of which nothing else says so, fit 25 times too well.
@@ -30,10 +30,4 @@ def read_too_well(fit: Fit, ability: Instruments | Unable) -> str | None:
     better = {setup: 1.0 / times for setup, times in most.items() if 0.0 < times < TOO_WELL}
     if len(most) < 2 or not better:
         return None
-    least, largest = (f"{limit(better.values()):.0f}" for limit in (min, max))
-    between = least if least == largest else f"{least} to {largest}"
-    return (
-        f"the readings of setup{'s' if len(better) > 1 else ''} {joined_by_and([*better])} fit {between} times better "
-        "than their stated standard uncertainty: in another unit than their column says (mm for µm is 1000 times, "
-        "inches for mm 25 times) they show nothing of the machine; else the stated value is too large"
-    )
+    return setups_fit_too_well(better)
