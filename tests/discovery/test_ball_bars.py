@@ -1,68 +1,15 @@
-"""Ball bars in several planes of one run: simulated by the distance of two points, without a line of the package."""
+"""Ball bars in several planes of one run."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from monitor.discovery import explain, fit
+from monitor.discovery import fit
 from monitor.methods import campaign_method
 from monitor.methods.instruments.assembly import between_set_ups
-from monitor.readers import read_campaign
 from monitor.workflow.instruments.too_well import read_too_well
-from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain
-
-CENTRE, LENGTH = np.array([200.0, 150.0, 300.0]), 100.0
-BAR = """
-[[setups]]
-id = "bar-{plane}"
-reading = "distance"
-instrument = "ball bar"
-standard_uncertainty_um = 0.3
-tool_point_mm = [0.0, 0.0, 0.0]
-work_point_mm = [200.0, 150.0, 300.0]
-length_mm = 100.0
-length_standard_uncertainty_um = 0.3
-"""
-
-
-def ball_bars(folder, error_um, degrees=(0.0, 360.0), seed=4, *, planes=("xy", "yz"), in_mm=()):
-    """The campaign of a bar there and back in every plane, brought into each along its circle; ``error_um`` of
-    position, last move and direction of every axis is a displacement. The planes ``in_mm`` were written in mm."""
-    rng = np.random.default_rng(seed)
-    rows = []
-    for plane in planes:
-        first, second = ("xyz".index(letter) for letter in plane)
-        for sense in (1.0, -1.0):
-            angles = np.arange(*degrees, 5.0)[:: int(sense)]
-            way = np.radians([angles[0] - 10.0 * sense, angles[0] - 5.0 * sense, *angles])
-            places = np.tile(CENTRE, (len(way), 1))
-            places[:, first] += LENGTH * np.cos(way)
-            places[:, second] += LENGTH * np.sin(way)
-            direction = np.zeros(3)
-            for index in range(1, len(way)):
-                move = places[index] - places[index - 1]
-                direction = np.where(np.abs(move) > 1e-6, np.sign(move), direction)
-                # Nobody knows how a place was come to that was left and is read again.
-                if index > (1 if sense > 0.0 else 2):
-                    moved = places[index] + 1e-3 * np.asarray(error_um(places[index], move, direction))
-                    reading = 1e3 * (np.linalg.norm(moved - CENTRE) - LENGTH) + rng.normal(0.0, 0.3)
-                    x, y, z = places[index].round(4).tolist()
-                    scale = 1e-3 if plane in in_mm else 1.0
-                    rows.append(
-                        {"run": 1, "setup": f"bar-{plane}", "X": x, "Y": y, "Z": z}
-                        | {"reading_um": reading * scale}
-                    )
-    chain = SimulatedChain(tuple(SimulatedAxis(name, "linear", way) for name, way in WAYS.items()))
-    setups = "".join(BAR.format(plane=plane) for plane in planes)
-    return read_campaign(chain.write(folder / "bars", setups, rows, started=["2026-03-02T20:00:00+00:00"]))
-
-
-def named(campaign):
-    """The effects that a search names, the first first."""
-    problem = campaign_method(campaign).problem_of(campaign).for_search()
-    answer = explain(campaign, problem, "instruments", rng=np.random.default_rng(1))
-    return {each.effect: each.amplitude for each in answer.missing}
+from tests.discovery.ball_bars import ball_bars, named
 
 
 def test_the_last_move_is_not_known_of_the_first_row_of_a_setup(tmp_path):
