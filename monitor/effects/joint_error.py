@@ -99,8 +99,8 @@ class JointError:
     def _explain_guideway(self) -> Explanation:
         rotation = self.term.is_rotation
         return Explanation(
-            f"the guideway of {self.name} is {'twisted' if rotation else 'bent'}: worn, badly levelled, or sagging "
-            "under its load",
+            f"the guideway of {self.name} is {'twisted' if rotation and self.is_along else 'bent'}: worn, badly "
+            "levelled, or sagging under its load",
             f"check level and foundation bolts, re-scrape or re-align the guideway of {self.name}, or compensate "
             + ("volumetrically" if rotation else "its straightness"),
             MOTION_LINEAR,

@@ -436,3 +436,18 @@ def test_play_of_an_axis_that_turns_is_in_its_bearing() -> None:
         "EYX:reversal": "play in the guide of X lets the carriage shift or tilt when it reverses",
         "EXC:reversal": "play in the bearing of C lets what it carries shift or tilt when it reverses",
     }
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("EYX:poly1", "X is not square to Y"),
+        ("EYX:poly2", "the guideway of X is bent"),
+        ("EBX:poly1", "the guideway of X is bent"),
+        ("EAX:poly1", "the guideway of X is twisted"),
+        ("EXX:poly1", "scale or screw of X"),
+    ],
+    ids=["a slope across", "a curve across", "pitch", "roll", "along"],
+)
+def test_an_error_motion_of_a_linear_axis_has_the_cause_of_its_kind(text, cause):
+    assert describe(parse_effect(text, CHAIN)).cause.startswith(cause)

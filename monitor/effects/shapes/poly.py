@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from monitor.effects.context import Context
-from monitor.effects.description import power_of
+from monitor.effects.description import LOCATION_ERRORS, Explanation, power_of
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
 from monitor.machine import Joint
@@ -36,6 +36,17 @@ class Poly(DescribedShape):
 
     def phrase(self, error: JointError) -> str:
         return f", growing {power_of(self.order)} its position"
+
+    def explanation(self, error: JointError) -> Explanation | None:
+        across = not (error.term.is_rotation or error.is_along or error.joint.turns)
+        if self.order > 1 or not across:
+            return None
+        axis, name = "XYZ"[error.term.component % 3], error.name
+        return Explanation(
+            f"{name} is not square to {axis}: settled, knocked out of alignment, or assembled so",
+            f"re-align {name}, or enter the squareness of {name} and {axis} in the control's table",
+            LOCATION_ERRORS,
+        )
 
 
 REGISTERED = (Poly,)
