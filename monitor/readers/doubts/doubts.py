@@ -15,6 +15,7 @@ import numpy as np
 
 from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
+from monitor.readers.doubts.nominal_readings import nominal_words
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
@@ -68,6 +69,7 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
             _same_start(campaign),
             _to_come(campaign),
             repeated_rows(campaign),
+            nominal_words(campaign),
             zero_rows(campaign, frames),
         )
     )
@@ -90,6 +92,7 @@ def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             exchanged_columns(campaign),
             _units_of_runs(campaign),
             _length_of_bar(campaign),
+            nominal_words(campaign),
         )
     )
 

@@ -47,6 +47,7 @@ from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation
 from monitor.workflow.explain.measurements import with_measurements
+from monitor.workflow.explain.nominal_mistakes import pasted
 from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
@@ -93,7 +94,9 @@ def explanation_of(
     def maker(changed: Campaign) -> ChainProblem:
         return machine_problem(changed, model)
 
-    mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
+    mistakes = pasted(campaign, maker, first)
+    if not mistakes:
+        mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes:
         mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes:
