@@ -10,6 +10,7 @@ from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes.cures import Mistake
+from monitor.discovery.machine.mistakes.late_rows import find_late_rows, find_late_rows_without_fit
 from monitor.discovery.machine.mistakes.mistakes import (
     find_mistakes,
     find_other_names,
@@ -36,6 +37,8 @@ __all__ = [
     "VersionError",
     "compare",
     "explain",
+    "find_late_rows",
+    "find_late_rows_without_fit",
     "find_mistakes",
     "find_other_names",
     "find_reading_mistakes",

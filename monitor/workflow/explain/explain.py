@@ -16,6 +16,8 @@ from monitor.discovery import (
     RobustFit,
     compare as compare_fit,
     explain as search,
+    find_late_rows,
+    find_late_rows_without_fit,
     find_mistakes,
     find_other_names,
     find_reading_mistakes,
@@ -97,6 +99,10 @@ def explanation_of(
     mistakes = pasted(campaign, maker, first)
     if not mistakes:
         mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
+    if not mistakes:
+        mistakes = find_late_rows(campaign, maker, first)
+    if not mistakes and is_gross(campaign, first):
+        mistakes = find_late_rows_without_fit(campaign, maker)
     if not mistakes:
         mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes:

@@ -75,15 +75,16 @@ def _with_changes(
 ) -> DataError:
     """The refusal with the changes that would let the readings fit; without one, with the runs whose plan is why."""
     # Loaded here: only readings that contradict the file need the search.
-    from monitor.discovery import find_mistakes, only_misread
+    from monitor.discovery import find_late_rows_without_fit, find_mistakes, only_misread
     from monitor.reporting.machine_finding import mistake_sentence
     from monitor.workflow.explain.machine_answer import mistakes_found
 
     _, part = next(parts_of(campaign))
-    misread = only_misread(part, problem_of)
+    mistakes = find_late_rows_without_fit(part, problem_of)
+    misread = None if mistakes else only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes = find_mistakes(part, problem_of, None)
+    mistakes = mistakes or find_mistakes(part, problem_of, None)
     named: tuple[str, ...] = ()
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
