@@ -73,12 +73,21 @@ def nominal_words(campaign: Campaign) -> Iterator[str]:
     """Yield a sentence on each setup and run with nominal numbers in place of readings; none for none."""
     for each in nominal_readings(campaign):
         yield (
-            f"setup {each.setup}: in {named_range(campaign, each.rows)} {each.what} {each.why}: nominal values are no "
+            f"setup {each.setup}: in {_named_range(campaign, each.rows)} {each.what} {each.why}: nominal values are no "
             "measurement, and pull at what is fitted beside them. Put in what was read, or leave these rows out"
         )
 
 
-def named_range(campaign: Campaign, rows: npt.NDArray[np.int64]) -> str:
+def nominal_mistake(campaign: Campaign, nominal: Sequence[NominalReadings]) -> str:
+    """What is wrong with nominal readings, as the end of "it looks as if"."""
+    return " and ".join(
+        f"{each.what} of setup {each.setup} were no readings in {_named_range(campaign, each.rows)}, but nominal "
+        "values that were put in (undone: without these rows)"
+        for each in nominal
+    )
+
+
+def _named_range(campaign: Campaign, rows: npt.NDArray[np.int64]) -> str:
     """Name rows of one run by their count and their first and last sequence number."""
     probings, first, last = campaign.probings, rows[0], rows[-1]
     return (
@@ -95,8 +104,8 @@ def _blocks(campaign: Campaign) -> list[_Block]:
     number = probings.channels["setup"].astype(np.int64) - 1
     pairs, of_pair = np.unique(np.column_stack([probings.run, number]), axis=0, return_inverse=True)
     return [
-        _Block(int(run), setups[index], np.flatnonzero(of_pair.reshape(-1) == place), stated)
-        for place, (run, index) in enumerate(pairs.tolist())
+        _Block(int(run), setups[index], np.flatnonzero(of_pair.reshape(-1) == pair), stated)
+        for pair, (run, index) in enumerate(pairs.tolist())
         if (stated := setups[index].standard_uncertainty) is not None
     ]
 
@@ -105,18 +114,16 @@ def _places(campaign: Campaign, blocks: Sequence[_Block]) -> Iterator[NominalRea
     """Positions that are the stated points moved as a whole, where others scatter about theirs."""
     readings, channels = campaign.probings.readings, campaign.probings.channels
     of_points = [block for block in blocks if block.setup.reading in ("point", "pose")]
-    if not (of_points and all(axis in readings for axis in "XYZ") and "point_x_mm" in channels):
+    if not (of_points and "point_x_mm" in channels and {"X", "Y", "Z"} <= readings.keys()):
         return
     read = np.column_stack([readings[axis] for axis in "XYZ"])
     none = np.full(len(read), np.nan)
     stated = np.nan_to_num(np.column_stack([channels.get(f"point_{axis}_mm", none) for axis in "xyz"]))
-    turning = [values for axis, values in readings.items() if not campaign.machine.is_linear(axis)]
-    poses = np.column_stack([np.zeros(len(read)), *turning])
     finest = _digit(read)
     looked_at = [
         (block, _as_moved(read[block.rows], stated[block.rows], finest, COARSE * block.stated))
         for block in of_points
-        if finest <= COARSE * block.stated and np.ptp(poses[block.rows], axis=0).max() == 0.0
+        if finest <= COARSE * block.stated and not _turns(campaign, block)
     ]
     scatters = [moved.scatter for _, moved in looked_at if moved.scatter is not None]
     usual = float(np.median(scatters)) if scatters else np.inf
@@ -128,30 +135,44 @@ def _places(campaign: Campaign, blocks: Sequence[_Block]) -> Iterator[NominalRea
             )  # fmt: skip
 
 
+def _turns(campaign: Campaign, block: _Block) -> bool:
+    """Whether a rotary axis moved in the rows of a block."""
+    readings = campaign.probings.readings.items()
+    return any(
+        np.ptp(values[block.rows]) > 0.0 for axis, values in readings if not campaign.machine.is_linear(axis)
+    )
+
+
 def _as_moved(read: Array, stated: Array, finest: float, most: float) -> _Moved:
     """How positions (m, 3) are stated points (m, 3): all of them turned and shifted, or those of at least ``FEWEST``
     that one shift along the axes brings there. Their digit is at least the ``finest`` of the column and at ``most``
     what still shows their scatter."""
-    exact = np.zeros(len(read), dtype=bool)
+    none = np.zeros(len(read), dtype=bool)
     digit = min(max(_digit(read), finest), most)
     if len(np.unique(stated, axis=0)) < FEWEST:
-        return _Moved(exact, digit, None)
+        return _Moved(none, digit, None)
     arms, to = stated - stated.mean(axis=0), read - read.mean(axis=0)
-    left, sizes, right = np.linalg.svd(arms.T @ to)
+    left_vectors, sizes, right_vectors = np.linalg.svd(arms.T @ to)
     if sizes[1] < FLAT * sizes[0]:
-        return _Moved(exact, digit, None)
-    off = arms @ left @ right - to
+        return _Moved(none, digit, None)
+    turn = left_vectors @ right_vectors
+    off = arms @ turn - to
     if np.abs(off).max() <= digit:
-        return _Moved(~exact, digit, None)
+        return _Moved(~none, digit, None)
     scatter = float(np.sqrt(np.mean(off**2)))
-    along = np.round(left @ right)
-    if np.array_equal(along @ along.T, np.eye(3)):
-        steps = np.round((read - stated @ along) / max(finest, SAME_NUMBER)).astype(np.int64)
-        _, group, count = np.unique(steps, axis=0, return_inverse=True, return_counts=True)
-        of_most = group.reshape(-1) == np.argmax(count)
-        if len(np.unique(stated[of_most], axis=0)) >= FEWEST:
-            return _Moved(of_most, finest, scatter)
-    return _Moved(exact, digit, scatter)
+    shifted = _shifted_alike(read, stated, np.round(turn), max(finest, SAME_NUMBER))
+    return _Moved(none, digit, scatter) if shifted is None else _Moved(shifted, finest, scatter)
+
+
+def _shifted_alike(read: Array, stated: Array, turn: Array, digit: float) -> npt.NDArray[np.bool_] | None:
+    """The positions (m, 3) of most that one shift makes of the stated points (m, 3) turned from axes to axes; None of
+    fewer places than ``FEWEST``, or where that is no turn."""
+    if not np.array_equal(turn @ turn.T, np.eye(3)):
+        return None
+    steps = np.round((read - stated @ turn) / digit).astype(np.int64)
+    _, group, count = np.unique(steps, axis=0, return_inverse=True, return_counts=True)
+    of_most = group.reshape(-1) == np.argmax(count)
+    return of_most if len(np.unique(stated[of_most], axis=0)) >= FEWEST else None
 
 
 def _displacements(campaign: Campaign, blocks: Sequence[_Block]) -> Iterator[NominalReadings]:

@@ -8,18 +8,18 @@ import numpy as np
 
 from monitor.discovery import Fit, Mistake
 from monitor.discovery.machine.mistakes.cures import Maker, fitted
-from monitor.readers.doubts.nominal_readings import named_range, nominal_readings
+from monitor.readers.doubts.nominal_readings import nominal_mistake, nominal_readings
 from monitor.records import Campaign
 
 
 def pasted(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistake that readings are nominal ones; ``first`` is the fit of the campaign as recorded. Empty where the
     other rows have no fit of their own: what is left then are the nominal ones."""
-    found = nominal_readings(campaign)
-    if not found:
+    nominal = nominal_readings(campaign)
+    if not nominal:
         return ()
     is_read = np.ones(len(campaign.probings), dtype=bool)
-    for each in found:
+    for each in nominal:
         is_read[each.rows] = False
     rest = (
         fitted(replace(campaign, probings=campaign.probings.rows(is_read)), problem_of)
@@ -28,9 +28,4 @@ def pasted(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, 
     )
     if rest is None:
         return ()
-    what = " and ".join(
-        f"{each.what} of setup {each.setup} were no readings in {named_range(campaign, each.rows)}, but nominal "
-        "values that were put in (undone: without these rows)"
-        for each in found
-    )
-    return (Mistake(what, first.rms, rest.rms),)
+    return (Mistake(nominal_mistake(campaign, nominal), first.rms, rest.rms),)

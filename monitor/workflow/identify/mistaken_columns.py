@@ -80,30 +80,48 @@ def _with_changes(
     from monitor.workflow.explain.machine_answer import mistakes_found
 
     _, part = next(parts_of(campaign))
-    mistakes = find_late_rows_without_fit(part, problem_of)
-    misread = None if mistakes else only_misread(part, problem_of)
+    late = find_late_rows_without_fit(part, problem_of)
+    if late:
+        return _with_sentences(refusal, (mistake_sentence(mistakes_found(late)),))
+    misread = only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes = mistakes or find_mistakes(part, problem_of, None)
+    mistakes = find_mistakes(part, problem_of, None)
     named: tuple[str, ...] = ()
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
         mistakes, named = find_mistakes(_without(part, blank), problem_of, None), tuple(blank_words(blank))
-    names_no_reading = "First look at" not in str(refusal)
     # A refusal that names an error of a run says what is wrong with it; how many poses it has does not.
-    is_lost = names_no_reading and isinstance(refusal, NotConvergedError)
+    is_lost = _names_no_reading(refusal) and isinstance(refusal, NotConvergedError)
     if is_lost and not any(mistake.enough for mistake in mistakes):
         poor = refusal_of_poor_runs(campaign, problem_of)
         if poor is not None:
             return _with_files(poor, campaign)
     if mistakes:
         return _with_sentences(refusal, (*named, mistake_sentence(mistakes_found(mistakes))))
+    return _with_plan(refusal, campaign, problem_of)
+
+
+def _with_plan(
+    refusal: DataError, campaign: Campaign, problem_of: Callable[[Campaign], ChainProblem]
+) -> DataError:
+    """The refusal with what its plan and the import say of it, where no change is enough."""
+    names_no_reading = _names_no_reading(refusal)
     by_plan = (
         *(standing_still(campaign, problem_of) if names_no_reading else ()),
-        *(hardly_told(campaign, problem_of) if is_lost else ()),
+        *(
+            hardly_told(campaign, problem_of)
+            if names_no_reading and isinstance(refusal, NotConvergedError)
+            else ()
+        ),
     )
     said = (*by_plan, *column_doubts(campaign, tool_frames(campaign)))
     return _with_sentences(refusal, said) if said else refusal
+
+
+def _names_no_reading(refusal: DataError) -> bool:
+    """Whether a refusal blames no reading first."""
+    return "First look at" not in str(refusal)
 
 
 def _with_files(refusal: TooFewReadingsError, campaign: Campaign) -> DataError:

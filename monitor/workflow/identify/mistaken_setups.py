@@ -1,5 +1,5 @@
-"""A sign, a unit or exchanged columns of one setup or instrument, which contradicts the others by them, and columns that
-stand some rows too late."""
+"""A sign, a unit or exchanged columns of one setup or instrument, which contradicts the others by them; and columns
+that stand some rows too late."""
 
 from __future__ import annotations
 

@@ -56,19 +56,19 @@ class _Shift:
     def undone(self, campaign: Campaign) -> Campaign:
         """The campaign with the columns beside their readings, without the rows for which there is none any more."""
         probings = campaign.probings
-        source, known = self.source(len(probings))
+        source, has_position = self.source(len(probings))
         readings = {
             axis: values[source] if axis in self.axes else values
             for axis, values in probings.readings.items()
         }
-        return replace(campaign, probings=replace(probings, readings=readings).rows(known))
+        return replace(campaign, probings=replace(probings, readings=readings).rows(has_position))
 
     def source(self, count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
         """The row (n,) whose position belongs to each row, and whether (n,) the file has it."""
         rows = np.arange(count)
         source = np.where((rows >= self.row) & (rows < self.end), rows + self.late, rows)
-        known = (source == rows) | ((source >= self.row) & (source < self.end))
-        return np.clip(source, 0, count - 1), known
+        has_position = (source == rows) | ((source >= self.row) & (source < self.end))
+        return np.clip(source, 0, count - 1), has_position
 
     def in_words(self, campaign: Campaign) -> str:
         """What is wrong, with the first row of which it is."""
@@ -116,11 +116,11 @@ def _worth_trying(campaign: Campaign, first: Fit) -> list[_Shift]:
     foreseen: list[tuple[float, _Shift]] = []
     for axes, positions in _moving(campaign, problem):
         for late in SHIFTS:
-            moved, known = _moved(problem, first, positions, late)
-            found = _best_row(first, moved, known)
-            if found is not None and found[0] < WORTH_TRYING * before:
-                left, row, end = found
-                foreseen.append((left, _Shift(axes, late, row, end)))
+            moved, has_position = _moved(problem, first, positions, late)
+            shift_found = _best_row(first, moved, has_position)
+            if shift_found is not None and shift_found[0] < WORTH_TRYING * before:
+                remains, row, end = shift_found
+                foreseen.append((remains, _Shift(axes, late, row, end)))
     foreseen.sort(key=lambda pair: pair[0])
     return [shift for _, shift in foreseen[:MOST_TRIED]]
 
@@ -145,15 +145,15 @@ def _moved(
     context = problem.context
     rows = np.arange(len(context))
     source = np.clip(rows + late, 0, len(rows) - 1)
-    known = (rows + late == source) & (context.run[source] == context.run)
+    has_position = (rows + late == source) & (context.run[source] == context.run)
     positions = context.positions.copy()
-    positions[:, joints] = np.where(known[:, None], positions[source][:, joints], positions[:, joints])
+    positions[:, joints] = np.where(has_position[:, None], positions[source][:, joints], positions[:, joints])
     shifted = replace(problem, context=replace(context, positions=positions))
     solution = first.solution
-    return shifted.vectors(solution.local, solution.common) - first.vectors, known
+    return shifted.vectors(solution.local, solution.common) - first.vectors, has_position
 
 
-def _best_row(first: Fit, moved: Array, known: npt.NDArray[np.bool_]) -> tuple[float, int, int] | None:
+def _best_row(first: Fit, moved: Array, has_position: npt.NDArray[np.bool_]) -> tuple[float, int, int] | None:
     """What would be left, from which row on and up to which, were the numbers (n, d) ``moved`` by that from one row on:
     up to the end of the run, or of the file. Rows without a position count nothing from there on. None where the rows
     of runs do not follow each other in the file."""
@@ -161,7 +161,7 @@ def _best_row(first: Fit, moved: Array, known: npt.NDArray[np.bool_]) -> tuple[f
     residual, basis = first.solution.last.residual, first.nuisance.basis
     numbers = problem.sigma.shape[1]
     white = np.where(first.has_weight, moved / problem.sigma, 0.0)
-    white = np.where(known[:, None], white, -problem.by_rows(residual))
+    white = np.where(has_position[:, None], white, -problem.by_rows(residual))
     run = np.searchsorted(problem.runs, problem.context.run)
     if np.any(np.diff(run) < 0):
         return None
@@ -171,8 +171,9 @@ def _best_row(first: Fit, moved: Array, known: npt.NDArray[np.bool_]) -> tuple[f
     for index, (rest, by, unknowns) in enumerate(zip(residual, change, basis, strict=True)):
         squares = ((2.0 * rest[: len(by)] + by) * by).reshape(depth, numbers).sum(axis=1)
         taken = (unknowns[: len(by)] * by[:, None]).reshape(depth, numbers, -1).sum(axis=1)
-        own = rest @ unknowns
-        taken = own + np.concatenate([np.cumsum(taken[::-1], axis=0)[::-1], np.zeros((1, taken.shape[1]))])
+        taken = rest @ unknowns + np.concatenate(
+            [np.cumsum(taken[::-1], axis=0)[::-1], np.zeros((1, taken.shape[1]))]
+        )
         squares = np.concatenate([np.cumsum(squares[::-1])[::-1], [0.0]])
         remains[index] = rest @ rest + squares - np.sum(taken**2, axis=1)
     as_recorded, whole = remains[:, -1], remains[:, 0]
@@ -221,10 +222,10 @@ def _settled(campaign: Campaign, first: Fit, shift: _Shift) -> _Shift | None:
 def _at_rows_of(problem: ChainProblem, joints: Sequence[int], shift: _Shift) -> ChainProblem:
     """The problem with a shift of some joints undone; rows whose positions the file does not have get no weight."""
     context = problem.context
-    source, known = shift.source(len(context))
+    source, has_position = shift.source(len(context))
     positions = context.positions.copy()
     positions[:, joints] = positions[source][:, joints]
-    sigma = np.where(known[:, None], problem.sigma, np.inf)
+    sigma = np.where(has_position[:, None], problem.sigma, np.inf)
     return replace(problem, context=replace(context, positions=positions), sigma=sigma)
 
 
@@ -240,8 +241,8 @@ def find_late_rows_without_fit(campaign: Campaign, problem_of: Maker) -> tuple[M
     for last in _last_rows(campaign, problem_of):
         for shift in _late_at_end(_rows(campaign, last), problem_of):
             at_end = replace(shift, row=int(last[0]), end=int(last[-1]) + 1)
-            found = _first_row_of(campaign, problem_of, at_end)
-            for tried in (replace(found, end=end), found):
+            shift_found = _first_row_of(campaign, problem_of, at_end)
+            for tried in (replace(shift_found, end=end), shift_found):
                 fit = fitted(tried.undone(campaign), problem_of)
                 if fit is not None and _is_sound(fit):
                     return (Mistake(tried.in_words(campaign), float("inf"), fit.rms),)
