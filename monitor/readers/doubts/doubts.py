@@ -17,6 +17,7 @@ from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.nominal_readings import nominal_words
 from monitor.readers.doubts.repeated_rows import repeated_rows
+from monitor.readers.doubts.still_columns import still_columns
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.readers.doubts.zero_rows import zero_rows
@@ -70,6 +71,7 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
             _to_come(campaign),
             repeated_rows(campaign),
             nominal_words(campaign),
+            still_columns(campaign),
             zero_rows(campaign, frames),
         )
     )
@@ -93,6 +95,7 @@ def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             _units_of_runs(campaign),
             _length_of_bar(campaign),
             nominal_words(campaign),
+            still_columns(campaign),
         )
     )
 

@@ -23,6 +23,7 @@ from monitor.discovery import (
     find_reading_mistakes,
     find_run_mistakes,
     find_setup_mistakes,
+    find_still_axes,
     is_far,
     is_gross,
     robust_fit,
@@ -83,7 +84,7 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
 def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistakes of whole columns, where what is left is more than effects leave."""
     if is_gross(campaign, first):
-        return find_mistakes(campaign, maker, first)
+        return find_mistakes(campaign, maker, first) or find_still_axes(campaign, maker)
     return find_reading_mistakes(campaign, maker, first) if is_far(first) else ()
 
 

@@ -20,6 +20,7 @@ from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
+from monitor.readers.doubts.still_columns import still_columns
 from monitor.records import Campaign
 from monitor.row_files import rows_in, runs_in
 from monitor.workflow.identify.poor_runs import hardly_told, refusal_of_poor_runs, standing_still
@@ -44,12 +45,12 @@ def with_mistake(
 ) -> DataError:
     """The refusal of a fit, and in a second sentence the mistake of the file that explains it, where one does.
 
-    Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays where
-    it is whatever else is mistaken. Columns that the import saw exchanged are said again. Else the changes are tried
-    that would let the readings fit, which takes up to half a minute, and as long again without rows of zeros, which are
-    named too where that is enough. Where no change is, runs are named whose plan leaves unknowns open, else what the
-    import noticed of the columns is said. Where the refusal names the one setup that is wrong, nothing else is sought.
-    Of very many rows a part is tried.
+    Rows of zeros are named where the campaign without them fits: the origin of a plate is a reading, and stays
+    where it is whatever else is mistaken. Columns that the import saw exchanged, or standing still, are said again.
+    Else the changes are tried that would let the readings fit, which takes up to half a minute, and as long again
+    without rows of zeros, which are named too where that is enough. Where no change is, runs are named whose plan
+    leaves unknowns open, else what the import noticed of the columns is said. Where the refusal names the one setup
+    that is wrong, nothing else is sought. Of very many rows a part is tried.
     """
     if isinstance(refusal, TooFewReadingsError):
         return _with_files(refusal, campaign)
@@ -61,9 +62,9 @@ def with_mistake(
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
         return _with_sentences(refusal, tuple(blank_words(blank)))
-    exchanged = tuple(exchanged_columns(campaign))
-    if exchanged:
-        return _with_sentences(refusal, exchanged)
+    seen_at_import = (*exchanged_columns(campaign), *still_columns(campaign))
+    if seen_at_import:
+        return _with_sentences(refusal, seen_at_import)
     return _with_changes(refusal, campaign, problem_of, blank)
 
 
@@ -75,7 +76,7 @@ def _with_changes(
 ) -> DataError:
     """The refusal with the changes that would let the readings fit; without one, with the runs whose plan is why."""
     # Loaded here: only readings that contradict the file need the search.
-    from monitor.discovery import find_late_rows_without_fit, find_mistakes, only_misread
+    from monitor.discovery import find_late_rows_without_fit, find_mistakes, find_still_axes, only_misread
     from monitor.reporting.machine_finding import mistake_sentence
     from monitor.workflow.explain.machine_answer import mistakes_found
 
@@ -86,7 +87,7 @@ def _with_changes(
     misread = only_misread(part, problem_of)
     if misread is not None and f"setup {misread} " in str(refusal):
         return refusal
-    mistakes = find_mistakes(part, problem_of, None)
+    mistakes = find_mistakes(part, problem_of, None) or find_still_axes(part, problem_of)
     named: tuple[str, ...] = ()
     if blank and not mistakes:
         # The two hide each other: no column is enough while the zeros stand, nor are they while the column does.
