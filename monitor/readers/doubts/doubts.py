@@ -16,6 +16,7 @@ import numpy as np
 from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
 from monitor.readers.doubts.nominal_readings import nominal_words
+from monitor.readers.doubts.plate_doubts import plate_doubts, tracker_doubts
 from monitor.readers.doubts.repeated_rows import repeated_rows
 from monitor.readers.doubts.still_columns import still_columns
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
@@ -72,6 +73,8 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
             repeated_rows(campaign),
             nominal_words(campaign),
             still_columns(campaign),
+            plate_doubts(campaign),
+            tracker_doubts(campaign),
             zero_rows(campaign, frames),
         )
     )
@@ -96,6 +99,8 @@ def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             _length_of_bar(campaign),
             nominal_words(campaign),
             still_columns(campaign),
+            plate_doubts(campaign),
+            tracker_doubts(campaign),
         )
     )
 

@@ -20,6 +20,7 @@ from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.chain.suspects import with_suspects
 from monitor.readers.doubts.blank_rows import blank_rows, blank_words
 from monitor.readers.doubts.doubts import column_doubts, exchanged_columns
+from monitor.readers.doubts.plate_doubts import plate_doubts, tracker_doubts
 from monitor.readers.doubts.still_columns import still_columns
 from monitor.records import Campaign
 from monitor.row_files import rows_in, runs_in
@@ -62,7 +63,9 @@ def with_mistake(
     blank = blank_rows(campaign)
     if blank and _fits_without(campaign, blank, problem_of):
         return _with_sentences(refusal, tuple(blank_words(blank)))
-    seen_at_import = (*exchanged_columns(campaign), *still_columns(campaign))
+    seen_at_import = (
+        *exchanged_columns(campaign), *still_columns(campaign), *plate_doubts(campaign), *tracker_doubts(campaign),
+    )  # fmt: skip
     if seen_at_import:
         return _with_sentences(refusal, seen_at_import)
     return _with_changes(refusal, campaign, problem_of, blank)
