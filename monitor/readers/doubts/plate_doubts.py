@@ -19,6 +19,8 @@ from monitor.units import UNIT_WORDS, Unit, mistaken_for_mm
 
 #: Rows of a setup in a run from which on anything is said, and part of them that may be wrong.
 FEWEST, MOST_WRONG = 8, 0.3
+#: Rows of a tracker in a run that are looked at: of a million the first ones.
+MOST_ROWS = 20_000
 #: Factors of units are met within this part, and points within this part of their spread.
 NEAR_UNIT, NEAR = 5e-3, 2e-3
 #: Of targets on a tool this part of their distance, which is tens of mm: a tracker scatters by some hundredths.
@@ -100,8 +102,8 @@ def _in_unit(plate: _Plate) -> tuple[Unit | None, str]:
 
 def _unit_words(plate: _Plate, unit: Unit, columns: str) -> str:
     return (
-        f"columns {columns} of setup {plate.setup.id} in run {plate.run} look as if they were {UNIT_WORDS[unit]}: positions "
-        "and points have the same distances only then, as they have in other setups; lengths are in mm"
+        f"columns {columns} of setup {plate.setup.id} in run {plate.run} look as if they were {UNIT_WORDS[unit]}: "
+        "positions and points have the same distances only then, as they have in other setups; lengths are in mm"
     )
 
 
@@ -164,7 +166,7 @@ def tracker_doubts(campaign: Campaign) -> Iterator[str]:
     beside = {reflector.id for reflector in campaign.artefact.reflectors if reflector.fixed}
     for run in np.unique(probings.run).tolist():
         rows = np.flatnonzero(probings.run == run)
-        rows = rows[~np.isin(probings.target[rows], list(beside))]
+        rows = rows[~np.isin(probings.target[rows], list(beside))][:MOST_ROWS]
         if len(rows) < FEWEST:
             continue
         odd = _rows_in_unit(points[rows], probings.target[rows], _poses(campaign, rows))
@@ -172,9 +174,9 @@ def tracker_doubts(campaign: Campaign) -> Iterator[str]:
             unit, of_unit = odd
             sequences = probings.sequence[rows[of_unit]]
             yield (
-                f"columns {and_of(names)} look as if they were {UNIT_WORDS[unit]} in {len(sequences)} rows of run {run} (about "
-                f"sequences {sequences[0]} to {sequences[-1]}): the targets on the tool are as far apart as in the "
-                "other rows only then; lengths are in mm"
+                f"columns {and_of(names)} look as if they were {UNIT_WORDS[unit]} in {len(sequences)} rows of run "
+                f"{run} (about sequences {sequences[0]} to {sequences[-1]}): the targets on the tool are as far apart as "
+                "in the other rows only then; lengths are in mm"
             )
 
 
