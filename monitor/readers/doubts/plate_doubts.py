@@ -175,8 +175,8 @@ def tracker_doubts(campaign: Campaign) -> Iterator[str]:
             sequences = probings.sequence[rows[of_unit]]
             yield (
                 f"columns {and_of(names)} look as if they were {UNIT_WORDS[unit]} in {len(sequences)} rows of run "
-                f"{run} (about sequences {sequences[0]} to {sequences[-1]}): the targets on the tool are as far apart as "
-                "in the other rows only then; lengths are in mm"
+                f"{run} (about sequences {sequences[0]} to {sequences[-1]}): the targets on the tool are as far apart "
+                "as in the other rows only then; lengths are in mm"
             )
 
 
