@@ -15,7 +15,10 @@ import numpy as np
 
 from monitor.readers.doubts.angle_doubts import angles_begun_anew, radians
 from monitor.readers.doubts.axes_doubts import mistaken_axes
+from monitor.readers.doubts.nominal_readings import nominal_words
+from monitor.readers.doubts.plate_doubts import plate_doubts, tracker_doubts
 from monitor.readers.doubts.repeated_rows import repeated_rows
+from monitor.readers.doubts.still_columns import still_columns
 from monitor.readers.doubts.tool_frames import ToolFrames, apart
 from monitor.readers.doubts.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
 from monitor.readers.doubts.zero_rows import zero_rows
@@ -68,6 +71,10 @@ def doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple[str, .
             _same_start(campaign),
             _to_come(campaign),
             repeated_rows(campaign),
+            nominal_words(campaign),
+            still_columns(campaign),
+            plate_doubts(campaign),
+            tracker_doubts(campaign),
             zero_rows(campaign, frames),
         )
     )
@@ -90,6 +97,10 @@ def result_doubts(campaign: Campaign, frames: ToolFrames | None = None) -> tuple
             exchanged_columns(campaign),
             _units_of_runs(campaign),
             _length_of_bar(campaign),
+            nominal_words(campaign),
+            still_columns(campaign),
+            plate_doubts(campaign),
+            tracker_doubts(campaign),
         )
     )
 

@@ -16,11 +16,14 @@ from monitor.discovery import (
     RobustFit,
     compare as compare_fit,
     explain as search,
+    find_late_rows,
+    find_late_rows_without_fit,
     find_mistakes,
     find_other_names,
     find_reading_mistakes,
     find_run_mistakes,
     find_setup_mistakes,
+    find_still_axes,
     is_far,
     is_gross,
     robust_fit,
@@ -47,6 +50,7 @@ from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation
 from monitor.workflow.explain.measurements import with_measurements
+from monitor.workflow.explain.nominal_mistakes import pasted
 from monitor.workflow.explain.planned_ties import with_plans
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.explain.unit_mistakes import units_mistaken
@@ -81,7 +85,7 @@ def first_fit(campaign: Campaign, model: StoredModel, times: int = TIMES_OF_FIT)
 def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistakes of whole columns, where what is left is more than effects leave."""
     if is_gross(campaign, first):
-        return find_mistakes(campaign, maker, first)
+        return find_mistakes(campaign, maker, first) or find_still_axes(campaign, maker)
     return find_reading_mistakes(campaign, maker, first) if is_far(first) else ()
 
 
@@ -94,7 +98,13 @@ def explanation_of(
     def maker(changed: Campaign) -> ChainProblem:
         return machine_problem(changed, model)
 
-    mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
+    mistakes = pasted(campaign, maker, first)
+    if not mistakes:
+        mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
+    if not mistakes:
+        mistakes = find_late_rows(campaign, maker, first)
+    if not mistakes and is_gross(campaign, first):
+        mistakes = find_late_rows_without_fit(campaign, maker)
     if not mistakes:
         mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes:

@@ -9,6 +9,7 @@ import numpy as np
 
 from monitor.discovery.machine.fit import Fit
 from monitor.exceptions import MonitorError
+from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Campaign
 
@@ -41,13 +42,34 @@ class Mistake:
 
 def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:
     """The fit of a corrected campaign; None where it does not converge within few steps."""
+    problem = problem_with(campaign, problem_of)
+    return None if problem is None else fitted_problem(problem)
+
+
+def problem_with(campaign: Campaign, problem_of: Maker) -> ChainProblem | None:
+    """The problem of a corrected campaign; None where that is no machine of the file either."""
     try:
         with np.errstate(all="ignore"):
-            problem = problem_of(campaign)
+            return problem_of(campaign)
     except (MonitorError, np.linalg.LinAlgError):
-        # This is no machine of that file either.
         return None
-    return fitted_problem(problem)
+
+
+def sum_after_one_step(problem: ChainProblem) -> float:
+    """The sum of squares that one step of a fit foresees; infinite where there is none."""
+    try:
+        with np.errstate(all="ignore"):
+            at = problem.linearise(problem.start, problem.common_start)
+    except (MonitorError, np.linalg.LinAlgError):
+        return float("inf")
+    total = 0.0
+    for residual, local, common in zip(at.residual, at.local, at.common, strict=True):
+        columns = np.hstack([local, common])
+        size = np.linalg.norm(columns, axis=0)
+        columns = columns / np.where(size > 0.0, size, 1.0)
+        rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=RANK_TOLERANCE)[0]
+        total += float(rest @ rest)
+    return total
 
 
 def fitted_problem(problem: ChainProblem) -> Fit | None:

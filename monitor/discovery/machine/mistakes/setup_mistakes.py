@@ -38,12 +38,13 @@ from monitor.discovery.machine.mistakes.cures import (
     cured_rms,
     fitted,
     fitted_problem,
+    problem_with,
+    sum_after_one_step,
     without_gross,
 )
 from monitor.discovery.machine.mistakes.fewer_rows import MOST_RUNS, fewer_rows
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
-from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.suspects import DOUBTFUL, who_contradicts
 from monitor.methods.method import Contrast, ContrastKind, Instruments, SetupScatter
@@ -251,20 +252,8 @@ def _contradicts_itself(alone: Campaign, problem_of: Maker, run: int) -> bool:
 
 def _worth_fitting(undone: Campaign, problem_of: Maker, limit: float) -> ChainProblem | None:
     """The problem of a campaign; None where one step of a fit foresees a sum of squares above a limit."""
-    try:
-        with np.errstate(all="ignore"):
-            problem = problem_of(undone)
-            at = problem.linearise(problem.start, problem.common_start)
-    except (MonitorError, np.linalg.LinAlgError):
-        return None
-    total = 0.0
-    for residual, local, common in zip(at.residual, at.local, at.common, strict=True):
-        columns = np.hstack([local, common])
-        size = np.linalg.norm(columns, axis=0)
-        columns = columns / np.where(size > 0.0, size, 1.0)
-        rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=RANK_TOLERANCE)[0]
-        total += float(rest @ rest)
-    return problem if total <= limit else None
+    problem = problem_with(undone, problem_of)
+    return problem if problem is not None and sum_after_one_step(problem) <= limit else None
 
 
 def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
