@@ -44,6 +44,7 @@ NAMED_BLIND_SPOTS = 6
 def show(answer: ExplainAnswer) -> None:
     """Print an explanation: the finding in sentences first, because whoever reads one line has to read that."""
     explanation = answer.explanation
+    output.copied(answer.copied_readings)
     output.say(explanation.answer)
     residual_output.summary(explanation.comparison)
     if isinstance(explanation, MachineExplanation):
