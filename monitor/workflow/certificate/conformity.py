@@ -171,7 +171,7 @@ def _volumetric_in_words(rule: str, volumetric: VolumetricResult, texts: Texts, 
 
 def _never_passing(rule: str, judged: Sequence[_Judged], texts: Texts) -> list[str]:
     """Of which parameters no estimate could have passed by the rule, their uncertainty being what it is."""
-    names = [each.name for each in judged if _acceptance(rule, each) is None]
+    names = [each.name for each in judged if not _can_pass(rule, each)]
     if not names:
         return []
     what = "guard" if rule in _BY_GUARD_BAND else "probability"
@@ -305,12 +305,19 @@ def _global_risks(rule: str, judged: _Judged, spread: float | None) -> tuple[flo
     return risks.consumer, risks.producer
 
 
+def _can_pass(rule: str, judged: _Judged) -> bool:
+    """Whether an estimate of zero would pass; where it does not, none does."""
+    if rule in ("simple", *_BY_GUARD_BAND):
+        return judged.band <= judged.limit
+    return _probability_at(judged, 0.0) >= WANTED
+
+
 def _acceptance(rule: str, judged: _Judged) -> float | None:
     """The largest absolute estimate that passes; None where none does."""
-    if rule in ("simple", *_BY_GUARD_BAND):
-        return judged.limit - judged.band if judged.band <= judged.limit else None
-    if _probability_at(judged, 0.0) < WANTED:
+    if not _can_pass(rule, judged):
         return None
+    if rule in ("simple", *_BY_GUARD_BAND):
+        return judged.limit - judged.band
     low, high = 0.0, judged.limit
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
