@@ -13,6 +13,7 @@ from monitor.reporting.adjusting import remedy_holds_for
 from monitor.reporting.runs_that_tell import (
     MOVED_ONCE,
     NO_POSE_TELLS,
+    ONE_LINE,
     WHO_MOVED,
     further_runs,
     more_runs,
@@ -44,6 +45,7 @@ NAMED_BLIND_SPOTS = 6
 def show(answer: ExplainAnswer) -> None:
     """Print an explanation: the finding in sentences first, because whoever reads one line has to read that."""
     explanation = answer.explanation
+    output.copied(answer.copied_readings)
     output.say(explanation.answer)
     residual_output.summary(explanation.comparison)
     if isinstance(explanation, MachineExplanation):
@@ -195,13 +197,21 @@ def _of_another_correction(effect: MachineMissing | CurveMissing) -> list[str]:
     return [rival for rival in effect.indistinguishable_from if rival not in served]
 
 
-#: Ties that other runs break.
-_MORE_RUNS = (TieBreak.REPEATED, TieBreak.REFERENCES, TieBreak.MORE_RUNS, TieBreak.NO_POSES)
+#: Ties that other runs break, or nothing.
+_MORE_RUNS = (
+    TieBreak.REPEATED,
+    TieBreak.REFERENCES,
+    TieBreak.MORE_RUNS,
+    TieBreak.NO_POSES,
+    TieBreak.ONE_LINE,
+)
 
 
 def _more_runs(rivals: str, tie: Tie) -> str:
     """What other runs do about rivals."""
     runs = "" if tie.runs is None else more_runs(tie.runs)
+    if tie.broken_by is TieBreak.ONE_LINE:
+        return f"no pose tells {rivals} apart: {ONE_LINE}"
     if tie.broken_by is TieBreak.NO_POSES:
         return f"{NO_POSE_TELLS} {rivals} apart{runs and ': '}{runs}"
     said = {TieBreak.REPEATED: MOVED_ONCE, TieBreak.REFERENCES: WHO_MOVED}.get(tie.broken_by, runs)

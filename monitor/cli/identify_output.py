@@ -33,6 +33,7 @@ def show(answer: IdentifyAnswer) -> None:
 
 def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     """The parameters of the last runs, newest last, and what was refused."""
+    output.copied(answer.copied_readings)
     if answer.work_points_elsewhere is not None:
         output.say(str(answer.work_points_elsewhere))
     shown = runs[-SHOWN_RUNS:]

@@ -21,7 +21,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from monitor.documents import to_document
+from monitor.documents import Said, to_document
 from monitor.formula_cells import FORMULA
 
 # A table that goes to a file or a pipe is as wide as it needs: one line a row, whatever the window.
@@ -59,6 +59,12 @@ def _plain(answer: object) -> Any:
 def csv_cell(cell: object) -> object:
     """Return a cell as CSV has it: a text that a spreadsheet would run as a formula begins with an apostrophe."""
     return f"'{cell}" if isinstance(cell, str) and re.match(FORMULA, cell) else cell
+
+
+def copied(sentences: Sequence[Said] | None) -> None:
+    """Say before any number which readings it rests on are copies."""
+    for sentence in sentences or ():
+        say(str(sentence))
 
 
 def say(text: str = "") -> None:

@@ -214,3 +214,33 @@ class RunsOfSeveralPlans(Sentence):
 
     def __str__(self) -> str:
         return "the runs do not follow one plan"
+
+
+@dataclass(frozen=True)
+class RowsRepeated(Sentence):
+    """So many ``rows`` of a run, from sequence ``first`` on, equal those from sequence ``of`` on in all but their
+    times; they ``may_be_passes`` where the display hides what readings scatter."""
+
+    run: int
+    rows: int
+    first: int
+    of: int
+    may_be_passes: bool
+
+    def __str__(self) -> str:
+        equal = (
+            f"{self.rows} rows of run {self.run}, from sequence {self.first} on, equal those from sequence "
+            f"{self.of} on in every number"
+        )
+        counted = (
+            "u and the repeatability come out too small, the degrees of freedom and the lack of fit too large"
+        )
+        if self.may_be_passes:
+            return (
+                f"{equal}: either they are copies, which count here as independent readings ({counted}), or the "
+                "display hides the scatter and they say nothing of repeatability"
+            )
+        return (
+            f"{equal}: copies count here as independent readings, so {counted}. Take them out of the file, "
+            "withdraw the campaign and import it again"
+        )

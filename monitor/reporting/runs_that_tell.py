@@ -36,6 +36,8 @@ WHO_MOVED = (
     "repeat the run with targets that rest beside the machine, read again and again: they seem to move with the "
     "station, and stand still where the machine moved on its base"
 )
+#: Why no measurement at other poses tells turns of joints apart.
+ONE_LINE = "they turn the same links about the same line wherever the axes stand"
 NO_POSE_TELLS = "no pose that this machine reaches tells"
 
 

@@ -17,13 +17,17 @@ def as_vector(values: npt.ArrayLike, name: str, *, length: int | None = None, le
     if array.ndim != 1:
         raise DataError(f"{name} has shape {array.shape}; one dimension is needed.")
     if length is not None and array.shape[0] != length:
-        raise DataError(f"{name} has {array.shape[0]} values; {length} are needed, one for each run.")
+        raise DataError(f"{name} has {_counted(array, 'value')}; {length} are needed, one for each run.")
     if array.shape[0] < least:
-        raise DataError(f"{name} has {array.shape[0]} values; at least {least} are needed.")
+        raise DataError(f"{name} has {_counted(array, 'value')}; at least {least} are needed.")
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise DataError(f"{name}[{bad[0]}] is {array[bad[0]]}; every value must be finite.")
     return array
+
+
+def _counted(array: Array, word: str) -> str:
+    return f"{len(array)} {word}{'' if len(array) == 1 else 's'}"
 
 
 def as_positive(values: npt.ArrayLike, name: str, *, length: int | None = None) -> Array:
@@ -43,7 +47,7 @@ def as_matrix(values: npt.ArrayLike, name: str, *, least: int = 2) -> Array:
     if array.ndim != 2:
         raise DataError(f"{name} has shape {array.shape}; runs by quantities (n, p) are needed.")
     if array.shape[0] < least:
-        raise DataError(f"{name} has {array.shape[0]} rows; at least {least} runs are needed.")
+        raise DataError(f"{name} has {_counted(array, 'row')}; at least {least} runs are needed.")
     if array.shape[1] < 1:
         raise DataError(f"{name} has no columns; at least one quantity is needed.")
     bad = np.argwhere(~np.isfinite(array))

@@ -111,6 +111,15 @@ if TYPE_CHECKING:
         CHANGES as CHANGES,
         ComputedChange as ComputedChange,
     )
+    from monitor.store.copies_of_runs import (
+        CopiedCampaign as CopiedCampaign,
+        CopiedRun as CopiedRun,
+        campaign_notes as campaign_notes,
+        copied_campaigns as copied_campaigns,
+        copied_runs as copied_runs,
+        copy_notes as copy_notes,
+        noted_campaigns as noted_campaigns,
+    )
     from monitor.store.curves import (
         curve_names as curve_names,
         is_curve as is_curve,
@@ -134,10 +143,7 @@ if TYPE_CHECKING:
         load_identification as load_identification,
         save_identification as save_identification,
     )
-    from monitor.store.import_notes import (
-        campaign_notes as campaign_notes,
-        run_fingerprints as run_fingerprints,
-    )
+    from monitor.store.import_notes import run_fingerprints as run_fingerprints
     from monitor.store.models import (
         StoredModel as StoredModel,
         last_used_campaign as last_used_campaign,
@@ -235,6 +241,8 @@ else:
             "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
             "load_certificate mark_certificate save_certificate",
             "connection": "Database",
+            "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes copied_campaigns copied_runs copy_notes "
+            "noted_campaigns",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
             "copies.export": "export_tables tables_without_rows",
@@ -248,7 +256,7 @@ else:
             "events": "NOTE MachineEvent StoredEvent list_events machine_events record_event",
             "identifications": "MadeBy identification_by_number identifications_made last_identification "
             "load_identification save_identification",
-            "import_notes": "campaign_notes run_fingerprints",
+            "import_notes": "run_fingerprints",
             "models": "StoredModel last_used_campaign list_models load_model model_history next_version "
             "save_model",
             "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",

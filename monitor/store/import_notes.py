@@ -1,4 +1,4 @@
-"""What was noticed at an import: sentences stored with the campaign, and runs that were imported before.
+"""What was noticed at an import, in sentences stored with the campaign, and the hash of the readings of each run.
 
 Readings of a run that equal those of another in every digit are a copy, never chance; counted as independent they
 would make every uncertainty too small. The hash of a run's readings tells them without reading the readings again.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from itertools import groupby
-from typing import Any
 
 import numpy as np
 
@@ -26,8 +24,6 @@ FEWEST_PROBINGS = 12
 
 #: Names of targets that become text at a time: those of a million rows take 60 MB.
 ROWS_AT_ONCE = 50_000
-#: A folder imported again and again under new names: so many campaigns, and runs of each, are named.
-MOST_CAMPAIGNS, MOST_PAIRS = 5, 5
 
 
 def run_fingerprints(touches: Probings, *, signed_zeros: bool = False) -> dict[int, str]:
@@ -68,15 +64,22 @@ def keep_fingerprints(db: Database, campaign_id: int, touches: Probings) -> None
     """Add the hashes of a campaign's runs, and those of campaigns that came in before there were any."""
     _insert(db, campaign_id, run_fingerprints(touches) | _known_with_signs(db, touches))
     older = db.rows(
-        "SELECT campaign_id, campaign, machine_description FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
+        "SELECT campaign_id FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
         "AND campaign_id NOT IN (SELECT campaign_id FROM run_fingerprint) ORDER BY campaign_id",
         [campaign_id],
     )
-    for number, name, machine in older:
-        with as_imported(name):
-            described = machine_record(machine)
-        record = probings.as_record(probings.select(db, number), described)
-        _insert(db, number, run_fingerprints(record))
+    for (number,) in older:
+        _insert(db, number, stored_fingerprints(db, number))
+
+
+def stored_fingerprints(db: Database, campaign_id: int) -> dict[int, str]:
+    """The hashes by run of the stored readings of a campaign that counts, computed anew."""
+    ((name, machine),) = db.rows(
+        "SELECT campaign, machine_description FROM campaign WHERE campaign_id = ?", [campaign_id]
+    )
+    with as_imported(name):
+        described = machine_record(machine)
+    return run_fingerprints(probings.as_record(probings.select(db, campaign_id), described))
 
 
 def _known_with_signs(db: Database, touches: Probings) -> dict[int, str]:
@@ -115,42 +118,3 @@ def notes_content(db: Database, campaign_id: int) -> str:
     return audit.digest(
         *db.rows("SELECT * FROM import_note WHERE campaign_id = ? ORDER BY position", [campaign_id])
     )
-
-
-def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
-    """Return the notes of a campaign's import, and sentences on runs that equal others' in every digit."""
-    notes = [
-        str(note)
-        for (note,) in db.rows(
-            "SELECT note FROM v_import_notes WHERE campaign = ? ORDER BY position", [campaign]
-        )
-    ]
-    repeated = db.rows(
-        "SELECT same_as_campaign, same_as_machine, machine, run, same_as_run FROM v_repeated_runs "
-        "WHERE campaign = ? ORDER BY same_as_campaign, run, same_as_run",
-        [campaign],
-    )
-    copies = [(key, list(rows)) for key, rows in groupby(repeated, key=lambda row: row[:3])]
-    return (*notes, _copied(campaign, copies)) if copies else tuple(notes)
-
-
-def _copied(campaign: str, copies: Sequence[tuple[tuple[Any, ...], list[tuple[Any, ...]]]]) -> str:
-    """One sentence on all campaigns that hold runs of this one, however often it was imported."""
-    count = len({run for _, rows in copies for *_, run, _ in rows})
-    head = f"{count} run{'s' * (count > 1)} of {campaign} equal{'s' * (count == 1)}"
-    never = "in every reading, which two measurements never do"
-    named = [_named(key, rows) for key, rows in copies[:MOST_CAMPAIGNS]]
-    if len(copies) == 1:
-        ((other, pairs),) = named
-        return f"{head} those of campaign {other} {never}: run {pairs}; withdraw the copy (monitor withdraw)"
-    more = len(copies) - len(named)
-    each = "; ".join(f"{other}, run {pairs}" for other, pairs in named) + f"; and {more} more" * (more > 0)
-    return f"{head} those of {len(copies)} campaigns {never}: {each}. Withdraw the copies (monitor withdraw)"
-
-
-def _named(key: tuple[Any, ...], rows: Sequence[tuple[Any, ...]]) -> tuple[str, str]:
-    """A campaign with its machine, where that is another, and the pairs of equal runs."""
-    other, its_machine, machine = key
-    pairs = [f"{run} (there {same})" for *_, run, same in rows]
-    shown = ", ".join(pairs[:MOST_PAIRS]) + ", ..." * (len(pairs) > MOST_PAIRS)
-    return f"{other}{'' if machine == its_machine else f' of machine {its_machine}'}", shown

@@ -15,6 +15,7 @@ from monitor.reporting.numbers import round_result, written
 from monitor.reporting.runs_that_tell import (
     MOVED_ONCE,
     NO_POSE_TELLS,
+    ONE_LINE,
     WHO_MOVED,
     further_runs,
     more_runs,
@@ -342,6 +343,7 @@ def what_breaks(tie: Tie) -> str:
         TieBreak.UNEVEN_POSITIONS: f"measure {positions_that_tell(tie.axes, tie.step_mm or 0.0)}",
         TieBreak.INSTRUMENT: _another_instrument(tie.measurement),
         TieBreak.SETUP: f"{further_runs(tie.runs or 1)} {IN_WORDS[tie.setup or SecondSetup.LONGER_STYLUS]}",
+        TieBreak.ONE_LINE: f"no pose does: {ONE_LINE}",
         TieBreak.NOTHING: (
             "no touch of these targets does: they move the tip alike, and one correction serves both with this stylus"
         ),

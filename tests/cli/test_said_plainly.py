@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,7 @@ def test_the_fleet_has_a_row_for_a_machine_without_numbers(typed: Any, tmp_path:
     assert (answer["machines"], answer["without_numbers"]) == (1, ["CENTRE-4"])
     said = typed("fleet", db=db).out
     assert "2 machines, 1 of them without numbers, 32 values" in said
+    assert re.search(r"computed on \d{4}-\d\d-\d\d; the latest values shown are of 2012-03-05\n", said)
     assert any(
         line.split()[:2] == ["-", "CENTRE-4"] and "not judged: not identified" in line
         for line in said.splitlines()

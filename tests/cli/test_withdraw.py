@@ -58,3 +58,22 @@ def test_its_certificates_are_named_and_no_longer_verify(typed: Any, issued: Any
     assert withdrawn.status == 0
     assert typed("certificate", "verify", issued.file("2026-0001"), db=issued.db).status == 1
     assert typed("verify", db=issued.db).status == 0
+
+
+def test_the_list_of_campaigns_says_which_hold_runs_of_others(
+    typed: Any, examples: Path, tmp_path: Path
+) -> None:
+    folder, db = tmp_path / "copy", tmp_path / "x.duckdb"
+    shutil.copytree(examples / "r-test", folder)
+    text = (folder / "campaign.toml").read_text(encoding="utf-8")
+    text = text.replace('"r-test"', '"copy"', 1).replace('"CENTRE-4"', '"CENTRE-5"', 1)
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    assert typed("import", examples / "r-test", folder, db=db).status == 0
+    said = "1 run of copy equals those of r-test of machine CENTRE-4 in every reading"
+    assert said in typed("campaigns", db=db).out
+    (copied,) = typed("campaigns", "--json", db=db).document["copied"]
+    assert (copied["campaign"], copied["same_as_campaign"], copied["runs"]) == ("copy", "r-test", 1)
+    told = typed("identify", "r-test", db=db).out.splitlines()[0]
+    assert told.startswith(
+        "1 run of r-test equals those of campaign copy of machine CENTRE-5 in every reading"
+    )

@@ -5,6 +5,7 @@ The machine is the example of rotary probing, ``w C A Y b X Z t``: the table til
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from monitor.discovery import fit
+from monitor.discovery.machine.separation.alike import moves_alike
 from monitor.discovery.machine.separation.separate import separating_poses
 from monitor.effects import parse_effect
+from monitor.machine import chain_of_axes
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
+from monitor.records import ChainAxis
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "tilting-table"
 DIRECTIONS = dict(zip("XYZ", np.eye(3), strict=True))
@@ -66,10 +70,32 @@ def test_shifts_are_alike_where_the_matrices_say_so(fitted, effect: str, rival: 
     assert separation.together == (((effect, rival),) if alike else ())
 
 
-def test_of_turns_nothing_is_said(fitted) -> None:
-    """What a turn does depends on where is touched; poses are planned for methods of balls alone."""
-    effect, rival = (
-        parse_effect(text, fitted.problem.context.chain)
-        for text in ("EA0A@warmup20min", "EAA:const@warmup20min")
-    )
-    assert separating_poses(fitted, effect, np.array([1e-5]), [rival]).together == ()
+@pytest.mark.parametrize(
+    ("rival", "alike"),
+    [("EAA:const@warmup20min", True), ("EBA:const@warmup20min", False), ("EAC:const@warmup20min", False)],
+)
+def test_turns_about_one_line_are_alike(fitted, rival: str, alike: bool) -> None:
+    """What a turn does depends on where is touched, too: the zero of A and a turn about A are one for all of that."""
+    effect, other = (parse_effect(text, fitted.problem.context.chain) for text in ("EA0A@warmup20min", rival))
+    separation = separating_poses(fitted, effect, np.array([1e-5]), [other])
+    assert separation.together == ((("EA0A@warmup20min", rival),) if alike else ())
+
+
+@pytest.mark.parametrize("driver", ["harmonic1", "compliance@gravity"])
+@pytest.mark.parametrize("offset_mm", [0.0, 5.0])
+def test_a_shoulder_on_the_line_of_the_base_is_told_by_no_pose(fitted, driver: str, offset_mm: float) -> None:
+    """EBJ1 turns J1's arm about its Y axis, EBJ2 the shoulder about its own, which stands on that line or beside it."""
+    chain = chain_of_axes(
+        [
+            ChainAxis("J1", "rotary", "tool", (0.0, 0.0, 1.0), (0.0, 0.0, 200.0)),
+            ChainAxis("J2", "rotary", "tool", (0.0, 1.0, 0.0), (offset_mm, 0.0, 0.0)),
+            ChainAxis("J3", "rotary", "tool", (0.0, 1.0, 0.0), (0.0, 0.0, 250.0)),
+        ],
+        {}, (0.0, 0.0, -1.0),
+    )  # fmt: skip
+    context = replace(fitted.problem.context, chain=chain)
+    base, shoulder, elbow = (parse_effect(f"EB{joint}:{driver}", chain) for joint in ("J1", "J2", "J3"))
+    coefficients = np.array([1e-5, 2e-5])[: 2 if driver == "harmonic1" else 1]
+    # A harmonic goes with the angle of its own joint, a compliance with the torque about its line.
+    assert moves_alike(context, base, coefficients, shoulder, {}) == (driver[0] == "c" and offset_mm == 0.0)
+    assert not moves_alike(context, shoulder, coefficients, elbow, {})

@@ -12,6 +12,7 @@ from by_path import load
 from monitor.documents import from_document, to_document
 from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.certificate.dcc import dcc_xml
+from monitor.reporting.certificate.pictures import map_picture
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.volumetric import printed_map
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
@@ -135,6 +136,9 @@ def test_a_map_of_linear_axes_alone_is_at_no_rotary_pose(
 ) -> None:
     (plain,) = make_record(language=language, maps=1).volumetric
     of_0_2_0, turning, linear = (replace(plain, poses=1, turns=turns) for turns in (None, True, False))
+    for texts, words in ((texts_of(), "otary axes"), (texts_of("de"), "Drehachsen")):
+        captions = [map_picture(each, texts, "points.csv").caption for each in (of_0_2_0, turning, linear)]
+        assert [words in caption for caption in captions] == [True, True, False]
     assert said not in printed_map(of_0_2_0, texts_of(language)).explained
     assert said not in printed_map(turning, texts_of(language)).explained
     assert said in printed_map(linear, texts_of(language)).explained

@@ -5,6 +5,7 @@ import pytest
 
 from monitor.exceptions import DataError
 from monitor.reporting.figures.style import svg
+from monitor.reporting.figures.titles import map_note
 from monitor.reporting.figures.volumetric import expected_uncertainties, volumetric_slices
 
 GRID = np.array([[x, y, z] for x in (0.0, 50.0, 100.0) for y in (-20.0, 0.0, 20.0) for z in (0.0, 200.0)])
@@ -42,3 +43,10 @@ def test_a_parameter_without_a_number_leaves_a_gap():
     assert len(svg(figure)) > 1000
     with pytest.raises(DataError, match="2 parameters need as many units and uncertainties"):
         expected_uncertainties(["EA0C", "EX0C1"], ["µrad"], [2.0, 1.0], None, title="A plan")
+
+
+def test_the_note_says_rotary_axes_of_machines_that_have_them():
+    assert "otary" not in map_note(2.0, 0.95, None)
+    assert map_note(2.0, 0.95, 1).endswith("The title is about the one rotary pose of the plan.")
+    assert map_note(2.0, 0.95, 4).startswith("Rotary axes at zero. Colour")
+    assert map_note(2.0, 0.95, 4).endswith("all 4 rotary poses of the plan.")

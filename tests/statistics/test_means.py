@@ -11,6 +11,7 @@ from statsmodels.stats.oneway import anova_oneway
 
 from monitor.exceptions import DataError
 from monitor.statistics import anova, kruskal_wallis, welch_anova
+from monitor.statistics.checks import as_matrix, as_vector
 
 # Digits of the F statistic and residual standard deviation against the certified values, as reached
 # (floored). Limited by the doubles: 1e12 + 0.4 is stored to 6e-5 only.
@@ -130,3 +131,12 @@ def test_refusals_say_what_is_needed():
         anova(np.arange(4.0), [1, 1, 2])
     with pytest.raises(DataError, match="leave nothing within them"):
         anova(np.arange(3.0), [1, 2, 3])
+
+
+def test_one_value_is_one_value() -> None:
+    with pytest.raises(DataError, match=r"^x has 1 value; at least 2 are needed"):
+        as_vector([1.0], "x", least=2)
+    with pytest.raises(DataError, match=r"^x has 3 values; 2 are needed"):
+        as_vector([1.0, 2.0, 3.0], "x", length=2)
+    with pytest.raises(DataError, match=r"^x has 1 row; at least 2 runs are needed"):
+        as_matrix([[1.0]], "x")

@@ -16,6 +16,8 @@ from monitor.store import (
     Database,
     StoredIdentification,
     campaign_notes,
+    copied_campaigns,
+    copied_runs,
     export_tables,
     import_campaign,
     latest_documents,
@@ -25,6 +27,7 @@ from monitor.store import (
     load_certificate,
     machine_history,
     mark_certificate,
+    noted_campaigns,
     record_event,
     restore,
     save_analysis,
@@ -239,7 +242,9 @@ def test_runs_that_came_in_before_are_named_until_one_of_both_is_withdrawn(
 ) -> None:
     import_campaign(db, long_campaign(make_campaign, "one"))
     import_campaign(db, long_campaign(make_campaign, "two", machine="N"))
-    assert campaign_notes(db, "one") == ()
+    # Nobody can tell from the readings which of two machines was measured.
+    (note,) = campaign_notes(db, "one")
+    assert note.startswith("2 runs of one equal those of campaign two of machine N in every reading")
     (note,) = campaign_notes(db, "two")
     assert note == (
         "2 runs of two equal those of campaign one of machine M in every reading, which two measurements never do: "
@@ -294,6 +299,47 @@ def test_campaigns_from_before_the_hashes_are_compared_too(
     db.execute("DELETE FROM run_fingerprint")
     import_campaign(db, long_campaign(make_campaign, "two"))
     assert len(campaign_notes(db, "two")) == 1
+
+
+def test_copies_are_told_of_campaigns_that_have_no_hashes_yet(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    """As in a file of version 0.1.0 into which nothing was imported since."""
+    for name, machine in (("one", "M"), ("two", "N"), ("again", "N")):
+        import_campaign(db, long_campaign(make_campaign, name, machine=machine))
+    told = {name: copied_runs(db, name) for name in ("one", "two", "again")}
+    db.execute("DELETE FROM run_fingerprint WHERE campaign_id <> 2")
+    assert {name: copied_runs(db, name) for name in told} == told
+    db.execute("DELETE FROM run_fingerprint")
+    assert {name: copied_runs(db, name) for name in told} == told
+    assert [(run.campaign, run.is_of_another, run.is_earlier) for run in told["again"]] == [
+        ("one", True, True), ("one", True, True), ("two", False, True), ("two", False, True),
+    ]  # fmt: skip
+    # Of one machine the first is taken for the measured one.
+    assert {run.campaign for run in told["two"]} == {"one"}
+    assert db.rows("SELECT count(*) FROM run_fingerprint") == [(0,)]
+
+
+def test_campaigns_that_hold_runs_of_others_are_listed_beside_the_first(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    for name, machine in (("one", "M"), ("two", "N"), ("three", "M")):
+        import_campaign(db, long_campaign(make_campaign, name, machine=machine), ["a note"] * (name == "two"))
+    import_campaign(db, make_campaign("short"))
+    listed = copied_campaigns(db)
+    assert [(each.campaign, each.runs, each.same_as_campaign) for each in listed] == [
+        ("two", 2, "one"), ("three", 2, "one"),
+    ]  # fmt: skip
+    assert str(listed[0]) == (
+        "2 runs of two equal those of one of machine M in every reading, which two measurements never do: withdraw the "
+        "copy (monitor withdraw)"
+    )
+    assert [each.campaign for each in copied_campaigns(db, [2])] == ["two"]
+    assert copied_campaigns(db, [1]) == listed
+    assert copied_campaigns(db, [4]) == copied_campaigns(db, []) == ()
+    assert noted_campaigns(db, [1, 2, 3]) == {"two": 1}
+    withdraw_campaign(db, "one", "a copy")
+    assert [(each.campaign, each.same_as_campaign) for each in copied_campaigns(db)] == [("three", "two")]
 
 
 def signed(campaign: Campaign, zero: float) -> Campaign:

@@ -59,6 +59,22 @@ def test_every_text_of_a_trend_is_shown_as_it_was_typed() -> None:
     assert unescape(in_template(NAME)) == NAME
 
 
+def test_a_history_of_one_run_is_drawn_between_days() -> None:
+    """Was: over "1 runs", on an axis of milliseconds."""
+    chart = trend_chart(_values("A"), "A", None)
+    assert "A of A over 1 run in " in chart.says
+    assert chart.document["layout"]["xaxis"]["range"] == [
+        "2026-03-01T00:00:00+00:00",
+        "2026-03-03T00:00:00+00:00",
+    ]
+    two = replace(
+        _values("A"), started_at=(datetime(2026, 3, 2, tzinfo=UTC), datetime(2026, 3, 4, tzinfo=UTC)),
+        campaign=("A", "A"), method=("A", "A"), run=(1, 2), day=(1, 2), warm_up=(False, False),
+        parameters={"A": ParameterValues("A", (1.0, 2.0), (0.1, 0.1), 2.0)}, conditions={},
+    )  # fmt: skip
+    assert "range" not in trend_chart(two, "A", None).document["layout"]["xaxis"]
+
+
 def test_a_name_that_begins_as_a_colour_is_no_colour() -> None:
     chart = trend_chart(
         replace(_values("@blue"), parameters={"EXX": _values("EXX").parameters["EXX"]}), "EXX", None

@@ -50,7 +50,10 @@ DAY = date(2026, 3, 12)
 
 def other_machine() -> Campaign:
     campaign = read_campaign(EXAMPLES / "five-days")
-    return replace(campaign, name="other", machine=replace(campaign.machine, id="M"))
+    # With readings of its own: those of a copy have no certificate.
+    readings = {axis: values + 1e-6 for axis, values in campaign.probings.readings.items()}
+    probings = replace(campaign.probings, readings=readings)
+    return replace(campaign, name="other", machine=replace(campaign.machine, id="M"), probings=probings)
 
 
 @pytest.fixture(scope="module")

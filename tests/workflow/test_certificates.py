@@ -72,9 +72,8 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     limited = folder / "limited"
     shutil.copytree(EXAMPLES / "five-days", limited)
     text = (limited / "campaign.toml").read_text(encoding="utf-8")
-    text = re.sub('campaign = ".*?"', 'campaign = "limited"', text, count=1).replace(
-        'id = "HU40-T"', 'id = "M"', 1
-    )
+    # Of the same machine: a copy of the readings of another has no certificate.
+    text = re.sub('campaign = ".*?"', 'campaign = "limited"', text, count=1)
     limits = "".join(f"{name} = {limit}\n" for name, limit in {**LIMITS, "volumetric": LONGEST}.items())
     text = text.replace("[machine.axes]", f"[machine.tolerances]\n{limits}\n[machine.axes]", 1)
     (limited / "campaign.toml").write_text(text, encoding="utf-8")
@@ -292,6 +291,33 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> No
         assert (one.verdict == "pass") == (one.probability >= 0.95)
     joint = stated("simple").joint_probability
     assert joint <= min(one.probability for one in stated("simple").verdicts)
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize("rule", RULES)
+def test_17025_7_8_6_where_no_error_could_have_passed_the_statement_says_so(
+    found: RunUncertainty, rule: str, language: str
+) -> None:
+    """The tolerance lies between u and every guard band: only simple acceptance can pass."""
+    texts, freedoms = texts_of(language), dict.fromkeys(found.framework.names, math.inf)
+    result = results_of(as_stated(found), texts)
+    place = list(result.names).index("EA0B")
+    limits = np.where(np.arange(len(result.names)) == place, 1.2 * result.u, result.tolerances)
+    asked = {"campaign": "limited", "freedoms": freedoms}
+    usual = statement_of(result, rule, texts, **asked).basis
+    narrow = statement_of(replace(result, tolerances=limits), rule, texts, **asked)
+    said = {"en": "no error, not even zero, could have passed", "de": "auch nicht null, "}[language]
+    assert said not in usual
+    assert (said in narrow.basis) == (rule != "simple")
+    assert "EXX" not in narrow.basis
+    if rule != "simple":
+        assert re.search(r"(Of|Bei) EA0B (w|is|ist|the|die)", narrow.basis)
+        # Whatever the estimate: that of an error of zero does not pass either.
+        at_zero = replace(result, estimate=0.0 * result.estimate, tolerances=limits)
+        (verdict,) = (
+            one.verdict for one in statement_of(at_zero, rule, texts, **asked).verdicts if one.name == "EA0B"
+        )
+        assert verdict != "pass"
 
 
 def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(guarded: Path) -> None:

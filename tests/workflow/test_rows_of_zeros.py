@@ -86,6 +86,18 @@ def test_a_bad_reading_at_the_home_pose_is_no_row_of_zeros(tmp_path: Path) -> No
     assert "leave these rows out" not in answer.answer
 
 
+def test_rows_in_which_axes_read_nothing_of_balls_at_stated_places_are_all_named(tmp_path: Path) -> None:
+    """Was: of three rows of zeros the one of the plate's origin alone, whose stated place is 0, 0, 0."""
+    table = grid(tmp_path / "grid", (0, 40)) / "probings.csv"
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    for number in (0, 1, 2):
+        cells = lines[number].split(",")
+        lines[number] = ",".join([*cells[:4], "0.000", "0.000", "0.000", *cells[7:], f"B{number}"])
+    lines[3:] = [f"{line},B{number}" for number, line in enumerate(lines[3:], start=3)]
+    table.write_text("\n".join([f"{head},target", *lines]) + "\n", encoding="utf-8")
+    assert blank_rows(read_campaign(table.parent)) == {(1, 1), (1, 2), (1, 3)}
+
+
 @pytest.mark.slow
 def test_the_origin_of_a_plate_stays_where_a_column_is_mistaken(tmp_path: Path) -> None:
     """Was: its three readings were to be left out, and no word of the inches."""

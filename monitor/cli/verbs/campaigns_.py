@@ -11,6 +11,8 @@ from monitor.cli.parser import common
 from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor campaigns"
+#: So many campaigns are named of those that hold copies, or of which the import noticed something.
+MOST_NAMED = 10
 
 
 def options(parser: ArgumentParser) -> None:
@@ -36,6 +38,17 @@ def run(options: Namespace) -> int:
         for row in answer.campaigns
     ]
     output.listing(rows, "no campaign yet; type `monitor import FOLDER`")
+    for copied in (answer.copied or ())[:MOST_NAMED]:
+        output.say(str(copied))
+    more = len(answer.copied or ()) - MOST_NAMED
+    if more > 0:
+        output.say(f"and {more} more hold runs of earlier campaigns; --json has all")
+    if answer.noted:
+        names = [f"{name} ({count})" for name, count in answer.noted.items()]
+        others = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        output.say(
+            f"noticed at the import of {', '.join(names[:MOST_NAMED])}{others}: `monitor runs CAMPAIGN` says what"
+        )
     for campaign in answer.withdrawn:
         output.say(f"withdrawn on {campaign.withdrawn_at:%Y-%m-%d}: {campaign.campaign} ({campaign.reason})")
     return 0

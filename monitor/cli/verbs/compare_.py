@@ -48,6 +48,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    output.copied(answer.copied_readings)
     if answer.work_points_elsewhere is not None:
         output.say(str(answer.work_points_elsewhere))
     residual_output.summary(answer.comparison)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Container
+from datetime import datetime
 
 from monitor.cli import output
 from monitor.cli.database import ask, opened
@@ -58,6 +59,7 @@ def run(options: Namespace) -> int:
         return 0
     answer = on_screen(answer)
     _table(answer, options.top)
+    output.say(_as_of(answer))
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
@@ -82,6 +84,16 @@ def run(options: Namespace) -> int:
             f"type `monitor identify {answer.not_identified[0]}`"
         )
     return 0
+
+
+def _as_of(answer: FleetAnswer) -> str:
+    """The day on which the table was computed, on which what is ahead depends, and those of the shown values."""
+    days = sorted(row.latest_at[:10] for row in answer.table if row.latest_at is not None)
+    computed = f"computed on {datetime.now().astimezone():%Y-%m-%d}"
+    if not days:
+        return computed
+    latest = days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"
+    return f"{computed}; the latest values shown are of {latest}"
 
 
 def _table(answer: FleetAnswer, most: int) -> None:

@@ -72,10 +72,12 @@ def _say(answer: VolumetricAnswer) -> None:
     strokes = ", ".join(
         f"{name} {low:.4g} to {high:.4g} mm" for name, (low, high) in region.readings_mm.items()
     )
+    poses = f"at {region.rotary_poses} rotary pose{'s' if region.rotary_poses != 1 else ''}"
+    if not answer.has_rotary_axes:
+        poses = "of a machine without rotary axes"
     output.say(
         f"{answer.campaign}, run {answer.run}, model {answer.model}: volumetric error at {region.points} "
-        f"points, {strokes} ({region.origin}), at {region.rotary_poses} rotary "
-        f"pose{'s' if region.rotary_poses != 1 else ''}"
+        f"points, {strokes} ({region.origin}), {poses}"
     )
     rows = [
         [

@@ -55,35 +55,60 @@ class _Block:
     is_compared: bool
 
 
+@dataclass(frozen=True)
+class RepeatedRows:
+    """Rows of a ``run`` with the numbers ``sequences`` that equal those from number ``of`` on in all but their times,
+    as do ``equal`` of ``others``. They ``may_be_passes`` where the display hides what readings scatter."""
+
+    run: int
+    sequences: tuple[int, ...]
+    of: int
+    equal: int
+    others: int
+    may_be_passes: bool
+
+
 def repeated_rows(campaign: Campaign) -> Iterator[str]:
     """A sentence on the least likely block of rows that repeats an earlier one in all but its times."""
-    block = _block_of(campaign)
-    if block is None:
+    rows = rows_repeated(campaign)
+    if rows is None:
         return
-    probings, begin = campaign.probings, block.begin
     equal = (
-        f"{block.length} rows of run {probings.run[begin]}, from sequence {probings.sequence[begin]} on, equal those "
-        f"from sequence {probings.sequence[begin - block.distance]} on in every number"
+        f"{len(rows.sequences)} rows of run {rows.run}, from sequence {rows.sequences[0]} on, equal those from "
+        f"sequence {rows.of} on in every number"
     )
-    if not block.is_compared and _is_coarse(campaign, begin):
+    if rows.may_be_passes:
         yield (
             f"{equal}: either they were exported twice, or files joined, and counted so often they make u too small; "
             "or the display hides the scatter, and passes that agree so say nothing of repeatability"
         )
         return
     yield (
-        f"{equal}; of {block.others} other rows {block.equal} repeat one so: were they exported twice, or two files "
+        f"{equal}; of {rows.others} other rows {rows.equal} repeat one so: were they exported twice, or two files "
         "joined? Counted twice they make u too small"
+    )
+
+
+def rows_repeated(campaign: Campaign) -> RepeatedRows | None:
+    """The rows that ``repeated_rows`` tells of; None where there are none."""
+    block = _block_of(campaign)
+    if block is None:
+        return None
+    probings, begin = campaign.probings, block.begin
+    return RepeatedRows(
+        int(probings.run[begin]),
+        tuple(probings.sequence[begin : begin + block.length].tolist()),
+        int(probings.sequence[begin - block.distance]),
+        block.equal,
+        block.others,
+        not block.is_compared and _is_coarse(campaign, begin),
     )
 
 
 def repeated_sequences(campaign: Campaign) -> tuple[int, tuple[int, ...]] | None:
     """The run and the sequence numbers of the rows that ``repeated_rows`` tells of; None where there are none."""
-    block = _block_of(campaign)
-    if block is None:
-        return None
-    probings, rows = campaign.probings, slice(block.begin, block.begin + block.length)
-    return int(probings.run[block.begin]), tuple(probings.sequence[rows].tolist())
+    rows = rows_repeated(campaign)
+    return None if rows is None else (rows.run, rows.sequences)
 
 
 def _block_of(campaign: Campaign) -> _Block | None:
@@ -112,17 +137,23 @@ def _block_of(campaign: Campaign) -> _Block | None:
 def _is_coarse(campaign: Campaign, row: int) -> bool:
     """Whether no reading of the series of a row has a digit far below the stated standard uncertainty."""
     probings, stated = campaign.probings, campaign.probe.standard_uncertainty
-    series = probings.run == probings.run[row]
+    series, is_read_by_axes = probings.run == probings.run[row], False
     if "setup" in probings.channels:
         number = probings.channels["setup"]
         series &= number == number[row]
-        stated = campaign.artefact.setups[int(number[row]) - 1].standard_uncertainty or stated
+        setup = campaign.artefact.setups[int(number[row]) - 1]
+        stated = setup.standard_uncertainty or stated
+        is_read_by_axes = "targets" in setup.known
     digits = [
         factor * _digit(values[series & np.isfinite(values)])
         for name, values in probings.channels.items()
         for ending, factor in READINGS.items()
         if name.endswith(ending) and np.isfinite(values[row])
     ]
+    if is_read_by_axes:
+        # Balls whose places a certificate gives are measured by the axes: what scatters stands in their columns.
+        linear = (name for name in probings.readings if campaign.machine.is_linear(name))
+        digits += [_digit(probings.readings[name][series]) for name in linear]
     return min(digits, default=0.0) >= COARSE * stated
 
 

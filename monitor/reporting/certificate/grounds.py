@@ -18,6 +18,8 @@ from monitor.reporting.texts import Texts
 SEVERAL = ", "
 #: The unit of what is counted in standard uncertainties.
 IN_U = "u"
+#: The unit of runs that equal those of the same machine, where that is what differs.
+AT_ANOTHER_TIME = "started_at"
 
 
 class GroundKind(StrEnum):
@@ -33,6 +35,8 @@ class GroundKind(StrEnum):
     INSTRUMENTS = "instruments"
     SCALE = "scale"
     SIMULATED = "simulated"
+    COPIED_RUNS = "copied-runs"
+    COPIED_ROWS = "copied-rows"
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,9 @@ class Ground:
     simulated the subject is the machine, of a scale the instrument with the parameters that rest on it. Of instruments
     the subject is a parameter with the two that disagree, and ``size`` is their E_n; or it is who contradicts all
     others, by ``size`` in standard uncertainties. Where it may be any of several they are ``several``, each by its
-    name; where nobody alone explains it there is no subject.
+    name; where nobody alone explains it there is no subject. Of copied runs and rows ``size`` counts them; the subject
+    is the other campaign, with its machine where that is another, or the number of the first row and of that which it
+    repeats.
     """
 
     kind: GroundKind
@@ -68,27 +74,34 @@ class AcceptedGround:
 
 def ground_sentence(ground: Ground, texts: Texts) -> str:
     """A ground in words, without a full stop."""
-    key = ground.kind.value.replace("-", "_")
-    if ground.kind is GroundKind.TEMPERATURE and ground.size is not None:
-        key = "impossible_temperature"
-    if ground.kind is GroundKind.IMPLAUSIBLE and SEVERAL in ground.subject:
-        key = "common_gain"
-    if ground.kind is GroundKind.UNITS and not ground.subject:
-        key = "fits_too_well"
-    if ground.kind is GroundKind.UNITS and ground.subject and not ground.unit:
-        key = "setup_fits_too_well"
-    if ground.kind is GroundKind.INSTRUMENTS and ground.unit == IN_U:
-        key = _who(ground)
-    if ground.kind is GroundKind.LACK_OF_FIT and ground.subject:
-        key = "lack_in_budget"
     return texts(
-        f"grounds.{key}",
+        f"grounds.{_key(ground)}",
         run=ground.run,
         subject=texts("grounds.or").join(ground.several or (ground.subject,)),
         size=_written(ground.size, texts),
         limit=_written(ground.limit, texts),
         unit=ground.unit,
     )
+
+
+def _key(ground: Ground) -> str:
+    """The name of a ground's sentence among the texts."""
+    match ground.kind:
+        case GroundKind.TEMPERATURE if ground.size is not None:
+            return "impossible_temperature"
+        case GroundKind.IMPLAUSIBLE if SEVERAL in ground.subject:
+            return "common_gain"
+        case GroundKind.UNITS if not ground.subject:
+            return "fits_too_well"
+        case GroundKind.UNITS if not ground.unit:
+            return "setup_fits_too_well"
+        case GroundKind.INSTRUMENTS if ground.unit == IN_U:
+            return _who(ground)
+        case GroundKind.LACK_OF_FIT if ground.subject:
+            return "lack_in_budget"
+        case GroundKind.COPIED_RUNS if ground.unit == AT_ANOTHER_TIME:
+            return "copied_runs_elsewhen"
+    return ground.kind.value.replace("-", "_")
 
 
 def _who(ground: Ground) -> str:

@@ -76,4 +76,6 @@ def map_picture(volumetric: VolumetricResult, texts: Texts, file: str) -> Pictur
         scale_words=texts("figures.length"),
         sign=texts.decimal_sign,
     )
-    return Picture(Markup(drawing.svg()), PAGE_WIDTH_MM, texts("figures.map"))
+    # An older record does not say whether the machine has rotary axes.
+    caption = texts("figures.map_no_rotary" if volumetric.turns is False else "figures.map")
+    return Picture(Markup(drawing.svg()), PAGE_WIDTH_MM, caption)

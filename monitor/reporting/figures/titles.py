@@ -178,12 +178,16 @@ def map_title(campaign: str, run: int, worst: tuple[float, float], rms_um: float
     return f"{campaign}, run {run}: at worst {worst[0]:.1f} µm ± {worst[1]:.1f} µm, RMS {rms_um:.1f} µm"
 
 
-def map_note(k: float, p: float, rotary_poses: int) -> str:
-    """Return what the slices of a volumetric map show."""
-    return (
-        f"Rotary axes at zero. Colour: length of the error; arrows: its part in the slice; numbers: expanded "
-        f"uncertainty (k = {k:.2f}, p = {p:g}). The title is about all {rotary_poses} rotary poses of the plan."
+def map_note(k: float, p: float, rotary_poses: int | None) -> str:
+    """Return what the slices of a volumetric map show; ``rotary_poses`` is None of a machine without rotary axes."""
+    shown = (
+        "Colour: length of the error; arrows: its part in the slice; numbers: expanded uncertainty "
+        f"(k = {k:.2f}, p = {p:g})."
     )
+    if rotary_poses is None:
+        return shown
+    poses = "the one rotary pose" if rotary_poses == 1 else f"all {rotary_poses} rotary poses"
+    return f"Rotary axes at zero. {shown} The title is about {poses} of the plan."
 
 
 def shape_title(campaign: str, run: int, disagree_um: float, expanded_um: float) -> str:

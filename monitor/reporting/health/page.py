@@ -32,6 +32,7 @@ from monitor.reporting.health.records import (
     state_in_words,
 )
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
+from monitor.reporting.health.sentences import NO_ROTARY_AXES
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
 from monitor.reporting.messages import DRIFT_OR_SEASON
@@ -145,6 +146,7 @@ class PrintedMachine:
     fit: tuple[tuple[str, str], ...]
     map: tuple[tuple[str, str], ...]
     map_picture: Markup
+    map_of: str
     map_beyond: str
     blind: str
     refused: tuple[tuple[str, str], ...]
@@ -236,6 +238,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
         fit=_fit(health),
         map=_map(health.map),
         map_picture=map_picture(health.map),
+        map_of=_shown(health.map),
         map_beyond=_beyond_the_slices(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
@@ -385,6 +388,13 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
     lines += [("not followed", str(effect)) for effect in error_map.between_points or ()]
     lines += [("place unknown", str(step)) for step in error_map.step_places or ()]
     return tuple(lines)
+
+
+def _shown(error_map: VolumetricMap | None) -> str:
+    """At which pose the slices are, where there are poses."""
+    if error_map is None or [str(pose.pose) for pose in error_map.by_pose] == [NO_ROTARY_AXES]:
+        return "Three slices"
+    return "Rotary axes at zero, three slices"
 
 
 def _beyond_the_slices(error_map: VolumetricMap | None) -> str:

@@ -250,9 +250,13 @@ class Position(Sentence):
         return ", ".join(parts)
 
 
+#: The pose of a machine that has none; stored records hold these words.
+NO_ROTARY_AXES = "no rotary axes"
+
+
 @dataclass(frozen=True)
 class Pose(Position):
     """The readings of the rotary axes, of which there may be none."""
 
     def __str__(self) -> str:
-        return super().__str__() or "no rotary axes"
+        return super().__str__() or NO_ROTARY_AXES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from monitor.records import Array
 from monitor.web.charts.chart import DASHES, SERIES, Chart, Trace, axis, in_template, look
 from monitor.web.charts.line_words import Line, Runs, words_at_lines
-from monitor.web.words import channel, number
+from monitor.web.words import channel, counted, number
 
 if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 K = 2.0
 #: By what the runs can be coloured.
 GROUPINGS = ("campaign", "method", "day", "warm-up")
+#: What is drawn before and after the only moment of a history.
+AROUND_ONE = timedelta(days=1)
 #: Colours of upright lines: events of the machine, changes of the parameter.
 EVENT, CHANGE = "@violet", "@orange"
 
@@ -46,10 +48,11 @@ def trend_chart(
         traces += _forecast(values, statement)
     return Chart(
         key="trend",
-        says=f"{parameter} of {values.machine} over {len(values.run)} runs in {series.unit}, bars are ± U (k = 2)",
+        says=f"{parameter} of {values.machine} over {counted(len(values.run), 'run')} in {series.unit}, "
+        "bars are ± U (k = 2)",
         traces=[*traces, *conditions],
         layout={
-            "xaxis": axis("", type="date", anchor="y2" if conditions else "y"),
+            "xaxis": axis("", type="date", anchor="y2" if conditions else "y", **_range(traces, lines)),
             "yaxis": axis(f"{parameter} / {series.unit}", domain=[lowest, 1.0]),
             **({"yaxis2": axis(_shared_title(values), domain=[0.0, 0.26])} if conditions else {}),
             "shapes": shapes,
@@ -58,6 +61,15 @@ def trend_chart(
         },
         height=560 if conditions else 400,
     )
+
+
+def _range(traces: Sequence[Trace], lines: Sequence[Line]) -> dict[str, Any]:
+    """The days around a single moment, which would be drawn on an axis of milliseconds; else nothing."""
+    moments = {at for trace in traces for at in trace["x"]} | {line.at for line in lines}
+    if len(moments) != 1:
+        return {}
+    at = datetime.fromisoformat(moments.pop())
+    return {"range": [(at + days * AROUND_ONE).isoformat() for days in (-1, 1)]}
 
 
 def _shop_time(values: ValuesAnswer, at: str) -> str:

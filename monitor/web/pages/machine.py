@@ -76,7 +76,7 @@ def routes() -> APIRouter:
         names = list(values.parameters)
         _check_names(values, parameter, campaign, may_lack=trends.waiting is not None)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
-        campaigns = ask(user, "campaigns", {"machine": name}).campaigns
+        listed = ask(user, "campaigns", {"machine": name})
         trend = trends.shown(shown)
         all_trends = trends.of_all() if every else trends.of_all_already()
         form = refused_form(request, request.query_params.get("refused", ""))
@@ -89,8 +89,8 @@ def routes() -> APIRouter:
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             unlisted=groups_without_legend(values, shown, colour), groupings=GROUPINGS,
             colour=colour, since=period["since"], until=period["until"], campaign=campaign,
-            campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
-            refused=form,
+            campaigns=listed.campaigns, copied=listed.copied, noted=listed.noted, kinds=KINDS,
+            methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up, refused=form,
         )  # fmt: skip
 
     router.get("/machine/values.csv")(_values_csv)

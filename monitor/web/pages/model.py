@@ -66,7 +66,7 @@ def routes() -> APIRouter:
         current = _version(versions, label)
         return page(
             request, "model.html",
-            row=row, campaign=campaign, compare=compare, explanation=explanation,
+            row=row, campaign=campaign, compare=compare, explanation=explanation, copied=answers.copied,
             missing=() if explanation is None else explanation.missing, refusals=answers.refusals,
             model=label, asked=model,
             effect=effect, changed=changed, overtaken=overtaken, effects=[candidate.effect for candidate in missing],
@@ -163,6 +163,10 @@ class _Answers:
             tickets["history"] = desk.ask(user, "model history", version)
         explained = self._take("explain", tickets["explain"])
         self.explanation = None if explained is None else explained.explanation
+        # Both name the same; while one is computed, or was refused, the other has it.
+        self.copied = next(
+            (each.copied_readings for each in (self.compare, explained) if each is not None), None
+        )
         self.residuals = self._take("residuals", tickets.get("residuals"))
         self.driven = self._take("driven", tickets.get("driven"))
         history = self._take("history", tickets.get("history"))

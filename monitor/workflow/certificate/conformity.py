@@ -34,6 +34,8 @@ WANTED = 0.95
 COVERED = 0.9545
 #: Texts that hold as they are where the volumetric error is decided alone; of the others one of it stands beside.
 _OF_EITHER = ("rule_simple", "rule_probability")
+#: Rules that take the tolerance less w as the limit of acceptance, where they have a w.
+_BY_GUARD_BAND = ("guard", "ilac")
 #: Halvings of an interval that find a limit of acceptance to 1e-12 of the tolerance.
 _HALVINGS = 40
 
@@ -88,6 +90,7 @@ def statement_of(
     verdicts = [_stated(rule, each, spreads.get(each.name)) for each in judged]
     fewest = min(each.dof for each in judged if each.name != VOLUMETRIC or not names)
     sentences.insert(0, _basis(campaign, fewest, texts, volumetric_alone=not names))
+    sentences += _never_passing(rule, judged, texts)
     sentences += _not_decided(stated, [each.name for each in judged], texts)
     return ConformityStatement(
         *_rule_in_words(rule, result, texts, max(map(_largest_risk, judged)), volumetric_p=volumetric_p),
@@ -164,6 +167,17 @@ def _volumetric_in_words(rule: str, volumetric: VolumetricResult, texts: Texts, 
     if volumetric.left_out:
         sentences.append(texts("conformity.volumetric_left_out"))
     return sentences
+
+
+def _never_passing(rule: str, judged: Sequence[_Judged], texts: Texts) -> list[str]:
+    """Of which parameters no estimate could have passed by the rule, their uncertainty being what it is."""
+    names = [each.name for each in judged if not _can_pass(rule, each)]
+    if not names:
+        return []
+    what = "guard" if rule in _BY_GUARD_BAND else "probability"
+    shown = [texts("page.volumetric_error") if name == VOLUMETRIC else name for name in names]
+    wanted = written_probability(WANTED, texts.decimal_sign)
+    return [texts(f"conformity.never_passing_{what}", parameters=", ".join(shown), wanted=wanted)]
 
 
 def _not_decided(stated: Mapping[str, float], decided: Sequence[str], texts: Texts) -> list[str]:
@@ -248,7 +262,7 @@ def _verdict(rule: str, judged: _Judged) -> Verdict:
     value, limit, band = judged.value, judged.limit, judged.band
     if rule == "simple":
         return Verdict.PASS if value <= limit else Verdict.FAIL
-    if rule in ("guard", "ilac"):
+    if rule in _BY_GUARD_BAND:
         if value <= limit - band:
             return Verdict.PASS
         if value > limit + band:
@@ -291,12 +305,19 @@ def _global_risks(rule: str, judged: _Judged, spread: float | None) -> tuple[flo
     return risks.consumer, risks.producer
 
 
+def _can_pass(rule: str, judged: _Judged) -> bool:
+    """Whether an estimate of zero would pass; where it does not, none does."""
+    if rule in ("simple", *_BY_GUARD_BAND):
+        return judged.band <= judged.limit
+    return _probability_at(judged, 0.0) >= WANTED
+
+
 def _acceptance(rule: str, judged: _Judged) -> float | None:
     """The largest absolute estimate that passes; None where none does."""
-    if rule in ("simple", "guard", "ilac"):
-        return judged.limit - judged.band if judged.band <= judged.limit else None
-    if _probability_at(judged, 0.0) < WANTED:
+    if not _can_pass(rule, judged):
         return None
+    if rule in ("simple", *_BY_GUARD_BAND):
+        return judged.limit - judged.band
     low, high = 0.0, judged.limit
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -39,6 +39,7 @@ from monitor.workflow.certificate.certified import (
     refuse_without_region,
 )
 from monitor.workflow.certificate.conformity import statement_of
+from monitor.workflow.certificate.copies import copied_grounds
 from monitor.workflow.certificate.effects import effects_of
 from monitor.workflow.certificate.files import finish_left, keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate.grounds import grounds_against, judged_grounds
@@ -83,7 +84,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     keep_issued(db, path_of(request.out, request.number or next_number(db, day.year)))
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     stored = {run.run: stored_uncertainty(db, campaign, run.run, model, request.asked) for run in measured}
-    grounds = grounds_against(campaign, model, stored)
+    grounds = (*copied_grounds(db, campaign), *grounds_against(campaign, model, stored))
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     lack = (ground for run in runs for ground in lack_in_budget(run.evaluated.answer))
     accepted, refused = judged_grounds(tuple(dict.fromkeys((*grounds, *lack))), request.accept)

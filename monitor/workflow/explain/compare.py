@@ -13,6 +13,7 @@ from monitor.methods import campaign_method
 from monitor.methods.curve.fit import CurveFit
 from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison
 from monitor.workflow.explain.machine_answer import machine_comparison
@@ -48,6 +49,7 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
         db, "comparison", to_document(answer), method=fit.campaign.method, campaign=request.campaign,
         model=fit.model.name, model_version=fit.model.version,
     )  # fmt: skip
+    answer = replace(answer, copied_readings=copied_readings(db, fit.campaign))
     return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
 
 

@@ -153,7 +153,8 @@ class CompareAnswer:
     ``against_others`` where a setup or instrument contradicts all others together,
     ``likely_mistakes`` where a sign, a unit or exchanged columns of it explain that,
     ``run_with_time`` where readings of a setup drift by more than chance explains,
-    ``work_points_elsewhere`` where work points come out further from where they are stated than people misstate them.
+    ``work_points_elsewhere`` where work points come out further from where they are stated than people misstate them,
+    ``copied_readings`` where runs equal those of another campaign or rows earlier ones: no part of what is stored.
     """
 
     comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
@@ -163,4 +164,5 @@ class CompareAnswer:
     run_with_time: tuple[RunsWithTime, ...] | None = field(default=None, metadata=OMITTED)
     target_word: str | None = field(default=None, metadata=OMITTED)
     work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

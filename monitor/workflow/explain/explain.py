@@ -44,6 +44,7 @@ from monitor.reporting.machine_finding import doubt_sentence
 from monitor.reporting.run_left_out import RunLeftOut, runs_left_out
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of, without_runs
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.explain.alias_ties import with_uneven_positions
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
@@ -190,7 +191,8 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
         else _search_machine(measured, model, request.rate)
     )
     save_explanation(db, explanation, measured.method, model)
-    return ExplainAnswer(explanation, None if request.figures is None else tuple(draw(request.figures)))
+    files = None if request.figures is None else tuple(draw(request.figures))
+    return ExplainAnswer(explanation, files, copied_readings(db, measured))
 
 
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:

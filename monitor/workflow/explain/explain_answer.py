@@ -366,7 +366,12 @@ class CurveExplanation:
 
 @dataclass(frozen=True)
 class ExplainAnswer:
-    """The explanation of a campaign."""
+    """The explanation of a campaign.
+
+    ``copied_readings`` says which of its runs equal those of another campaign, and which rows of a run earlier ones: it
+    is no part of what is stored.
+    """
 
     explanation: MachineExplanation | CurveExplanation = field(metadata=INLINED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)

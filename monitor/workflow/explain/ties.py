@@ -51,6 +51,8 @@ class TieBreak(Enum):
     INSTRUMENT = "instrument"
     #: No pose of the present set-up does; ``runs`` with another stylus do, or with targets elsewhere (``setup``).
     SETUP = "setup"
+    #: Turns of joints that turn about one line, wherever the axes stand and whatever is measured: no pose tells them.
+    ONE_LINE = "one_line"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
 
@@ -120,7 +122,8 @@ def is_of_instrument(text: str) -> bool:
 
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:
     if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
-        return TieBreak.NOTHING, (), ()
+        turns = all(re.match("E[ABC]", text) for text in (effect.effect, rival))
+        return (TieBreak.ONE_LINE, (), axes_of(effect.effect, rival)) if turns else (TieBreak.NOTHING, (), ())
     moved = [":moved(" in text for text in (effect.effect, rival)]
     if any(moved):
         return (TieBreak.REFERENCES if all(moved) else TieBreak.REPEATED), (), ()

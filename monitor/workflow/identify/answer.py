@@ -129,7 +129,8 @@ class IdentifyAnswer:
     ``not_seen`` are position and orientation errors that no number of the last run holds; ``seen_by`` names for what is
     not seen or not separated the one measurement that gives it a number, where there is one.
     ``work_points_elsewhere`` says which come out further from where they are stated than people misstate them: no
-    number counts before that is mended.
+    number counts before that is mended. ``copied_readings`` says which of its runs equal those of another campaign, and
+    which rows of a run earlier ones.
     """
 
     campaign: str
@@ -151,6 +152,7 @@ class IdentifyAnswer:
     not_seen: tuple[RefusedParameters, ...] | None = field(default=None, metadata=OMITTED)
     seen_by: Mapping[str, TestAnswer] | None = field(default=None, metadata=OMITTED)
     work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from monitor.store import (
     save_identification,
 )
 from monitor.workflow.campaign_parts import only_run
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
@@ -107,4 +108,4 @@ def store(
             db, "identification", to_document(result.answer), method=measured.method, campaign=measured.name,
             model=model.name, model_version=model.version,
         )  # fmt: skip
-    return result.answer
+    return replace(result.answer, copied_readings=copied_readings(db, measured))

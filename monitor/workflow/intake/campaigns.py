@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.store import (
     CampaignRow,
+    CopiedCampaign,
     Database,
     RunRow,
     WithdrawnCampaign,
     campaign_notes,
+    copied_campaigns,
     list_campaigns,
     list_runs,
     list_withdrawn,
     load_campaign,
+    noted_campaigns,
 )
 
 #: Words that campaigns are searched by.
@@ -45,10 +50,16 @@ class CampaignsRequest:
 
 @dataclass(frozen=True)
 class CampaignsAnswer:
-    """The campaigns that count, in the order of import, and those that were withdrawn."""
+    """The campaigns that count, in the order of import, and those that were withdrawn.
+
+    ``copied`` are those among them that hold runs of earlier ones, or whose runs later ones hold; ``noted`` says of how
+    many the import noticed something, and how many sentences.
+    """
 
     campaigns: tuple[CampaignRow, ...]
     withdrawn: tuple[WithdrawnCampaign, ...]
+    copied: tuple[CopiedCampaign, ...] | None = field(default=None, metadata=OMITTED)
+    noted: Mapping[str, int] | None = field(default=None, metadata=OMITTED)
 
 
 _ALL = CampaignsRequest()
@@ -86,7 +97,14 @@ def campaigns(db: Database, request: CampaignsRequest = _ALL) -> CampaignsAnswer
         and request.method in (None, row.method)
         and all(word in f"{row.campaign} {row.machine} {row.method}".lower() for word in sought)
     ]
-    return CampaignsAnswer(rows, tuple(withdrawn))
+    numbers = [row.campaign_id for row in rows]
+    asks_for_all = request == _ALL
+    return CampaignsAnswer(
+        rows,
+        tuple(withdrawn),
+        copied_campaigns(db, None if asks_for_all else numbers) or None,
+        noted_campaigns(db, numbers) or None,
+    )
 
 
 def runs(db: Database, request: RunsRequest) -> RunsAnswer:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, Said
 from monitor.records import Array, FrameOfReference, ValidationVerdict
 from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource, Unchecked
 from monitor.reporting.certificate.grounds import Ground
@@ -133,7 +133,8 @@ class UncertaintyAnswer:
     Type B sources were stated, ``length`` to what gains refer; all are None in an answer of an earlier version.
     ``unchecked`` are readings that no other checks. ``grounds`` speak against a certificate of the run; None where they
     were not determined. ``effects`` are those of the parameters that belong to the whole campaign, being added to the
-    model; ``effects_outside`` says why none are.
+    model; ``effects_outside`` says why none are. ``copied_readings`` says which runs of the campaign equal those of
+    another and which rows earlier ones: it is no part of what is stored.
     """
 
     campaign: str
@@ -162,6 +163,7 @@ class UncertaintyAnswer:
     grounds: tuple[Ground, ...] | None = field(default=None, metadata=OMITTED)
     effects: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     effects_outside: Outside | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)
 
     @property
     def covariance(self) -> Array:

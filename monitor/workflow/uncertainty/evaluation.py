@@ -41,6 +41,7 @@ from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.runs.sensitivity import sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.identify.fitting import explained_refusals, machine_fit, machine_problem
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve_for
@@ -344,7 +345,7 @@ def uncertainty(db: Database, request: UncertaintyRequest) -> UncertaintyAnswer:
     answer = answer_of(result)
     answer = replace(answer, grounds=_grounds(result, answer, request))
     save_uncertainty(db, answer, result.model, request.method, request.before)
-    return answer
+    return replace(answer, copied_readings=copied_readings(db, result.campaign))
 
 
 def _grounds(

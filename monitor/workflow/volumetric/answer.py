@@ -101,3 +101,8 @@ class VolumetricAnswer:
     step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     tables: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def has_rotary_axes(self) -> bool:
+        """Whether the machine has rotary axes, by which there are poses."""
+        return any(pose.at for pose in self.by_pose)

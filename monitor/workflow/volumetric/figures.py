@@ -23,7 +23,9 @@ def map_figures(answer: VolumetricAnswer, mapped: VolumetricMap, folder: Path) -
         title=titles.map_title(
             answer.campaign, answer.run, (worst.error_um, worst.expanded_um), answer.rms.error_um
         ),
-        note=titles.map_note(answer.k, answer.p, answer.region.rotary_poses),
+        note=titles.map_note(
+            answer.k, answer.p, answer.region.rotary_poses if answer.has_rotary_axes else None
+        ),
     )
     make_folder(folder)
     return tuple(save_figure(figure, folder, "volumetric-error"))

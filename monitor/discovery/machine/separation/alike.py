@@ -2,7 +2,8 @@
 
 Of the poses of a plan nothing is asked here. A shift moves the tip by the same vector whatever target and stylus are;
 how the axes before it are turned changes its direction, and where they stand its size, if it has a shape. So poses are
-drawn over the whole travel of all axes, and what of a shift another one leaves there is compared with rounding.
+drawn over the whole travel of all axes, and what of a shift another one leaves there is compared with rounding. What a
+turn does depends on where is touched, too: where one of both is a turn, targets and a stylus are drawn with the poses.
 """
 
 from __future__ import annotations
@@ -34,14 +35,17 @@ def moves_alike(
 ) -> bool:
     """Whether a rival can do, wherever the axes stand, what an effect of the given coefficients (k,) does.
 
-    Both are asked at one state of their driver. Of turns it is not said: what they do depends on where is touched.
+    Both are asked at one state of their driver. Two joints that turn about one line make turns alike.
     ``strokes`` gives the travel of axes in mm or rad where the machine file has one.
     """
-    if not all(isinstance(each, ChainEffect) and not each.term.is_rotation for each in (effect, rival)):
+    if not isinstance(effect, ChainEffect) or not isinstance(rival, ChainEffect):
         return False
-    anywhere = _anywhere(context, strokes)
+    anywhere, tip = _anywhere(context, strokes), np.zeros(3)
+    if effect.term.is_rotation or rival.term.is_rotation:
+        drawn = np.random.default_rng(1).uniform(-ANY_PLACE, ANY_PLACE, (POSES + 1, 3))
+        anywhere, tip = replace(anywhere, nominal=drawn[1:]), drawn[0]
     errors = np.zeros((POSES, len(context.chain.joints), 2, 6))
-    pose = evaluate(context.chain, anywhere.positions, errors, anywhere.nominal, np.zeros(3), jacobian=True)
+    pose = evaluate(context.chain, anywhere.positions, errors, anywhere.nominal, tip, jacobian=True)
     assert pose.by_error is not None
     wanted = effect.basis(anywhere).displacement(pose.by_error).reshape(3 * POSES, -1) @ coefficients
     columns = rival.basis(anywhere).displacement(pose.by_error).reshape(3 * POSES, -1)
