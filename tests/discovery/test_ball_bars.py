@@ -46,6 +46,16 @@ def test_a_play_and_a_lag_are_told_across_the_planes(tmp_path):
     assert effects["EYY:lag"] == pytest.approx(-0.5e-3, abs=6e-5)
 
 
+def test_sides_of_a_play_that_have_no_solution_end_no_search(tmp_path):
+    """With what the play of X does at the first rows of each plane as unknowns the fit of this campaign does not end
+    (of twelve seeds one)."""
+
+    def error(place, move, direction):
+        return -2.0 * direction[0], 0.0, 0.0
+
+    assert [*named(ball_bars(tmp_path, error, seed=2510, planes=("xy", "yz", "zx")))] == ["EXX:reversal"]
+
+
 def test_a_bend_far_from_the_zero_of_its_axis_is_named(tmp_path):
     """4 um at the ends of 200 mm, in positions of 200 to 400 mm, over 220 degrees of a circle."""
 

@@ -39,6 +39,7 @@ from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.discovery.search.sign_flips import FEWEST
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.driver import HeatDriver
+from monitor.exceptions import NotConvergedError
 from monitor.methods.chain.problem import ChainProblem
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
@@ -222,7 +223,23 @@ class _Rounds:
         errors = {side.term for side in self.sides if isinstance(side, ChainEffect)}
         candidates = [finding.candidate for finding in searched.refined]
         sides = unknown_sides(searched.scene, candidates, self.search.rate)
-        return tuple(side for side in sides if side.term not in errors)
+        new = tuple(side for side in sides if side.term not in errors)
+        if not new:
+            return ()
+        try:
+            self._current((*self.sides, *new))
+        except NotConvergedError:
+            # What a plan hardly tells from the other unknowns of the runs may have no solution.
+            return ()
+        return new
+
+    def _current(self, sides: Sequence[MachineEffect]) -> Fit:
+        """The fit under the present suspects with what plays do where their side is not known."""
+        problem, suspects = self.search.problem, self.suspects
+        if not sides and suspects.same_as(self.initial):
+            return self.first
+        single = [*suspects.effects(problem), *sides]
+        return fit(with_effects(suspects.weighed(problem), single), suspects.left_out(problem), self.first)
 
     def _near(self) -> ChainRound | None:
         """What a whole search found under the same conditions but for noise that hardly differs; None where there was
@@ -243,12 +260,8 @@ class _Rounds:
     def _round(self, near: ChainRound | None) -> ChainRound:
         """Search effects under the present conditions; what was found under ``near`` ones is what is found, where a
         scan that begins with it neither adds to it nor takes from it."""
-        problem, suspects = self.search.problem, self.suspects
-        out, single = suspects.left_out(problem), [*suspects.effects(problem), *self.sides]
-        current = self.first
-        if self.sides or not suspects.same_as(self.initial):
-            current = fit(with_effects(suspects.weighed(problem), single), out, self.first)
-        noisy = current.with_correlation(self.correlation)
+        suspects, out = self.suspects, self.suspects.left_out(self.search.problem)
+        noisy = self._current(self.sides).with_correlation(self.correlation)
         again = None if near is None else self._again(noisy, near)
         scene, result = again or self._scan(noisy)
         result, refined = told_apart(scene, result)
