@@ -93,7 +93,10 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
         new += moved
         if not new:
             if not all_curves_were_searched(scene.fit):
-                scene, result = with_tables(scene, result, scanned)
+                tabled = with_tables(scene, result, scanned)
+                # A table that does not stand out would leave nothing of the shapes that it took the place of.
+                if len(standing_out(*tabled).findings) == len(tabled[1].findings):
+                    scene, result = tabled
             result = with_base_instead(scene, result, rate)
             plain, catalogued = scene, standing_out(scene, result)
             shaped = with_unknown_shapes(plain, catalogued)
