@@ -12,6 +12,7 @@ from monitor.cli.forecast_output import forecast_start
 from monitor.cli.rests_on_output import levels, steps_at_once
 from monitor.reporting.confounding import charted
 from monitor.reporting.lacks import NO_MAP_STORED
+from monitor.reporting.messages import ONE_DAY
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -212,9 +213,10 @@ def _change(name: str, change: DatedChange) -> str:
     others = change.between_instruments
     # Of several steps at once one sentence says it.
     exchanged = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
+    one_day = f"; {ONE_DAY}" if change.one_day else ""
     return (
         f"{name}: {change.kind} of {output.with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, {_p_value(change)}){exchanged}"
+        f"({_interval(change.interval)}, {_p_value(change)}){exchanged}{one_day}"
     )
 
 

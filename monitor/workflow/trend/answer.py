@@ -105,6 +105,7 @@ class DatedChange:
     ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say.
     It is of one parameter, and stated where it is below the share of ``false_alarm`` that each of the machine's
     parameters has, whether one is asked for or all. ``between_instruments``: other instruments measure from a step on.
+    ``one_day``: a step after which there is one day alone, which cannot show whether it stays.
     """
 
     at: str | None
@@ -118,6 +119,7 @@ class DatedChange:
     time_constant_days: float | None = field(default=None, metadata=OMITTED)
     p_at_most: bool | None = field(default=None, metadata=OMITTED)
     between_instruments: OtherInstruments | None = field(default=None, metadata=OMITTED)
+    one_day: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
