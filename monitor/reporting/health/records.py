@@ -50,7 +50,8 @@ STATES: dict[State, str] = {
     State.MAY_BE_OUT_OF_TOLERANCE: "the probability that a parameter or the volumetric error is beyond its tolerance "
     "exceeds the stated limit",
     State.NOT_EVALUATED: "what was measured last could not be evaluated: nothing is known of its tolerances",
-    State.CHANGED: "a parameter or an artefact changed this week; or a parameter stepped before, and no event explains it",
+    State.CHANGED: "a parameter or an artefact changed this week; or a parameter stepped before, and no event "
+    "explains it",
     State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing, or the "
     "campaign's file states something else than was measured",
     State.DRIFTS: "a parameter without a tolerance drifts, or follows a season that the history is too short to "

@@ -9,7 +9,7 @@ the earlier days do not refute, the one by which the latest day stands out least
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,11 +30,16 @@ _ROUNDING = 1e-9
 @dataclass(frozen=True)
 class LatestDay:
     """By how much the latest day differs from what the days before it foretell, its standard uncertainty, and the
-    probability of a difference as large where nothing happened."""
+    probability of a difference as large where nothing happened, of normal days.
+
+    ``times_others`` is how many times as far off as any day before it: where days have heavy tails, ``p_value`` alone
+    says too much.
+    """
 
     size: float
     u: float
     p_value: float
+    times_others: float
 
 
 def latest_day(t: Array, means: Array, more: float = 0.0) -> LatestDay | None:
@@ -52,7 +57,8 @@ def latest_day(t: Array, means: Array, more: float = 0.0) -> LatestDay | None:
         for base in (np.ones((days, 1)), np.column_stack([np.ones(days), time]))
         for found in _by_correlations(np.diff(t), base, means, more)
     ]
-    return max(every, key=lambda found: found.p_value)
+    least = max(every, key=lambda found: found.p_value)
+    return replace(least, times_others=min(found.times_others for found in every))
 
 
 def _by_correlations(apart: Array, base: Array, means: Array, more: float) -> list[LatestDay]:
@@ -83,6 +89,8 @@ def _beside(
     coefficients = np.linalg.solve(r, q.T @ y)
     reach = np.linalg.solve(r.T, latest[:-1])
     # In units of the scatter of a day about what the day before it foretells.
-    size = float(latest[-1] - latest[:-1] @ coefficients) * float(alone[-1])
+    off = float(latest[-1] - latest[:-1] @ coefficients)
+    size = off * float(alone[-1])
     u = float(np.sqrt(variance * (1.0 + reach @ reach) * alone[-1] ** 2 + more))
-    return float(likelihood), LatestDay(size, u, float(2.0 * scipy.special.stdtr(dof, -abs(size) / u)))
+    p_value = float(2.0 * scipy.special.stdtr(dof, -abs(size) / u))
+    return float(likelihood), LatestDay(size, u, p_value, abs(off) / float(np.abs(left).max()))

@@ -112,8 +112,8 @@ def new_this_week(
     quality: DataQuality,
     drifting: tuple[Drifting, ...] = (),
 ) -> NewThisWeek:
-    """What is new this week: changes, with those that are still open, then steps at events, then events, what the model lacks, and data that never
-    came in; and what is ``drifting``."""
+    """What is new this week: changes, with those that are still open, then steps at events, then events,
+    what the model lacks, and data that never came in; and what is ``drifting``."""
     every: list[Said] = [
         change.now
         for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)

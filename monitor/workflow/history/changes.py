@@ -32,6 +32,9 @@ SEED = 20260302
 DAYS_FOR_MEANS = 15
 #: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
 ALIKE = 1.25
+#: A latest day is a step where it lies at least so many times as far off as any day before it (measured rates and the
+#: price in power: docs/trials-statistics.md).
+FAR = 2.5
 #: Trials of the simulated null distribution at least; more where the level asks for it.
 TRIALS = 1999
 
@@ -102,10 +105,10 @@ def search_changes(
     """Steps, bends and transients of each parameter; or why none were sought.
 
     A latest day that stands out from the days since the last change or event is a step before it, at its own level of
-    ``false_alarm`` over all parameters. ``events`` are times of known changes, in the unit of ``t``. Parameters measured at the same times share one
-    search, and those weighed alike the simulated null distribution. Which search a parameter is in does not change its
-    share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
-    change is the start of its run, or of the first run of its day.
+    ``false_alarm`` over all parameters. ``events`` are times of known changes, in the unit of ``t``. Parameters
+    measured at the same times share one search, and those weighed alike the simulated null distribution. Which search a
+    parameter is in does not change its share of ``false_alarm``, the probability of any finding where there is nothing
+    to find. The ``at`` of a change is the start of its run, or of the first run of its day.
     """
     results: dict[str, ChangeSearch] = {}
     for plan in _plans(series):
@@ -181,7 +184,7 @@ def _with_latest_day(
     found = latest_day(
         np.append(t, t_last.mean()), np.append(y, y_last.mean()), _more_than_before(latest, before)
     )
-    if found is None or not found.p_value < level:
+    if found is None or not found.p_value < level or found.times_others < FAR:
         return search
     at = float(begins.min())
     step = Change(

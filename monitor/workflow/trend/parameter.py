@@ -145,8 +145,8 @@ def dated_change(
 ) -> DatedChange:
     """A change with its dates; a slope of a short history is stated a day, as ``SHORTEST_DAYS`` says why.
 
-    ``least_p`` is the smallest p-value that the search can say; that of a line may be any. ``is_of_latest_day``: one day
-    alone follows it.
+    ``least_p`` is the smallest p-value that the search can say; that of a line may be any. ``is_of_latest_day``: one
+    day alone follows it.
     """
     slope = change.kind in ("slope", "trend")
     period, days = ("day", 1.0) if np.ptp(series.t) < SHORTEST_DAYS else ("year", DAYS_PER_YEAR)
