@@ -167,14 +167,26 @@ def _with_latest_day(
     series: Series, search: ChangeSearch, events: Sequence[float], level: float
 ) -> ChangeSearch:
     """The search with the step before the latest day, where that stands out from the days since the last change or
-    event; as it is while a transient settles."""
+    event; as it is while a transient settles.
+
+    A step of the latest day that the search put one day early, as it takes no nearer one, is put in its place.
+    """
     if search.why_none is not None or any(drift.kind == "transient" for drift in search.drifts):
         return search
-    ends = [*(at for at in events if at <= series.t[-1]), *(change.at for change in search.changes)]
-    since = max(ends, default=-np.inf)
-    piece = series.part(series.t >= since)
-    if piece.day_count < FEWEST_DAYS:
+    earlier = search.changes
+    if earlier and series.days_since(earlier[-1].at) == 2:
+        earlier = earlier[:-1]
+    ends = [*(at for at in events if at <= series.t[-1]), *(change.at for change in earlier)]
+    step = _latest_step(series.part(series.t >= max(ends, default=-np.inf)), level)
+    if step is None:
         return search
+    return replace(search, changes=(*earlier, replace(step, index=int(np.searchsorted(series.t, step.at)))))
+
+
+def _latest_step(piece: Series, level: float) -> Change | None:
+    """The step before the latest day of a piece of history; None where that does not stand out."""
+    if piece.day_count < FEWEST_DAYS:
+        return None
     last = piece.of_last_day
     latest, before = piece.part(last), piece.part(~last)
     alike = before.part(np.isin(before.measured, latest.measured))
@@ -185,13 +197,10 @@ def _with_latest_day(
         np.append(t, t_last.mean()), np.append(y, y_last.mean()), _more_than_before(latest, before)
     )
     if found is None or not found.p_value < level or found.times_others < FAR:
-        return search
+        return None
     at = float(begins.min())
-    step = Change(
-        series.name, "step", int(np.searchsorted(series.t, at)), at, (float(before.t[-1]), at), found.size, found.u,
-        found.p_value,
-    )  # fmt: skip
-    return replace(search, changes=(*search.changes, step))
+    between = (float(piece.t[~last].max(initial=-np.inf)), at)
+    return Change(piece.name, "step", 0, at, between, found.size, found.u, found.p_value)
 
 
 def _more_than_before(latest: Series, before: Series) -> float:
