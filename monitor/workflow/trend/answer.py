@@ -23,6 +23,8 @@ from monitor.workflow.trend.charts_answer import ControlCharts, ParameterCharts
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
+#: More degrees of freedom than this are not printed.
+MOST_FREEDOMS = 1000
 #: The ends of an interval of time; None where open.
 Between = tuple[str | None, str | None]
 
@@ -94,6 +96,13 @@ class LatestMean:
     latest_runs: int
     latest_at: str | None
     latest_degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def few_degrees_of_freedom(self) -> int | None:
+        """The degrees of freedom where they are few enough to say something: of more than some 1000 the factor of
+        Student is that of infinitely many to three digits."""
+        freedom = self.latest_degrees_of_freedom
+        return None if freedom is None or freedom > MOST_FREEDOMS else int(freedom)
 
 
 @dataclass(frozen=True)
