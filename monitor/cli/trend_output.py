@@ -12,6 +12,7 @@ from monitor.cli.forecast_output import forecast_start
 from monitor.cli.rests_on_output import levels, steps_at_once
 from monitor.reporting.confounding import charted
 from monitor.reporting.lacks import NO_MAP_STORED
+from monitor.reporting.messages import ONE_DAY
 from monitor.reporting.weekly_notice import WeeklyNotices, weekly_sentence
 from monitor.workflow.history.season import SlopeVerdict
 from monitor.workflow.trend.answer import (
@@ -192,13 +193,16 @@ def _table(answer: TrendAnswer) -> None:
 def _freedoms(answer: TrendAnswer) -> str:
     """By what the u of the latest means is known, with its degrees of freedom."""
     means = (parameter.mean for parameter in answer.parameters.values())
+    known = [mean for mean in means if mean.latest_degrees_of_freedom is not None]
+    if not known:
+        return ""
     freedoms = sorted(
-        int(mean.latest_degrees_of_freedom) for mean in means if mean.latest_degrees_of_freedom is not None
+        mean.few_degrees_of_freedom for mean in known if mean.few_degrees_of_freedom is not None
     )
     if not freedoms:
-        return ""
+        return ", u by the scatter of runs within days"
     few = freedoms[0]
-    more = "" if few == freedoms[-1] else " or more"
+    more = "" if few == freedoms[-1] and len(freedoms) == len(known) else " or more"
     return f", u by the scatter of runs within days ({few} degree{'' if few == 1 else 's'} of freedom{more})"
 
 
@@ -212,9 +216,10 @@ def _change(name: str, change: DatedChange) -> str:
     others = change.between_instruments
     # Of several steps at once one sentence says it.
     exchanged = "" if others is None or others.together else f"; {others.in_words(change.unit)}"
+    one_day = f"; {ONE_DAY}" if change.one_day else ""
     return (
         f"{name}: {change.kind} of {output.with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
-        f"({_interval(change.interval)}, {_p_value(change)}){exchanged}"
+        f"({_interval(change.interval)}, {_p_value(change)}){exchanged}{one_day}"
     )
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 #: What is said of a slope that a season may be all of.
 DRIFT_OR_SEASON = "drift or season cannot be told apart"
+#: What is said of a step after which there is one day alone.
+ONE_DAY = "the latest day alone cannot show whether it stays: measure again"
 #: What is said of a parameter of the fleet in place of its class, where that is so.
 _MOVES = {
     "drifts out of tolerance within a year": f"reaches its tolerance within a year at this rate; {DRIFT_OR_SEASON}",

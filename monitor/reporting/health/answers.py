@@ -21,7 +21,6 @@ from monitor.reporting.health.news import CheckKind, NextCheck
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
-    ChangeKind,
     Drift,
     Fleet,
     FleetRow,
@@ -177,12 +176,12 @@ def _unexplained(health: MachineHealth) -> str:
 
 
 def _changed(health: MachineHealth) -> str:
-    changes = [change for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE]
+    changes = [change for change in health.changes if change.counts]
     parameter = concern(health)
     name = ""
     if parameter is not None and any(change.at in parameter.changed_at for change in changes):
         name = f" ({parameter.in_words})"
-    return "; ".join(str(change.what) for change in changes) + name
+    return "; ".join(str(change.now) for change in changes) + name
 
 
 def _suspect(health: MachineHealth) -> str:
@@ -254,11 +253,7 @@ def _since(health: MachineHealth) -> str:
     if health.due is not None or health.state is State.DRIFTS:
         return f"Since {day(health.since)} at the latest, the first of the runs that show it."
     span = next(
-        (
-            change.after
-            for change in health.changes
-            if change.this_week and change.kind is ChangeKind.CHANGE and change.at == health.since
-        ),
+        (change.after for change in health.changes if change.counts and change.at == health.since),
         None,
     )
     if span is not None and span != health.since:
@@ -393,7 +388,9 @@ def _was_judged(row: FleetRow) -> bool:
 
 def _has_tolerances(row: FleetRow) -> bool:
     """Whether tolerances are stated for a machine: then its next check is not open for the lack of them."""
-    return isinstance(row.next_check, NextCheck) and row.next_check.kind is not CheckKind.NO_TOLERANCE
+    return isinstance(row.next_check, NextCheck) and row.next_check.kind not in (
+        CheckKind.NO_TOLERANCE, CheckKind.ONE_DAY_NO_TOLERANCE,
+    )  # fmt: skip
 
 
 def _unjudged(fleet: Fleet) -> str:

@@ -16,7 +16,7 @@ def change_first(health: MachineHealth, action: str) -> str:
     """Return an ``action`` begun with what changed in the week; alone where nothing did, or where it is of that."""
     if health.state is State.CHANGED:
         return action
-    detected = _of_week(health, ChangeKind.CHANGE)
+    detected = [change.now for change in health.changes if change.counts]
     steps = [_at_event(what) for what in _of_week(health, ChangeKind.EVENT_STEP)]
     noted = [what for what in _of_week(health, ChangeKind.EVENT) if isinstance(what, EventNoted)]
     crashes = [str(what) for what in noted if what.kind == CRASH]

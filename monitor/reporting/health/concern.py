@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from monitor.reporting.health.records import (
-    ChangeKind,
     MachineHealth,
     MapShare,
     ParameterHealth,
@@ -94,9 +93,7 @@ def concern(health: MachineHealth) -> ParameterHealth | None:
     if health.state is State.DRIFTS:
         return next(iter(drifting_without_limit(parameters)), None)
     if health.state is State.CHANGED:
-        noted = [
-            change.at for change in health.changes if change.kind is ChangeKind.CHANGE and change.this_week
-        ]
+        noted = [change.at for change in health.changes if change.counts]
         changed = [parameter for parameter in parameters if any(at in parameter.changed_at for at in noted)]
         if changed:
             return changed[0]

@@ -41,6 +41,17 @@ class ParameterChanged(Sentence):
 
 
 @dataclass(frozen=True)
+class StillUnexplained(Sentence):
+    """A change of a week before this one that no event explains and that was not put right."""
+
+    what: Said
+    at: datetime
+
+    def __str__(self) -> str:
+        return f"{self.what} on {self.at:%Y-%m-%d}, and no event explains it"
+
+
+@dataclass(frozen=True)
 class SteppedAtEvent(Sentence):
     """A parameter differs before and after an event; ``undecided`` says why this may be no step.
 
@@ -195,6 +206,8 @@ class CheckKind(Enum):
     NO_RUN_THIS_WEEK = auto()
     NO_RUN_YET = auto()
     FIRST_RUN = auto()
+    ONE_DAY = auto()
+    ONE_DAY_NO_TOLERANCE = auto()
     NO_TOLERANCE = auto()
     NO_FORECAST = auto()
     SHORT_HISTORY = auto()
@@ -222,6 +235,8 @@ _CHECKS: Mapping[CheckKind, str] = {
     CheckKind.NO_RUN_THIS_WEEK: "now: no run this week",
     CheckKind.NO_RUN_YET: "now: no run yet",
     CheckKind.FIRST_RUN: "its first run",
+    CheckKind.ONE_DAY: "now: the latest day alone shows the step of {parameter}",
+    CheckKind.ONE_DAY_NO_TOLERANCE: "now: the latest day alone shows the step of {parameter}",
     CheckKind.NO_TOLERANCE: "no forecast: the campaign states no tolerances",
     CheckKind.NO_FORECAST: "no forecast: fewer than three days since the last change",
     CheckKind.SHORT_HISTORY: "next week: {span:.0f} days of history allow no longer forecast",

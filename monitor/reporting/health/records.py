@@ -15,6 +15,7 @@ from monitor.documents import OMITTED, Said
 from monitor.records import AuditAnchor
 from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.health.comparison import ModelHealth
+from monitor.reporting.health.news import StillUnexplained
 from monitor.reporting.svg.map_slices import Slice
 
 
@@ -49,7 +50,8 @@ STATES: dict[State, str] = {
     State.MAY_BE_OUT_OF_TOLERANCE: "the probability that a parameter or the volumetric error is beyond its tolerance "
     "exceeds the stated limit",
     State.NOT_EVALUATED: "what was measured last could not be evaluated: nothing is known of its tolerances",
-    State.CHANGED: "a parameter or an artefact changed this week",
+    State.CHANGED: "a parameter or an artefact changed this week; or a parameter stepped before, and no event "
+    "explains it",
     State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing, or the "
     "campaign's file states something else than was measured",
     State.DRIFTS: "a parameter without a tolerance drifts, or follows a season that the history is too short to "
@@ -134,7 +136,8 @@ class Change:
     """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``).
 
     What a parameter stepped by at a recorded event is an ``event step``: said like a change, but explained, so that it
-    does not make the state of the machine.
+    does not make the state of the machine. ``is_open``: a step of an earlier week that no event explains and that was
+    not put right (None: none, or of an older record).
     """
 
     kind: ChangeKind
@@ -143,6 +146,17 @@ class Change:
     what: Said
     p_value: float | None
     this_week: bool
+    is_open: bool | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def counts(self) -> bool:
+        """Whether it makes the state of the machine: found by the statistics, of this week or still open."""
+        return self.kind is ChangeKind.CHANGE and bool(self.this_week or self.is_open)
+
+    @property
+    def now(self) -> Said:
+        """What is said of it this week: of one that is still open since when."""
+        return StillUnexplained(self.what, self.at) if self.is_open else self.what
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -23,8 +23,10 @@ from monitor.reporting.health.records import (
 )
 from monitor.reporting.health.sentences import BadPoint, ScatteringBall, StepFailed
 from monitor.reporting.health.settling import ParameterSettled
+from monitor.reporting.messages import ONE_DAY
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import texts_of
+from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, MachineHistory, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation, MovedTarget
@@ -37,6 +39,9 @@ from monitor.workflow.history.other_instruments import between_instruments
 from monitor.workflow.history.past import ParameterPast, splitting_events
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+
+#: For so long a step that no event explains is said of a machine every week.
+OPEN_FOR = timedelta(weeks=13)
 
 
 @dataclass(frozen=True)
@@ -113,15 +118,30 @@ def changes_noted(
     week: Week,
 ) -> list[Change]:
     """Everything that changed, the latest first; ``runs`` are those of the campaign that was explained."""
-    noted, between = [], between_instruments(history, past, splitting_events(events))
+    moments = splitting_events(events)
+    noted, between = [], between_instruments(history, past, moments)
     for parameter in past.values():
+        still_open = not_put_right(parameter.search.changes)
         for change in parameter.search.changes:
             at = moment_of(change.at, parameter.series)
             after = moment_of(change.interval[0], parameter.series)
             others, unit = between.get(change), parameter.series.unit
-            besides = "" if others is None else others.in_words(unit)
-            what = ParameterChanged(change.parameter, change.kind, change.size, change.u, unit, besides)
-            noted.append(Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at)))
+            besides = [] if others is None else [others.in_words(unit)]
+            if parameter.is_of_latest_day(change):
+                besides.append(ONE_DAY)
+            what = ParameterChanged(
+                change.parameter, change.kind, change.size, change.u, unit, "; ".join(besides)
+            )
+            is_open = (
+                change in still_open
+                and not week.holds(at)
+                and week.begins - at <= OPEN_FOR
+                and not any(event >= change.interval[0] for event in moments)
+                and not (others is not None and others.may_be_all)
+            )
+            noted.append(
+                Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at), is_open or None)
+            )
         noted += _settling(parameter, week)
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
@@ -134,6 +154,22 @@ def changes_noted(
             noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)
+
+
+def not_put_right(changes: Sequence[FoundChange]) -> list[FoundChange]:
+    """The steps of one parameter, in the order of time, that no others undid: not one of several steps that come to
+    less than half of it together."""
+    steps = [change for change in changes if change.kind == "step"]
+    level = np.cumsum([0.0, *(step.size for step in steps)])
+    return [
+        step
+        for i, step in enumerate(steps)
+        if not any(
+            abs(level[after] - level[before]) < 0.5 * abs(step.size)
+            for before in range(i + 1)
+            for after in range(i + 1, len(level))
+        )
+    ]
 
 
 def _settling(parameter: ParameterPast, week: Week) -> Iterator[Change]:

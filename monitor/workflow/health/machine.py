@@ -10,7 +10,14 @@ from monitor.documents import Said
 from monitor.methods import Unable, method_named
 from monitor.records import VOLUMETRIC
 from monitor.reporting.health.news import CheckKind, NextCheck, NotMeasured
-from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
+from monitor.reporting.health.records import (
+    ALARMS,
+    Change,
+    DataQuality,
+    MachineHealth,
+    RefusedImport,
+    State,
+)
 from monitor.reporting.health.sentences import (
     LimitsWithoutParameter,
     LimitWithoutMap,
@@ -40,6 +47,7 @@ from monitor.workflow.health.facts import (
     condition_ranges,
     data_quality,
     event_noted,
+    moment_of,
     parameter_health,
 )
 from monitor.workflow.health.map import probability_beyond, stated_map
@@ -202,7 +210,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         judged, noted, explanation, quality, past.options.risk, evaluated=evaluated, drifts=bool(unjudged)
     )
     error_map = stated_map(results.map, limit_um, beyond)
-    check = next_check(state, drifts, limits, week)
+    check = next_check(state, drifts, limits, week, _of_latest_day(parameter_pasts, noted))
     due = due_by_drift(state, check)
     drifting = drifting_named(drifting_to_limit(state, parameters, error_map, due), unjudged)
     return MachineHealth(
@@ -219,6 +227,20 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         quality=quality,
         map=error_map, due=due,
     )  # fmt: skip
+
+
+def _of_latest_day(pasts: Mapping[str, ParameterPast], noted: Sequence[Change]) -> str | None:
+    """The parameter that stepped before the latest day alone, in this week or a step that is still open."""
+    counting = {change.at for change in noted if change.counts}
+    return next(
+        (
+            name
+            for name, past in pasts.items()
+            for change in past.search.changes
+            if past.is_of_latest_day(change) and moment_of(change.at, past.series) in counting
+        ),
+        None,
+    )
 
 
 def _simulated(db: Database, past: MachineWeek) -> list[Said]:
@@ -262,13 +284,18 @@ def _named(run: RecordedRun) -> RunNamed:
 
 
 def _left_in_alarm(db: Database, past: MachineWeek) -> str | None:
-    """The state that the last report gave the machine's last run, where it was an alarm: nothing has settled it."""
+    """The state that the last report gave the machine's last run, where it was an alarm, or a change that no event
+    since then explains: nothing has settled it."""
     for stored in stored_analyses(db, "health", machine=past.name.machine, most=100):
         if stored.document["run"] == str(
             _named(past.runs[-1])
         ):  # a stored report has the run by this text alone
             state = str(stored.document["state"])
-            return state if state in ALARMS else None
+            explained = any(
+                event.at.replace(tzinfo=None) >= past.runs[-1].local_start for event in past.events
+            )
+            stays = ALARMS if explained else (*ALARMS, State.CHANGED)
+            return state if state in stays else None
     return None
 
 

@@ -112,13 +112,13 @@ def new_this_week(
     quality: DataQuality,
     drifting: tuple[Drifting, ...] = (),
 ) -> NewThisWeek:
-    """What is new this week: changes, then steps at events, then events, what the model lacks, and data that never
-    came in; and what is ``drifting``."""
+    """What is new this week: changes, with those that are still open, then steps at events, then events,
+    what the model lacks, and data that never came in; and what is ``drifting``."""
     every: list[Said] = [
-        change.what
+        change.now
         for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)
         for change in noted
-        if change.this_week and change.kind is kind
+        if change.kind is kind and (change.this_week or change.is_open)
     ]
     every += imports_refused(quality.refused_imports)
     missing = () if explanation is None else explanation.missing[:1]
@@ -214,7 +214,7 @@ def since_when(
         return None if surest is None else surest.since
     changed = [change for change in noted if change.kind is ChangeKind.CHANGE]
     if state is State.CHANGED:
-        return min(change.at for change in changed if change.this_week)
+        return min(change.at for change in changed if change.counts)
     return max((change.at for change in changed), default=None)
 
 
@@ -230,7 +230,8 @@ def state_of(
 ) -> State:
     """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives.
 
-    ``drifts``: whether a parameter without a tolerance drifts.
+    ``drifts``: whether a parameter without a tolerance drifts. A step of an earlier week that is still open comes after
+    a model that fails.
     """
     if judged.any is not None and max(judged.single.values()) > 0.5:
         return State.OUT_OF_TOLERANCE
@@ -242,6 +243,8 @@ def state_of(
         return State.CHANGED
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
         return State.MODEL_FAILS
+    if any(change.counts for change in noted):
+        return State.CHANGED
     if drifts:
         return State.DRIFTS
     if quality.suspect:
@@ -254,8 +257,12 @@ def next_check(
     drifts: Mapping[str, DriftForecast | None],
     limits: Mapping[str, float],
     week: Week,
+    of_one_day: str | None = None,
 ) -> NextCheck:
-    """When to measure again, and why: the machine is likely to be in tolerance until then."""
+    """When to measure again, and why: the machine is likely to be in tolerance until then.
+
+    ``of_one_day`` names a parameter that stepped before the latest day of the week, None without one.
+    """
     good_until = {
         name: drift.origin + drift.good_for
         for name, drift in drifts.items()
@@ -265,6 +272,9 @@ def next_check(
         return NextCheck(CheckKind.NOT_EVALUATED)
     if state in ALARMS:
         return NextCheck(CheckKind.ALARM)
+    if of_one_day is not None:
+        kind = CheckKind.ONE_DAY if limits else CheckKind.ONE_DAY_NO_TOLERANCE
+        return NextCheck(kind, of_one_day)
     if not limits:
         return NextCheck(CheckKind.NO_TOLERANCE)
     if not good_until:

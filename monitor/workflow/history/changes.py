@@ -17,6 +17,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import FEWEST_RUNS, Change, History, find_changes
+from monitor.statistics.days.latest_day import FEWEST_DAYS, latest_day
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
@@ -31,6 +32,9 @@ SEED = 20260302
 DAYS_FOR_MEANS = 15
 #: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
 ALIKE = 1.25
+#: A latest day is a step where it lies at least so many times as far off as any day before it (measured rates and the
+#: price in power: docs/trials-statistics.md).
+FAR = 2.5
 #: Trials of the simulated null distribution at least; more where the level asks for it.
 TRIALS = 1999
 
@@ -39,6 +43,7 @@ TRIALS = 1999
 class ChangeSearch:
     """Changes and drifts that a search of one parameter found, in the order of time; or why none were sought.
 
+    The last change may be a step before the latest day, whose permanence that day alone cannot show.
     ``least_p`` is the smallest p-value that its simulated histories can say, which are more where more parameters are
     searched: a change with that one may be less probable still.
     """
@@ -99,10 +104,11 @@ def search_changes(
 ) -> Mapping[str, ChangeSearch]:
     """Steps, bends and transients of each parameter; or why none were sought.
 
-    ``events`` are times of known changes, in the unit of ``t``. Parameters measured at the same times share one
-    search, and those weighed alike the simulated null distribution. Which search a parameter is in does not change its
-    share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
-    change is the start of its run, or of the first run of its day.
+    A latest day that stands out from the days since the last change or event is a step before it, at its own level of
+    ``false_alarm`` over all parameters. ``events`` are times of known changes, in the unit of ``t``. Parameters
+    measured at the same times share one search, and those weighed alike the simulated null distribution. Which search a
+    parameter is in does not change its share of ``false_alarm``, the probability of any finding where there is nothing
+    to find. The ``at`` of a change is the start of its run, or of the first run of its day.
     """
     results: dict[str, ChangeSearch] = {}
     for plan in _plans(series):
@@ -121,7 +127,8 @@ def search_changes(
             results |= dict.fromkeys(plan.values, ChangeSearch(why_none=why))
             continue
         results |= {name: _of_parameter(history, name, plan.begins) for name in plan.values}
-    return results
+    level = false_alarm / max(len(series), 1)
+    return {each.name: _with_latest_day(each, results[each.name], events, level) for each in series}
 
 
 def _plans(series: Sequence[Series]) -> list[_Plan]:
@@ -154,3 +161,60 @@ def _of_parameter(history: History, name: str, begins: Array) -> ChangeSearch:
         for part in (history.changes, history.trends)
     )
     return ChangeSearch(changes, drifts, least_p=1.0 / (history.trials + 1))
+
+
+def _with_latest_day(
+    series: Series, search: ChangeSearch, events: Sequence[float], level: float
+) -> ChangeSearch:
+    """The search with the step before the latest day, where that stands out from the days since the last change or
+    event; as it is while a transient settles.
+
+    A step of the latest day that the search put one day early, as it takes no nearer one, is put in its place.
+    """
+    if search.why_none is not None or any(drift.kind == "transient" for drift in search.drifts):
+        return search
+    earlier = search.changes
+    if earlier and series.days_since(earlier[-1].at) == 2:
+        earlier = earlier[:-1]
+    ends = [*(at for at in events if at <= series.t[-1]), *(change.at for change in earlier)]
+    step = _latest_step(series.part(series.t >= max(ends, default=-np.inf)), level)
+    if step is None:
+        return search
+    return replace(search, changes=(*earlier, replace(step, index=int(np.searchsorted(series.t, step.at)))))
+
+
+def _latest_step(piece: Series, level: float) -> Change | None:
+    """The step before the latest day of a piece of history; None where that does not stand out."""
+    if piece.day_count < FEWEST_DAYS:
+        return None
+    last = piece.of_last_day
+    latest, before = piece.part(last), piece.part(~last)
+    alike = before.part(np.isin(before.measured, latest.measured))
+    if alike.day_count >= FEWEST_DAYS - 1:
+        before = alike
+    (t, y, _, _), (t_last, y_last, _, begins) = day_means(before), day_means(latest)
+    found = latest_day(
+        np.append(t, t_last.mean()), np.append(y, y_last.mean()), _more_than_before(latest, before)
+    )
+    if found is None or not found.p_value < level or found.times_others < FAR:
+        return None
+    at = float(begins.min())
+    between = (float(piece.t[~last].max(initial=-np.inf)), at)
+    return Change(piece.name, "step", 0, at, between, found.size, found.u, found.p_value)
+
+
+def _more_than_before(latest: Series, before: Series) -> float:
+    """The variance that the mean of the latest day has beyond that of a day before it: of fewer runs, by their scatter
+    within days, or of runs that are known worse, by their stated uncertainty."""
+    index = np.unique(before.days, return_inverse=True)[1]
+    runs = np.bincount(index)
+    within = before.values - (np.bincount(index, before.values) / runs)[index]
+    freedom = len(index) - len(runs)
+    fewer = 1.0 / len(latest.t) - len(runs) / len(index)
+    by_scatter = float(within @ within) / freedom * fewer if freedom else 0.0
+    u_latest, u_before = latest.weights(), before.weights()
+    if u_latest is None or u_before is None:
+        return max(by_scatter, 0.0)
+    of_day = np.bincount(index, u_before**2) / runs**2
+    by_stated = float((u_latest**2).mean()) / len(latest.t) - float(np.median(of_day))
+    return max(by_scatter, by_stated, 0.0)

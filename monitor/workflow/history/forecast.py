@@ -63,6 +63,12 @@ def crossing_dates(
     return at, None if low is None and high is None else (low, high)
 
 
+def probability_inside(line: Trend, limit: float, at: float) -> float:
+    """Return the probability that a run at a time is within ± ``limit`` by a line."""
+    ahead = statistics.forecast(line, (-limit, limit), at, [at], horizon=horizon_of(at))
+    return float(ahead.probability[0])
+
+
 def drift_forecast(
     drift: PieceDrift, limit: float | None, check: float | None = None, reliability: float = RELIABILITY
 ) -> DriftForecast | None:

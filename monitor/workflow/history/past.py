@@ -35,6 +35,10 @@ class ParameterPast:
     search: ChangeSearch
     drift: PieceDrift
 
+    def is_of_latest_day(self, change: Change) -> bool:
+        """Whether a change is a step after which there is one day alone."""
+        return change.kind == "step" and self.series.steady.days_since(change.at) == 1
+
     def is_maybe_season(self, change: Change) -> bool:
         """Whether a drift of the present piece that the search found may be a season."""
         return change.at >= self.drift.begins and self.drift.verdict is SlopeVerdict.DRIFT_OR_SEASON

@@ -97,6 +97,10 @@ class Series:
             return len(np.unique(self.days))
         return 1 + int((rises > 0).sum())
 
+    def days_since(self, at: float) -> int:
+        """Number of different days with runs from ``at`` on."""
+        return self.part(self.t >= at).day_count
+
     @cached_property
     def steady(self) -> Series:
         """The runs that are not marked warm_up, where enough are not: a warming machine is another matter."""

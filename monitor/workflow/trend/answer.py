@@ -23,6 +23,8 @@ from monitor.workflow.trend.charts_answer import ControlCharts, ParameterCharts
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
+#: More degrees of freedom than this are not printed.
+MOST_FREEDOMS = 1000
 #: The ends of an interval of time; None where open.
 Between = tuple[str | None, str | None]
 
@@ -95,6 +97,13 @@ class LatestMean:
     latest_at: str | None
     latest_degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
 
+    @property
+    def few_degrees_of_freedom(self) -> int | None:
+        """The degrees of freedom where they are few enough to say something: of more than some 1000 the factor of
+        Student is that of infinitely many to three digits."""
+        freedom = self.latest_degrees_of_freedom
+        return None if freedom is None or freedom > MOST_FREEDOMS else int(freedom)
+
 
 @dataclass(frozen=True)
 class DatedChange:
@@ -105,6 +114,7 @@ class DatedChange:
     ``p_at_most``: none of the simulated histories was like it, so that ``p_value`` is the smallest that they can say.
     It is of one parameter, and stated where it is below the share of ``false_alarm`` that each of the machine's
     parameters has, whether one is asked for or all. ``between_instruments``: other instruments measure from a step on.
+    ``one_day``: a step after which there is one day alone, which cannot show whether it stays.
     """
 
     at: str | None
@@ -118,6 +128,7 @@ class DatedChange:
     time_constant_days: float | None = field(default=None, metadata=OMITTED)
     p_at_most: bool | None = field(default=None, metadata=OMITTED)
     between_instruments: OtherInstruments | None = field(default=None, metadata=OMITTED)
+    one_day: bool | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,12 @@ from monitor.statistics import Trend, backtest, predict
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
-from monitor.workflow.history.forecast import crossing_dates, drift_forecast
+from monitor.workflow.history.forecast import crossing_dates, drift_forecast, probability_inside
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import ForecastStart, ForecastTest, LimitForecast
 
+#: By what a parameter that is out of tolerance is to be checked at once.
+OUT_OF_TOLERANCE = "the latest runs are out of tolerance"
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
 #: Days foretold at most, evenly spread: of five years of weeks all of them would be most of the time of a page.
@@ -33,6 +35,9 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_TOLERANCE))
     beyond = _beyond_since(drift.whole, limit)
     none = replace(none, beyond_since=beyond)
+    latest = float(drift.whole.values[drift.whole.of_last_day].mean())
+    if abs(latest) > limit:
+        return _out_of_tolerance(none, drift, latest, check, reliability)
     of_drift = drift_forecast(drift, limit, check, reliability)
     if of_drift is None or of_drift.ahead is None:
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
@@ -53,6 +58,32 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
         crosses_limit_interval=interval,
         in_tolerance_at_next_check=float(ahead.probability[0]),
         start=None if at is None else _start(drift, of_drift.line, ahead.crossing.limit),
+    )
+
+
+def _out_of_tolerance(
+    none: LimitForecast, drift: PieceDrift, latest: float, check: float, reliability: float
+) -> LimitForecast:
+    """The forecast of a parameter whose ``latest`` mean is beyond its limit: it is to be checked at once, whatever its
+    line foretells, and a run at the next ``check`` is in tolerance at most as surely as from that level on."""
+    assert none.limit is not None
+    now = replace(none, recommended_interval_days=0.0, recommended_by=OUT_OF_TOLERANCE)
+    of_drift = drift_forecast(drift, none.limit, check, reliability)
+    if of_drift is None or of_drift.ahead is None or drift.stated is None:
+        return replace(now, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
+    line, inside = of_drift.line, float(of_drift.ahead.probability[0])
+    higher = latest - float(predict(line, of_drift.origin)[0])
+    from_latest = probability_inside(
+        replace(line, level_at=line.level_at + higher), none.limit, max(check, of_drift.origin)
+    )
+    at, interval = None, None
+    if none.beyond_since is None:
+        at, interval = crossing_dates(of_drift.ahead.crossing, of_drift.ahead.horizon, of_drift.offset)
+    return replace(
+        now,
+        crosses_limit_at=at,
+        crosses_limit_interval=interval,
+        in_tolerance_at_next_check=min(inside, from_latest),
     )
 
 

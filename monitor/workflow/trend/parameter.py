@@ -140,10 +140,13 @@ def calibrations(drift: PieceDrift) -> tuple[RestsOn, ...]:
     return tuple(stated)
 
 
-def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedChange:
+def dated_change(
+    change: Change, series: Series, least_p: float = 0.0, *, is_of_latest_day: bool = False
+) -> DatedChange:
     """A change with its dates; a slope of a short history is stated a day, as ``SHORTEST_DAYS`` says why.
 
-    ``least_p`` is the smallest p-value that the search can say; that of a line may be any.
+    ``least_p`` is the smallest p-value that the search can say; that of a line may be any. ``is_of_latest_day``: one
+    day alone follows it.
     """
     slope = change.kind in ("slope", "trend")
     period, days = ("day", 1.0) if np.ptp(series.t) < SHORTEST_DAYS else ("year", DAYS_PER_YEAR)
@@ -158,4 +161,5 @@ def dated_change(change: Change, series: Series, least_p: float = 0.0) -> DatedC
         days=series.steady.day_count,
         time_constant_days=change.time_constant,
         p_at_most=True if np.isclose(change.p_value, least_p, rtol=1e-9, atol=0.0) else None,
+        one_day=is_of_latest_day or None,
     )

@@ -315,7 +315,9 @@ class _Page:
             mean=latest_mean(drift.whole),
             changes=tuple(
                 replace(
-                    dated_change(change, series, search.least_p),
+                    dated_change(
+                        change, series, search.least_p, is_of_latest_day=past.is_of_latest_day(change)
+                    ),
                     between_instruments=self.between.get(change),
                 )
                 for change in search.changes
