@@ -385,10 +385,14 @@ def lacks_campaigns(sheets: Sequence[str], campaigns: Sequence[str]) -> str:
     return f"{', '.join(sheets)}: without {named}, not identified yet; type `monitor identify`"
 
 
-def no_identified_run(machine: str, campaigns: Sequence[str], since: datetime | None) -> str:
-    """Return that a trend has no run."""
+def no_identified_run(
+    machine: str, campaigns: Sequence[str], since: datetime | None, *, is_narrowed: bool = False
+) -> str:
+    """Return that a trend has no run; ``is_narrowed`` where the choice of runs is more than these."""
     when = "yet" if since is None else f"since {since:%Y-%m-%d}"
     campaign = f" of campaign {', '.join(campaigns)}" if campaigns else ""
+    if is_narrowed:
+        return f"machine {machine} has no identified run{campaign} among those that were chosen"
     return f"machine {machine} has no identified run{campaign} {when}"
 
 

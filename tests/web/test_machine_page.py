@@ -16,7 +16,7 @@ import pytest
 from monitor.documents import from_document, to_document
 from monitor.store import Database, list_runs
 from monitor.web.charts.trend import groups_without_legend, trend_chart
-from monitor.web.pages.machine import _ends, _within
+from monitor.web.pages.shown_runs import ShownRuns
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.intake.importing import ImportRequest, import_folders
@@ -71,11 +71,7 @@ def test_a_period_is_cut_of_the_history_as_the_database_cuts_it(local: Any) -> N
 def values_of_page(local: Any, since: str, until: str) -> Any:
     """What the page cuts of the whole history, as the interface would answer it."""
     _, whole = local.ask("values", {"machine": "HU40-T"})
-    return json.loads(
-        json.dumps(
-            to_document(_within(from_document(ValuesAnswer, whole), **_ends(since=since, until=until)))
-        )
-    )
+    return json.loads(json.dumps(to_document(ShownRuns(since, until).of(from_document(ValuesAnswer, whole)))))
 
 
 @pytest.fixture(scope="module")
@@ -150,3 +146,27 @@ def test_colours_that_come_twice_have_no_legend(local: Any) -> None:
     shown = trend_chart(many, "EXX", None, "campaign")
     assert {trace["showlegend"] for trace in shown.traces if "error_y" in trace} == {False}
     assert groups_without_legend(many, "EXX", "campaign") == len(values.run)
+
+
+def test_all_of_a_filtered_page_is_of_the_runs_that_it_shows(crashed: tuple[Any, datetime]) -> None:
+    """The file of its values had both campaigns and the latest value was of a day outside the period."""
+    served = crashed[0]
+    looked_at(served, "/machine?name=HU40-T")
+    chosen = "campaign=five-days&warm_up=warm&since=2026-03-03&until=2026-03-05"
+    text = looked_at(served, f"/machine?name=HU40-T&parameter=EB0C&{chosen}")
+    chart = json.loads(html.unescape(re.findall(r'class="figure">(.*?)</script>', text, re.DOTALL)[0]))
+    drawn = [time for trace in chart["data"] if "error_y" in trace for time in trace["x"]]
+    link = re.search(r'href="(/machine/values.csv[^"]+)"', text)
+    assert link is not None
+    rows = served.client.get(html.unescape(link[1])).text.splitlines()[1:]
+    assert [row.split(",")[0] for row in rows] == sorted(drawn)
+    assert len(rows) == 8
+    latest = re.search(r"<dt>Latest</dt><dd>(.*?)</dd>", text, re.DOTALL)
+    assert latest is not None
+    assert "2026-03-04" in latest[1]
+    later = re.search(r'data-later="([^"]+)"', text)
+    assert later is not None
+    assert all(part in html.unescape(later[1]) for part in chosen.split("&"))
+    _, none = served.ask("trend", {"machine": "HU40-T", "warm_up": True})
+    assert none["runs"] == 0
+    assert "among those that were chosen" in str(none["why"])
