@@ -370,7 +370,15 @@ def before_all_runs(machine: str, first: datetime) -> str:
     """Return that an event lies before the first run of its machine, in UTC."""
     return (
         f"recorded, and it lies before the first run of {machine} ({first:%Y-%m-%d %H:%M} UTC): it splits nothing "
-        "until earlier runs are imported; an event cannot be undone"
+        "until earlier runs are imported; an event that is wrong can be withdrawn"
+    )
+
+
+def long_before_all_runs(machine: str, at: datetime, first: datetime) -> str:
+    """Return that an event lies long before the first run of its machine, in UTC, and how it is confirmed."""
+    return (
+        f"{at:%Y-%m-%d} lies more than a year before the first run of {machine} ({first:%Y-%m-%d} UTC): give the time "
+        "it had, or confirm that it was so long before (--before-runs; the box beside the time); nothing was recorded"
     )
 
 

@@ -221,6 +221,7 @@ if TYPE_CHECKING:
         Withdrawal as Withdrawal,
         withdraw_campaign as withdraw_campaign,
     )
+    from monitor.store.withdrawn_events import withdraw_event as withdraw_event
 else:
     __getattr__, __dir__ = on_demand(
         __name__,
@@ -269,5 +270,6 @@ else:
             "type_tolerances": "type_in_use",
             "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",
+            "withdrawn_events": "withdraw_event",
         },
     )

@@ -18,7 +18,7 @@ from monitor.web.charts.trend import GROUPINGS, groups_without_legend, trend_cha
 from monitor.web.days import as_iso, typed_moment
 from monitor.web.desk import Desk
 from monitor.web.faults import refusal_of
-from monitor.web.forms import asked_once, read_form
+from monitor.web.forms import Form, asked_once, read_form, whole_number
 from monitor.web.pages.fleet import ASKED as FLEET
 from monitor.web.pages.refused import RefusedForm, led_back, led_back_to_the_form, refused_form
 from monitor.web.pages.shown_runs import WARMTHS, ShownRuns
@@ -74,6 +74,7 @@ def routes() -> APIRouter:
         _check_names(values, parameter, campaign, may_lack=trends.waiting is not None)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
         campaigns = ask(user, "campaigns", {"machine": name}).campaigns
+        events = ask(user, "events", {"machine": name}).events
         trend = trends.shown(shown)
         all_trends = trends.of_all() if every else trends.of_all_already()
         form = refused_form(request, request.query_params.get("refused", ""))
@@ -85,7 +86,8 @@ def routes() -> APIRouter:
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             unlisted=groups_without_legend(values, shown, colour), groupings=GROUPINGS,
-            colour=colour, shown_runs=shown_runs, campaigns=campaigns, kinds=KINDS, methods=methods, warmths=WARMTHS,
+            colour=colour, shown_runs=shown_runs, campaigns=campaigns, events=events, kinds=KINDS,
+            methods=methods, warmths=WARMTHS,
             refused=form,
         )  # fmt: skip
 
@@ -98,8 +100,8 @@ def routes() -> APIRouter:
         """Record what happened to a machine."""
         async with read_form(request) as form:
             machine = form.text("machine")
-            document = {"machine": machine, "text": form.text("text"), **form.filled("kind")}
         try:
+            document = {"machine": machine, **_event_document(form)}
             at = typed_moment("when it happened", form.text("at"))
             await asked_once(request, form, "event", {**document, "at": at.isoformat()})
         except NotFoundError:
@@ -110,7 +112,24 @@ def routes() -> APIRouter:
             return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
         return led_back(request, "/machine", {"name": machine}, "events")
 
+    @router.post("/machine/event/withdraw")
+    async def withdraw_event(request: Request) -> Response:
+        """Let an event count no longer."""
+        async with read_form(request) as form:
+            machine, number = form.text("machine"), whole_number("number", form.text("number"))
+        document = {"machine": machine, "number": number, "reason": form.texts.get("reason", "")}
+        await asked_once(request, form, "withdraw event", document)
+        return led_back(request, "/machine", {"name": machine}, "events")
+
     return router
+
+
+def _event_document(form: Form) -> dict[str, Any]:
+    """What the form says of an event besides its moment. Raises InputError for one without words."""
+    if not form.texts.get("text"):
+        raise InputError("say in words what happened, for example 'B axis encoder changed'")
+    confirmed = {"before_runs": True} if form.texts.get("before_runs") else {}
+    return {"text": form.text("text"), **form.filled("kind"), **confirmed}
 
 
 def _values_csv(
