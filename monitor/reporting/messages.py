@@ -199,6 +199,16 @@ def compacted(file: str | Path, before: int, after: int, rows: int) -> str:
     return f"{file}: {before / 1e6:.1f} MB before, {after / 1e6:.1f} MB now; {rows} rows, all compared"
 
 
+def certificates_in_force(campaign: str, numbers: Sequence[str]) -> str:
+    """Return that other certificates of the same runs are in force."""
+    several = len(numbers) > 1
+    return (
+        f"of the same runs of {campaign} {'certificates' if several else 'certificate'} {', '.join(numbers)} "
+        f"{'are' if several else 'is'} in force: withdraw {'them' if several else 'it'}, or amend "
+        f"{'one of them' if several else 'it'} instead of issuing another"
+    )
+
+
 def campaign_withdrawn(campaign: str) -> str:
     """Return what is said of a campaign that counts no longer."""
     return f"{campaign}: withdrawn, it no longer counts; its name is free for the corrected folder"

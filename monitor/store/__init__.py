@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from monitor.store.certificates import (
         StoredCertificate as StoredCertificate,
         certificate_numbers as certificate_numbers,
+        certificates_in_force as certificates_in_force,
         find_certificate as find_certificate,
         list_certificates as list_certificates,
         load_certificate as load_certificate,
@@ -233,8 +234,8 @@ else:
             "campaigns": "Imported import_campaign import_curve load_campaign",
             "catalogue": "CampaignRow RunRow WithdrawnCampaign check_machine described_machines described_setups "
             "list_campaigns list_runs list_withdrawn",
-            "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
-            "load_certificate mark_certificate save_certificate",
+            "certificates": "StoredCertificate certificate_numbers certificates_in_force find_certificate "
+            "list_certificates load_certificate mark_certificate save_certificate",
             "connection": "Database",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
