@@ -45,6 +45,7 @@ GROUND = {
     "toml_text",
     "topology_text",
     "row_files",
+    "said",
 }
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.

@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from monitor.store.certificates import (
         StoredCertificate as StoredCertificate,
         certificate_numbers as certificate_numbers,
+        certificates_in_force as certificates_in_force,
         find_certificate as find_certificate,
         list_certificates as list_certificates,
         load_certificate as load_certificate,
@@ -227,6 +228,7 @@ if TYPE_CHECKING:
         Withdrawal as Withdrawal,
         withdraw_campaign as withdraw_campaign,
     )
+    from monitor.store.withdrawn_events import withdraw_event as withdraw_event
 else:
     __getattr__, __dir__ = on_demand(
         __name__,
@@ -238,8 +240,8 @@ else:
             "campaigns": "Imported import_campaign import_curve load_campaign",
             "catalogue": "CampaignRow RunRow WithdrawnCampaign check_machine described_machines described_setups "
             "list_campaigns list_runs list_withdrawn",
-            "certificates": "StoredCertificate certificate_numbers find_certificate list_certificates "
-            "load_certificate mark_certificate save_certificate",
+            "certificates": "StoredCertificate certificate_numbers certificates_in_force find_certificate "
+            "list_certificates load_certificate mark_certificate save_certificate",
             "connection": "Database",
             "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes copied_campaigns copied_runs copy_notes "
             "noted_campaigns",
@@ -277,5 +279,6 @@ else:
             "type_tolerances": "type_in_use",
             "verification": "Verification unrecorded verify_audit",
             "withdrawals": "Withdrawal withdraw_campaign",
+            "withdrawn_events": "withdraw_event",
         },
     )

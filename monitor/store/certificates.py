@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from monitor import __version__
 from monitor.exceptions import DataError, InputError, NotFoundError, TakenNumberError
+from monitor.said import reason as said_reason
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -105,8 +106,7 @@ def mark_certificate(
 
     Raises InputError without a reason or a new number, or where the state does not allow it; NotFoundError.
     """
-    if not reason.strip():
-        raise InputError(f"certificate {number} can be {state} only with a reason")
+    reason = said_reason(reason, f"certificate {number} can be {state} only with a reason in words")
     with db.transaction():
         old = load_certificate(db, number)
         if state == "amended":
@@ -159,6 +159,15 @@ def list_certificates(db: Database) -> pd.DataFrame:
 def certificate_numbers(db: Database) -> list[str]:
     """The numbers of all certificates, in order."""
     return [str(number) for (number,) in db.rows("SELECT number FROM v_certificates ORDER BY number")]
+
+
+def certificates_in_force(db: Database, campaign: str) -> tuple[tuple[str, frozenset[int]], ...]:
+    """The issued certificates of a campaign that were neither amended nor withdrawn, by number, with their runs."""
+    rows = db.rows(
+        "SELECT number, runs FROM v_certificates WHERE campaign_id = ? AND state = 'issued' ORDER BY number",
+        [campaign_number(db, campaign)],
+    )
+    return tuple((str(number), frozenset(runs)) for number, runs in rows)
 
 
 def find_certificate(db: Database, pdf_sha256: str) -> str | None:

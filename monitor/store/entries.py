@@ -33,6 +33,7 @@ SOURCES: dict[str, Source] = {
     "withdrawn_campaign": Source("withdrawn campaign", "campaign_id"),
     "analysis": Source("analysis", "analysis_id"),
     "event": Source("event", "event_id"),
+    "withdrawn_event": Source("withdrawn event", "event_id"),
     "selection": Source("selection", "selection_id"),
     "machine_model": Source("machine model", "choice_id"),
     "refused_import": Source("refused import", "refusal_id"),

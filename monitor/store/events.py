@@ -74,7 +74,7 @@ def _refuse_twice(db: Database, machine: str, happened_at: datetime, kind: str, 
     """Raise InputError where the same was recorded of the same moment."""
     moment = happened_at.astimezone(UTC).replace(tzinfo=None)
     same = db.rows(
-        "SELECT event_id FROM event WHERE machine = ? AND happened_at = ? AND kind = ? "
+        "SELECT event_id FROM v_events WHERE machine = ? AND happened_at = ? AND kind = ? "
         "AND lower(trim(description)) = lower(trim(?))",
         [machine, moment, kind, description],
     )
@@ -98,7 +98,8 @@ def list_events(db: Database, machine: str | None = None) -> tuple[StoredEvent, 
 def machine_events(db: Database, machine: str) -> list[MachineEvent]:
     """The events of a machine, in the order of time."""
     rows = db.rows(
-        "SELECT happened_at, utc_offset_s, kind, description FROM event WHERE machine = ? ORDER BY happened_at",
+        "SELECT happened_at, utc_offset_s, kind, description FROM event ANTI JOIN withdrawn_event USING (event_id) "
+        "WHERE machine = ? ORDER BY happened_at",
         [machine],
     )
     return [

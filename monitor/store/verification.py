@@ -31,6 +31,7 @@ from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.schema import schema_faults
 from monitor.store.selections import selection_content
 from monitor.store.withdrawals import withdrawal_content
+from monitor.store.withdrawn_events import withdrawn_event_content
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,7 @@ _NUMBERS: Mapping[str, str] = {
     "identification": "SELECT identification_id FROM identification",
     "analysis": "SELECT DISTINCT analysis_id FROM analysis",
     "event": "SELECT event_id FROM event",
+    "withdrawn event": "SELECT event_id FROM withdrawn_event",
     "selection": "SELECT selection_id FROM selection",
     "machine model": "SELECT choice_id FROM machine_model",
     "refused import": "SELECT refusal_id FROM refused_import",
@@ -159,6 +161,7 @@ _HASHES: Mapping[str, Callable[[Database, int], str]] = {
     "campaign": stored_content,
     "identification": stored_identification_content,
     "event": event_content,
+    "withdrawn event": withdrawn_event_content,
     "selection": selection_content,
     "machine model": machine_model_content,
     "refused import": refusal_content,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from monitor import __version__
-from monitor.exceptions import InputError
+from monitor.said import reason as said_reason
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -32,15 +32,16 @@ def withdraw_campaign(db: Database, name: str, reason: str) -> Withdrawal:
 
     Raises InputError without a reason, NotFoundError listing what is there.
     """
-    if not reason.strip():
-        raise InputError(f'say why campaign {name} is withdrawn: --reason "balls 3 and 5 were exchanged"')
+    reason = said_reason(
+        reason, f'say why campaign {name} is withdrawn: --reason "balls 3 and 5 were exchanged"'
+    )
     with db.transaction():
         campaign_id = campaign_number(db, name)
         ((machine,),) = db.rows("SELECT machine FROM campaign WHERE campaign_id = ?", [campaign_id])
         at = utc_now()
         db.execute(
             "INSERT INTO withdrawn_campaign VALUES (?, ?, ?, ?)",
-            [campaign_id, reason.strip(), __version__, at],
+            [campaign_id, reason, __version__, at],
         )
         audit.record(
             db, "withdraw", "withdrawn campaign", str(campaign_id), withdrawal_content(db, campaign_id)
@@ -50,7 +51,7 @@ def withdraw_campaign(db: Database, name: str, reason: str) -> Withdrawal:
             [campaign_id],
         )
     db.forget_campaigns()
-    return Withdrawal(name, machine, reason.strip(), at, tuple(str(number) for (number,) in resting))
+    return Withdrawal(name, machine, reason, at, tuple(str(number) for (number,) in resting))
 
 
 def withdrawal_content(db: Database, campaign_id: int) -> str:

@@ -15,7 +15,16 @@ from monitor.workflow.contract import QUESTIONS
 ROOT = "/api/v1"
 #: What changes the history of machines, models or campaigns.
 ENGINEERS = frozenset(
-    {"add effect", "event", "identify all", "import", "remove effect", "select", "use model"}
+    {
+        "add effect",
+        "event",
+        "identify all",
+        "import",
+        "remove effect",
+        "select",
+        "use model",
+        "withdraw event",
+    }
 )
 #: What the laboratory answers for, and what takes something away.
 APPROVERS = frozenset(

@@ -170,7 +170,7 @@ def _identity(path: str) -> tuple[int, int] | None:
 
 def _touched_machines(db: Database, question: str, request: Any, answer: Any) -> set[str] | None:
     """Return the machines whose answers a write changes; None: it may be any."""
-    if question == "event":
+    if question in ("event", "withdraw event"):
         return {request.machine}
     if question != "import":
         return None

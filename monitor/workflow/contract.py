@@ -63,6 +63,7 @@ QUESTIONS = {
         "effects": "effects:effects",
         "effects of campaign": "effects:campaign_effects",
         "event": "events:event",
+        "events": "events:events",
         "explain": "explain.explain:explain",
         "export": "keeping:export",
         "fleet": "fleet.fleet:fleet",
@@ -113,5 +114,6 @@ QUESTIONS = {
         "watch": "watching.watch:watch",
         "withdraw campaign": "intake.withdrawals:withdraw",
         "withdraw certificate": "certificate.issue:withdraw",
+        "withdraw event": "events:withdraw",
     }.items()
 }

@@ -9,6 +9,11 @@ from typing import Any
 import pypdf
 import pytest
 
+from monitor.store import Database
+from monitor.workflow.certificate.issue import _in_force
+from monitor.workflow.certificate.orders import Measured
+from monitor.workflow.certificate.request import CertificateRequest
+
 
 def text_of(file: Path) -> str:
     return "\n".join(page.extract_text() for page in pypdf.PdfReader(file).pages)
@@ -195,3 +200,18 @@ def test_a_number_with_slashes_stays_in_its_folder(
     (file,) = Path("out").iterdir()
     assert str(file) == answer.document["file"]
     assert not list(Path("..").glob("*.pdf"))
+
+
+def test_another_certificate_of_a_run_names_the_one_in_force(issued: Any, laboratory: Path) -> None:
+    """Three certificates of one run were in force at once, without a word."""
+    with Database(issued.db, read_only=True) as db:
+
+        def said(run: int, **more: Any) -> tuple[str, ...]:
+            request = CertificateRequest("five-days", run, laboratory=laboratory, **more)
+            return _in_force(db, request, [Measured(run, "as found")])
+
+        assert said(18) == said(20, replaces="2026-0001", reason="wrong customer") == ()
+        assert said(20) == (
+            "of the same runs of five-days certificate 2026-0001 is in force: withdraw it, or amend it instead of "
+            "issuing another",
+        )

@@ -10,12 +10,14 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Campaign
 from monitor.store import (
     Database,
+    certificates_in_force,
     find_certificate,
     import_campaign,
     list_certificates,
     load_certificate,
     mark_certificate,
     save_certificate,
+    withdraw_campaign,
 )
 from monitor.store.certificates import certificate_faults
 
@@ -108,3 +110,25 @@ def test_chain_shows_what_was_altered(db: Database, campaign: Campaign, sql: str
     assert certificate_faults(db) == ()
     db.execute(sql)
     assert any(fault in found for found in certificate_faults(db))
+
+
+@pytest.mark.parametrize("reason", ["-", " ", "...", "1"])
+def test_a_reason_is_said_in_words(db: Database, campaign: Campaign, reason: str) -> None:
+    """Of a withdrawal for "-" the certificate said ``campaign_withdrawn: -``, which reads as no."""
+    _issue(db, campaign, "C-1")
+    with pytest.raises(InputError, match="C-1 can be withdrawn only with a reason in words"):
+        mark_certificate(db, "C-1", "withdrawn", reason)
+    with pytest.raises(InputError, match="say why campaign"):
+        withdraw_campaign(db, campaign.name, reason)
+    with pytest.raises(InputError, match=r"the reason holds the character U\+202E, which nobody sees"):
+        mark_certificate(db, "C-1", "withdrawn", "wrong \u202ebar")
+
+
+def test_the_certificates_in_force_are_those_issued_and_neither_amended_nor_withdrawn(
+    db: Database, campaign: Campaign
+) -> None:
+    for number in ("C-1", "C-2", "C-3"):
+        _issue(db, campaign, number)
+    mark_certificate(db, "C-1", "amended", "a word", "C-2")
+    mark_certificate(db, "C-3", "withdrawn", "the bar was wrong")
+    assert [number for number, _ in certificates_in_force(db, campaign.name)] == ["C-2"]

@@ -56,3 +56,24 @@ def test_a_link_to_a_withdrawn_campaign_says_when_and_why(imported: Path, serve:
         assert page.status_code == 404
         assert re.search(r"any more: it was withdrawn on 20\d\d-\d\d-\d\d \(wrong piece\)", page.text), path
     assert "there is no campaign &#39;none&#39;; the page" in own.client.get("/campaign?name=none").text
+
+
+def test_an_approver_withdraws_a_campaign_on_its_page(imported: Path, serve: Any, tmp_path: Path) -> None:
+    """No page could, though the pages' document says so; "-" was a reason, which reads as none."""
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    own = serve(copy, False)
+    name = "hidden-spindle-growth"
+    assert f"withdraw {name}</button>" in own.client.get(f"/campaign?name={name}").text
+
+    def withdrawn(typed: str, reason: str) -> Any:
+        texts = {"campaign": name, "typed": typed, "reason": reason}
+        return own.sent("/campaign/withdraw", data={"proof": own.proof(), **texts})
+
+    assert "type the name of the campaign" in withdrawn("hidden", "wrong piece").text
+    assert "say why campaign hidden-spindle-growth is withdrawn" in withdrawn(name, "-").text
+    assert [row["campaign"] for row in own.ask("campaigns")[1]["campaigns"]] == [name, "load-cell"]
+    assert withdrawn(name, "wrong piece").status_code == 200
+    _, left = own.ask("campaigns")
+    assert [row["campaign"] for row in left["campaigns"]] == ["load-cell"]
+    assert [row["reason"] for row in left["withdrawn"]] == ["wrong piece"]

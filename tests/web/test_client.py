@@ -70,6 +70,8 @@ ASKED: list[tuple[str, Callable[[Path], dict[str, Any]]]] = [
     ("use model", lambda out: {"model": "samba", "machine": MACHINE, "reason": "as before"}),
     ("event", lambda out: {
         "machine": MACHINE, "text": "belt changed", "at": datetime(2026, 3, 1, 7, tzinfo=UTC), "kind": "repair"}),
+    ("events", lambda out: {"machine": MACHINE}),
+    ("withdraw event", lambda out: {"machine": MACHINE, "number": 1, "reason": "of another machine"}),
     ("trend", lambda out: {"machine": MACHINE, "parameter": "EB0C"}),
     ("periods", lambda out: {
         "machine": MACHINE, "earlier": Period(datetime(2026, 3, 2, tzinfo=UTC), datetime(2026, 3, 5, tzinfo=UTC)),

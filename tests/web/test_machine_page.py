@@ -16,10 +16,11 @@ import pytest
 from monitor.documents import from_document, to_document
 from monitor.store import Database, list_runs
 from monitor.web.charts.trend import groups_without_legend, trend_chart
-from monitor.web.pages.machine import _ends, _within
+from monitor.web.pages.shown_runs import ShownRuns
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.trend.answer import TrendAnswer
 from tests.web.test_pages import looked_at
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -71,11 +72,7 @@ def test_a_period_is_cut_of_the_history_as_the_database_cuts_it(local: Any) -> N
 def values_of_page(local: Any, since: str, until: str) -> Any:
     """What the page cuts of the whole history, as the interface would answer it."""
     _, whole = local.ask("values", {"machine": "HU40-T"})
-    return json.loads(
-        json.dumps(
-            to_document(_within(from_document(ValuesAnswer, whole), **_ends(since=since, until=until)))
-        )
-    )
+    return json.loads(json.dumps(to_document(ShownRuns(since, until).of(from_document(ValuesAnswer, whole)))))
 
 
 @pytest.fixture(scope="module")
@@ -150,3 +147,77 @@ def test_colours_that_come_twice_have_no_legend(local: Any) -> None:
     shown = trend_chart(many, "EXX", None, "campaign")
     assert {trace["showlegend"] for trace in shown.traces if "error_y" in trace} == {False}
     assert groups_without_legend(many, "EXX", "campaign") == len(values.run)
+
+
+def test_all_of_a_filtered_page_is_of_the_runs_that_it_shows(crashed: tuple[Any, datetime]) -> None:
+    """The file of its values had both campaigns and the latest value was of a day outside the period."""
+    served = crashed[0]
+    looked_at(served, "/machine?name=HU40-T")
+    chosen = "campaign=five-days&warm_up=warm&since=2026-03-03&until=2026-03-05"
+    text = looked_at(served, f"/machine?name=HU40-T&parameter=EB0C&{chosen}")
+    chart = json.loads(html.unescape(re.findall(r'class="figure">(.*?)</script>', text, re.DOTALL)[0]))
+    drawn = [time for trace in chart["data"] if "error_y" in trace for time in trace["x"]]
+    link = re.search(r'href="(/machine/values.csv[^"]+)"', text)
+    assert link is not None
+    rows = served.client.get(html.unescape(link[1])).text.splitlines()[1:]
+    assert [row.split(",")[0] for row in rows] == sorted(drawn)
+    assert len(rows) == 8
+    latest = re.search(r"<dt>Latest</dt><dd>(.*?)</dd>", text, re.DOTALL)
+    assert latest is not None
+    assert "2026-03-04" in latest[1]
+    later = re.search(r'data-later="([^"]+)"', text)
+    assert later is not None
+    assert all(part in html.unescape(later[1]) for part in chosen.split("&"))
+    _, none = served.ask("trend", {"machine": "HU40-T", "warm_up": True})
+    assert none["runs"] == 0
+    assert "among those that were chosen" in str(none["why"])
+
+
+def test_an_event_long_before_the_runs_is_asked_about_and_squeezes_no_chart(
+    imported: Path, serve: Any, tmp_path: Path
+) -> None:
+    """One of 1999 was recorded for ever, and pressed the runs of every chart into a line."""
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    own = serve(copy, False)
+    looked_at(own, "/machine?name=HU40-T")
+
+    def recorded(**more: str) -> Any:
+        texts = {"machine": "HU40-T", "text": "delivered", "kind": "repair", "at": "1999-03-05", **more}
+        return own.sent("/machine/event", data={"proof": own.proof(), **texts})
+
+    wordless = recorded(text="")
+    assert (wordless.status_code, 'value="1999-03-05"' in wordless.text) == (400, True)
+    assert "say in words what happened" in wordless.text
+    asked = recorded()
+    assert "lies more than a year before the first run of HU40-T" in html.unescape(asked.text)
+    assert 'name="before_runs"' in asked.text
+    recorded(before_runs="1")
+    page = looked_at(own, "/machine?name=HU40-T")
+    assert "1999-03-05: repair, delivered" in page
+    chart = json.loads(html.unescape(re.findall(r'class="figure">(.*?)</script>', page, re.DOTALL)[0]))
+    assert min(chart["layout"]["xaxis"]["range"]) > "2026"
+    assert "1999" not in json.dumps(chart["layout"]["shapes"])
+    number = re.search(r'name="number" value="(\d+)"', page)
+    assert number is not None
+    texts = {"machine": "HU40-T", "number": number[1], "reason": "of another machine"}
+    own.sent("/machine/event/withdraw", data={"proof": own.proof(), **texts})
+    assert "none recorded" in looked_at(own, "/machine?name=HU40-T")
+
+
+def test_a_forecast_of_no_slope_widens_no_chart(local: Any) -> None:
+    looked_at(local, "/machine?name=HU40-T")
+    _, whole = local.ask("values", {"machine": "HU40-T"})
+    _, followed = local.ask("trend", {"machine": "HU40-T", "parameter": "EXX"})
+    values, answer = from_document(ValuesAnswer, whole), from_document(TrendAnswer, followed)
+    statement = answer.parameters["EXX"]
+    last = max(values.started_at).isoformat()
+    ends = []
+    for p_value in (0.9, 0.001):
+        forecast = replace(statement.forecast, crosses_limit_at="2038-01-01T00:00:00-05:00", limit=9.0)
+        moved = replace(statement, forecast=forecast, drift=replace(statement.drift, p_value=p_value))
+        chart = trend_chart(values, "EXX", replace(answer, parameters={"EXX": moved}))
+        ends.append(max(chart.layout["xaxis"]["range"]))
+    span = max(values.started_at) - min(values.started_at)
+    assert last < ends[0] < (max(values.started_at) + span / 8).isoformat()
+    assert (max(values.started_at) + span).isoformat() < ends[1] < "2027"

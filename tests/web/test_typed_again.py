@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 
+from monitor.exceptions import InputError
 from monitor.web.laboratory_form import laboratory_file
+from monitor.web.pages.issuing import _document, _refused
 from tests.web.test_pages import looked_at
 
 CAMPAIGN = "hidden-spindle-growth"
@@ -160,3 +162,20 @@ def test_a_page_names_no_option_of_the_command_line(local: Any) -> None:
     assert "--week" not in looked_at(local, "/reports?week=2026-W99")
     assert "week 2026-W99: write a year and a week of it" in looked_at(local, "/reports?week=2026-W99")
     assert "last -1: how many entries" in local.client.get("/audit?last=-1").text
+
+
+def test_a_form_is_refused_in_its_own_words() -> None:
+    """It said that laboratory.toml was refused, and to write without quotes, of a file that nobody wrote."""
+    fault = "item.received_on is a date without quotes, for example 2026-03-02, but is 'x'"
+    outcome = _refused(InputError(f"/tmp/a/laboratory.toml was refused:\n  {fault}"), "/tmp/a")
+    assert outcome.refusal is not None
+    assert outcome.refusal.error == "these boxes were refused:"
+    assert outcome.refusal.faults == (fault.replace(" without quotes", ""),)
+    assert set(outcome.faults) == {"item.received_on"}
+
+
+@pytest.mark.parametrize("number", ["A" * 3000, "A\u202e1"])
+def test_a_preview_judges_the_number_as_an_issue_does(number: str) -> None:
+    with pytest.raises(InputError, match="is one line of at most") as refused:
+        _document({"campaign": CAMPAIGN, "number": number}, draft=True)
+    assert len(str(refused.value)) < 300

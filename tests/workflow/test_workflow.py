@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ import pytest
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import ChainMethod, methods
 from monitor.reporting.covariance_source import covariance_sentence
-from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow.events import EventRequest, event
+from monitor.store import Database, load_campaign, load_identification, machine_events, verify_audit
+from monitor.workflow.events import EventRequest, WithdrawEventRequest, event, withdraw as withdraw_event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
@@ -181,14 +182,41 @@ def test_events_need_words_and_a_machine(db: Database) -> None:
 
 
 def test_an_event_before_all_runs_is_recorded_with_a_word(tmp_path: Path) -> None:
-    """A mistyped year cannot be undone, and nothing was said."""
+    """An event of 1999 was recorded without a question, and could not be taken away."""
     with Database(tmp_path / "one.duckdb") as db:
         import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
-        early = event(db, EventRequest("HU40-T", "belt", datetime(1926, 3, 5, tzinfo=UTC), "repair"))
+        mistyped = EventRequest("HU40-T", "belt", datetime(1926, 3, 5, tzinfo=UTC), "repair")
+        with pytest.raises(InputError, match="lies more than a year before the first run of HU40-T"):
+            event(db, mistyped)
+        early = event(db, replace(mistyped, before_runs=True))
         assert early.notes[0].startswith("recorded, and it lies before the first run of HU40-T (20")
         late = event(db, EventRequest("HU40-T", "belt", datetime.now(UTC), "repair"))
         assert late.notes == ()
         assert len(late.events) == 2
+        for wordless in ("", "-"):
+            with pytest.raises(InputError, match="say in words why event 1 is withdrawn"):
+                withdraw_event(db, WithdrawEventRequest("HU40-T", 1, wordless))
+        left = withdraw_event(db, WithdrawEventRequest("HU40-T", 1, "the year was mistyped"))
+        assert [of.event_id for of in left.events] == [2]
+        assert [of.at for of in machine_events(db, "HU40-T")] == [
+            late.events[1].happened_at.replace(tzinfo=UTC)
+        ]
+        with pytest.raises(NotFoundError, match="has no event 1 that counts; it has 2"):
+            withdraw_event(db, WithdrawEventRequest("HU40-T", 1, "once more"))
+        assert db.rows("SELECT description, reason FROM v_withdrawn_events") == [
+            ("belt", "the year was mistyped")
+        ]
+        assert verify_audit(db).faults == ()
+        db.execute("UPDATE withdrawn_event SET reason = 'none'")
+        assert verify_audit(db).faults == ("withdrawn event 1 was altered after it was stored",)
+
+
+@pytest.mark.parametrize("text", ["\x07bell", "nul\x00", "\u202eturned"])
+def test_what_happened_is_said_in_letters_that_one_sees(text: str) -> None:
+    with pytest.raises(
+        InputError, match=r"what happened holds the character U\+[0-9A-F]{4}, which nobody sees"
+    ):
+        EventRequest("HU40-T", text, datetime(2026, 3, 4, tzinfo=UTC))
 
 
 @pytest.mark.slow

@@ -28,6 +28,19 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument("machine", metavar="MACHINE", help="a machine of the database, by its id")
     parser.add_argument("--parameter", metavar="P", help="one parameter only")
     parser.add_argument("--since", metavar="DATE", help="only runs from then on")
+    parser.add_argument("--until", metavar="DATE", help="only runs before then")
+    parser.add_argument("--method", metavar="NAME", help="only runs of this calibration method")
+    warmth = parser.add_mutually_exclusive_group()
+    warmth.add_argument(
+        "--warm", action="store_const", dest="warm_up", const=False, help="only runs of a warm machine"
+    )
+    warmth.add_argument(
+        "--warming-up",
+        action="store_const",
+        dest="warm_up",
+        const=True,
+        help="only runs of a machine that warms up",
+    )
     parser.add_argument("--next-check", metavar="DATE", help="when the machine is to be checked again")
     parser.add_argument(
         "--reliability", type=float, default=0.95, metavar="P",
@@ -72,6 +85,9 @@ def run(options: Namespace) -> int:
         volumetric_limit_um=options.volumetric_limit,
         figures=options.figures,
         weekly_looks=options.weekly_looks,
+        until=None if options.until is None else moment(options.until, "--until"),
+        method=options.method,
+        warm_up=options.warm_up,
     )
     with opened(options, judging=True) as db, output.working("following"):
         answer = ask(db, trend, request)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
@@ -29,6 +30,7 @@ def run(options: Namespace) -> int:
     output.say(answer.message)
     for number in answer.certificates:
         output.say(
-            f"certificate {number} rests on it: `monitor certificate amend {number}` or `withdraw {number}`"
+            f"certificate {number} rests on it: `monitor certificate amend {shlex.quote(number)}` or "
+            f"`withdraw {shlex.quote(number)}`"
         )
     return 0

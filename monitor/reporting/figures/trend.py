@@ -60,7 +60,12 @@ def parameter_over_time(
             at, level, width = (np.asarray(array, dtype=np.float64) for array in line)
             axes.plot(at, level, color=ORANGE, linewidth=1.4, label="drift since the last change", zorder=3)
             axes.fill_between(at, level - width, level + width, color=PALE, linewidth=0, zorder=1)
-        _changes_and_events(axes, changes, events or {})
+        # What happened long before or after would press the runs into a line.
+        begin, end = axes.get_xlim()
+        axes.set_xlim(begin, end)
+        _changes_and_events(
+            axes, changes, {day: text for day, text in (events or {}).items() if begin <= day <= end}
+        )
         for side in () if limit is None else (-limit, limit):
             reference_line(axes, side)
         # Days since 1970 are what matplotlib counts its dates in.

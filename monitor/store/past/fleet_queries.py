@@ -103,7 +103,7 @@ WHERE machine_no IN (SELECT machine_no FROM followed WHERE began_d <= ended_befo
 SINCE = f"""
 CREATE OR REPLACE TEMP TABLE fleet_since AS
 WITH happened AS (
-    SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM event JOIN fleet_machine USING (machine)
+    SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM v_events JOIN fleet_machine USING (machine)
     WHERE kind <> '{NOTE}'
 ), last AS (
     SELECT machine_no, max(began_d) AS last_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY machine_no

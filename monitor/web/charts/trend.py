@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 #: Expanded uncertainty of a run as it is drawn: k = 2.
 K = 2.0
+#: Beside the runs a chart shows this part of the time that they span; runs of one day span this time.
+MARGIN, LEAST_SPAN = 0.06, timedelta(hours=2)
+#: Probability of a slope by chance below which a forecast widens the chart.
+MOVING = 0.05
 #: By what the runs can be coloured.
 GROUPINGS = ("campaign", "method", "day", "warm-up")
 #: What is drawn before and after the only moment of a history.
@@ -37,7 +41,9 @@ def trend_chart(
     statement = None if trend is None else trend.parameters.get(parameter)
     conditions = _conditions(values)
     lowest = 0.34 if conditions else 0.0
+    begin, end = _shown_time(values, statement)
     lines = [] if trend is None else _lines(values, trend, statement)
+    lines = [line for line in lines if begin <= datetime.fromisoformat(line.at) <= end]
     if lines:
         shapes += [_upright(line) for line in lines]
         runs = Runs.of(
@@ -52,7 +58,12 @@ def trend_chart(
         "bars are ± U (k = 2)",
         traces=[*traces, *conditions],
         layout={
-            "xaxis": axis("", type="date", anchor="y2" if conditions else "y", **_range(traces, lines)),
+            "xaxis": axis(
+                "",
+                type="date",
+                anchor="y2" if conditions else "y",
+                range=[begin.isoformat(), end.isoformat()],
+            ),
             "yaxis": axis(f"{parameter} / {series.unit}", domain=[lowest, 1.0]),
             **({"yaxis2": axis(_shared_title(values), domain=[0.0, 0.26])} if conditions else {}),
             "shapes": shapes,
@@ -63,13 +74,23 @@ def trend_chart(
     )
 
 
-def _range(traces: Sequence[Trace], lines: Sequence[Line]) -> dict[str, Any]:
-    """The days around a single moment, which would be drawn on an axis of milliseconds; else nothing."""
-    moments = {at for trace in traces for at in trace["x"]} | {line.at for line in lines}
-    if len(moments) != 1:
-        return {}
-    at = datetime.fromisoformat(moments.pop())
-    return {"range": [(at + days * AROUND_ONE).isoformat() for days in (-1, 1)]}
+def _shown_time(values: ValuesAnswer, statement: ParameterTrend | None) -> tuple[datetime, datetime]:
+    """The time that a chart shows: that of the runs and as much of what follows as is told of it.
+
+    Events and forecasts far away would press the runs into a line; a double click on the chart shows all of them. The
+    slope of a forecast is told where chance makes as large a one in less than ``MOVING``.
+    """
+    begin, end = min(values.started_at), max(values.started_at)
+    if begin == end:
+        return begin - AROUND_ONE, end + AROUND_ONE
+    span = max(end - begin, LEAST_SPAN)
+    latest = end
+    if statement is not None and statement.forecast.crosses_limit_at is not None:
+        p_value = statement.drift.p_value
+        if p_value is not None and p_value < MOVING:
+            crosses_at = datetime.fromisoformat(_shop_time(values, statement.forecast.crosses_limit_at))
+            latest = max(end, min(crosses_at, end + span))
+    return begin - MARGIN * span, latest + MARGIN * span
 
 
 def _shop_time(values: ValuesAnswer, at: str) -> str:

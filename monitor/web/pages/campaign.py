@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, NotFoundError
 from monitor.web.charts.chart import Chart
 from monitor.web.charts.statistics import cloud_chart, correlation_chart, p_value_chart, region_chart
-from monitor.web.forms import whole_number
+from monitor.web.forms import asked_once, read_form, whole_number
 from monitor.web.rendering import page
 
 if TYPE_CHECKING:
@@ -75,6 +75,17 @@ def routes() -> APIRouter:
             region=region,
             trials=trials, waiting=waiting,
         )  # fmt: skip
+
+    @router.post("/campaign/withdraw")
+    async def withdraw(request: Request) -> Response:
+        """Let a campaign count no longer; of its certificates, which stay, the list says so."""
+        async with read_form(request) as form:
+            name, typed = form.text("campaign"), form.texts.get("typed", "")
+            document = {"campaign": name, "reason": form.texts.get("reason", "")}
+        if typed != name:
+            raise InputError(f"type the name of the campaign, '{name}', to withdraw it, not '{typed[:60]}'")
+        answer = await asked_once(request, form, "withdraw campaign", document)
+        return RedirectResponse("/certificates" if answer.certificates else "/campaigns", status_code=303)
 
     return router
 

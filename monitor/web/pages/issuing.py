@@ -34,6 +34,12 @@ from monitor.web.users import User
 FILE_BYTES = 2**20
 #: The file that the answers are kept in.
 FILE_NAME = "laboratory.toml"
+#: What refusals say of a file that nobody wrote, as the form says it.
+_WORDS_OF_FORM = {
+    f"{FILE_NAME} was refused:": "these boxes were refused:",
+    ", without quotes": "",
+    " without quotes": "",
+}
 #: What stands in the place of the number on a preview.
 PREVIEW = "preview {}"
 NO_RUN = "choose the run that is certified"
@@ -48,6 +54,7 @@ class _Outcome:
     held), or a ``refusal`` with what is wrong at each box."""
 
     number: str = ""
+    notes: tuple[str, ...] = ()
     preview: bytes = b""
     has_preview: bool = False
     refusal: Refusal | None = None
@@ -175,10 +182,10 @@ def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder:
                 user, question, document, {"laboratory": laboratory, "out": Path(folder)}, storing=not draft
             )
             if draft:
-                return _Outcome(preview=Path(answer.file).read_bytes())
+                return _Outcome(preview=Path(answer.file).read_bytes(), notes=answer.notes or ())
         except MonitorError as error:
             return _refused(error, folder)
-        return _Outcome(number=answer.certificate.number)
+        return _Outcome(number=answer.certificate.number, notes=answer.notes or ())
 
 
 def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
@@ -194,6 +201,11 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
     document["accept"] = {kind: reason for kind, reason in accepted.items() if reason}
     document["with_map"] = bool(texts.get("with_map"))
     if draft:
+        if texts.get("number"):
+            # A preview has a number of its own; that of the form is judged as it will be.
+            from monitor.workflow.certificate.orders import check_written
+
+            check_written(texts["number"])
         return {**document, "draft": True, "number": PREVIEW.format(campaign)[:60]}
     if texts.get("replaces"):
         return {**document, "replaces": texts["replaces"], "reason": texts.get("reason", "")}
@@ -204,7 +216,7 @@ def _refused(error: MonitorError, folder: str) -> _Outcome:
     """The refusal in words, and at every box that it names what is missing there."""
     if isinstance(error, RefusedGroundsError):
         return _refused_by_grounds(error)
-    refusal = refusal_of(error, {f"{folder}/": ""} if folder else {})
+    refusal = refusal_of(error, {**({f"{folder}/": ""} if folder else {}), **_WORDS_OF_FORM})
     lines = [line.strip() for line in refusal.error.splitlines()]
     faults: dict[str, str] = {}
     if isinstance(error, IncompleteCertificateError):

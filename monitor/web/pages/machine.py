@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
-from datetime import UTC, date, datetime, time, timedelta
+from datetime import date, timedelta
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -19,9 +18,10 @@ from monitor.web.charts.trend import GROUPINGS, groups_without_legend, trend_cha
 from monitor.web.days import as_iso, typed_moment
 from monitor.web.desk import Desk
 from monitor.web.faults import refusal_of
-from monitor.web.forms import asked_once, read_form
+from monitor.web.forms import Form, asked_once, read_form, whole_number
 from monitor.web.pages.fleet import ASKED as FLEET
 from monitor.web.pages.refused import RefusedForm, led_back, led_back_to_the_form, refused_form
+from monitor.web.pages.shown_runs import WARMTHS, ShownRuns
 from monitor.web.rendering import page
 from monitor.web.sending import attachment
 from monitor.web.ticket import Ticket
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from monitor.workflow.history.values import ValuesAnswer
     from monitor.workflow.trend.answer import TrendAnswer
 
-#: Which runs are shown: all, those of a warm machine, those of one that warms up.
-WARMTHS = ("", "warm", "warming up")
 #: So long the script's question for the table of all parameters is held before it has to ask again.
 FETCH_S = 20.0
 #: The ends of two periods as their boxes call them.
@@ -58,8 +56,8 @@ def routes() -> APIRouter:
         ask, user = request.app.state.asker, request.state.user
         if colour not in GROUPINGS:
             raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
-        period = as_iso(since=since, until=until)
-        trends = _Trends(request, _asked(name, period["since"], campaign), parameter)
+        shown_runs = ShownRuns.typed(since, until, campaign, method, warm_up)
+        trends = _Trends(request, shown_runs.trend_document(name), parameter)
         # The whole history, of which a period is cut: it is read once and held for every period that is looked at.
         values: ValuesAnswer = ask(user, "values", {"machine": name})
         is_unidentified = (
@@ -70,13 +68,13 @@ def routes() -> APIRouter:
         if is_unidentified and trends.of_all() is not None:
             # The trend has identified what nobody had identified before: both are then of one version.
             values = ask(user, "values", {"machine": name})
-        values = _within(values, **_ends(**period))
-        methods = sorted(set(values.method))
-        values = _chosen(values, campaign, method, warm_up)
+        methods = sorted(set(shown_runs.within(values).method))
+        values = shown_runs.of(values)
         names = list(values.parameters)
         _check_names(values, parameter, campaign, may_lack=trends.waiting is not None)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
         listed = ask(user, "campaigns", {"machine": name})
+        events = ask(user, "events", {"machine": name}).events
         trend = trends.shown(shown)
         all_trends = trends.of_all() if every else trends.of_all_already()
         form = refused_form(request, request.query_params.get("refused", ""))
@@ -88,9 +86,8 @@ def routes() -> APIRouter:
             season_not_told=SEASON_NOT_TOLD, drift_or_season=DRIFT_OR_SEASON,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             unlisted=groups_without_legend(values, shown, colour), groupings=GROUPINGS,
-            colour=colour, since=period["since"], until=period["until"], campaign=campaign,
-            campaigns=listed.campaigns, copied=listed.copied, noted=listed.noted, kinds=KINDS,
-            methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up, refused=form,
+            colour=colour, shown_runs=shown_runs, campaigns=listed.campaigns, copied=listed.copied,
+            noted=listed.noted, events=events, kinds=KINDS, methods=methods, warmths=WARMTHS, refused=form,
         )  # fmt: skip
 
     router.get("/machine/values.csv")(_values_csv)
@@ -102,8 +99,8 @@ def routes() -> APIRouter:
         """Record what happened to a machine."""
         async with read_form(request) as form:
             machine = form.text("machine")
-            document = {"machine": machine, "text": form.text("text"), **form.filled("kind")}
         try:
+            document = {"machine": machine, **_event_document(form)}
             at = typed_moment("when it happened", form.text("at"))
             await asked_once(request, form, "event", {**document, "at": at.isoformat()})
         except NotFoundError:
@@ -114,22 +111,45 @@ def routes() -> APIRouter:
             return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
         return led_back(request, "/machine", {"name": machine}, "events")
 
+    @router.post("/machine/event/withdraw")
+    async def withdraw_event(request: Request) -> Response:
+        """Let an event count no longer."""
+        async with read_form(request) as form:
+            machine, number = form.text("machine"), whole_number("number", form.text("number"))
+        document = {"machine": machine, "number": number, "reason": form.texts.get("reason", "")}
+        await asked_once(request, form, "withdraw event", document)
+        return led_back(request, "/machine", {"name": machine}, "events")
+
     return router
 
 
-def _values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
-    """Send the values of a machine, a row a run, units in the column names."""
-    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", _period(name, since, until))
-    return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
+def _event_document(form: Form) -> dict[str, Any]:
+    """What the form says of an event besides its moment. Raises InputError for one without words."""
+    if not form.texts.get("text"):
+        raise InputError("say in words what happened, for example 'B axis encoder changed'")
+    confirmed = {"before_runs": True} if form.texts.get("before_runs") else {}
+    return {"text": form.text("text"), **form.filled("kind"), **confirmed}
+
+
+def _values_csv(
+    request: Request, name: str,
+    since: str = "", until: str = "", campaign: str = "", method: str = "", warm_up: str = "",
+) -> Response:  # fmt: skip
+    """Send the values of the runs that the page shows, a row a run, units in the column names."""
+    shown_runs = ShownRuns.typed(since, until, campaign, method, warm_up)
+    values: ValuesAnswer = request.app.state.asker(request.state.user, "values", {"machine": name})
+    return attachment(f"{name}.csv", _csv(shown_runs.of(values)).encode("utf-8"))
 
 
 async def _table_of_all(
-    request: Request, name: str, parameter: str = "", since: str = "", campaign: str = ""
-) -> Response:
+    request: Request, name: str, parameter: str = "",
+    since: str = "", until: str = "", campaign: str = "", method: str = "", warm_up: str = "",
+) -> Response:  # fmt: skip
     """Send the table of all parameters, which the page asks for when it is scrolled to; 202 until it is there, 409
     where somebody took the question back."""
     desk: Desk = request.app.state.desk
-    ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", _asked(name, since, campaign))
+    shown_runs = ShownRuns.typed(since, until, campaign, method, warm_up)
+    ticket = await run_in_threadpool(desk.ask, request.state.user, "trend", shown_runs.trend_document(name))
     await ticket.settled(FETCH_S)
     if ticket.is_taken_back:
         return JSONResponse({}, 409)
@@ -138,8 +158,7 @@ async def _table_of_all(
     values = await run_in_threadpool(request.app.state.asker, request.state.user, "values", {"machine": name})
     return page(
         request, "parameters.html",
-        topology=values.topology, name=name, parameter=parameter, since=since, until="", campaign=campaign,
-        every=ticket.answer(),
+        topology=values.topology, name=name, parameter=parameter, shown_runs=shown_runs, every=ticket.answer(),
     )  # fmt: skip
 
 
@@ -237,15 +256,6 @@ def _check_names(values: ValuesAnswer, parameter: str, campaign: str, *, may_lac
         )
 
 
-def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
-    document: dict[str, Any] = {"machine": name}
-    if since:
-        document["since"] = f"{since}T00:00:00Z"
-    if campaign:
-        document["campaigns"] = [campaign]
-    return document
-
-
 def _typed_ends(typed: dict[str, str]) -> tuple[dict[str, str], list[str]]:
     """The ends of two periods as ISO 8601 writes them, empty where none can be read; and what is wrong, by its box."""
     ends, faults = dict.fromkeys(typed, ""), []
@@ -272,67 +282,6 @@ def _whole_days(of: str, since: str, until: str) -> dict[str, str]:
     except OverflowError as error:
         raise InputError(f"no calendar has a day after {last}") from error
     return {"since": f"{first}T00:00:00Z", "until": f"{end}T00:00:00Z"}
-
-
-def _period(name: str, since: str, until: str) -> dict[str, Any]:
-    ends = as_iso(since=since, until=until)
-    return {"machine": name, **{key: f"{day}T00:00:00Z" for key, day in ends.items() if day}}
-
-
-def _ends(**days: str) -> dict[str, datetime]:
-    """The ends of a period that are named, as ISO 8601 writes them."""
-    return {name: datetime.combine(date.fromisoformat(day), time(), UTC) for name, day in days.items() if day}
-
-
-def _within(
-    values: ValuesAnswer, since: datetime | None = None, until: datetime | None = None
-) -> ValuesAnswer:
-    """The runs from the beginning of a day until the beginning of another."""
-    rows = [
-        row
-        for row, at in enumerate(values.started_at)
-        if (since is None or at >= since) and (until is None or at < until)
-    ]
-    return _of_rows(values, rows)
-
-
-def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> ValuesAnswer:
-    """The runs of one campaign, one method, warm or warming up alone; all parameters and conditions that they have."""
-    if warm_up not in WARMTHS:
-        raise InputError(f"runs are shown {', '.join(word for word in WARMTHS if word)}, not '{warm_up}'")
-    rows = [
-        row
-        for row, warming in enumerate(values.warm_up)
-        if campaign in ("", values.campaign[row])
-        and method in ("", values.method[row])
-        and warm_up in ("", WARMTHS[2 if warming else 1])
-    ]
-    return _of_rows(values, rows)
-
-
-def _of_rows(values: ValuesAnswer, rows: list[int]) -> ValuesAnswer:
-    """Some of the runs, with the parameters and conditions that any of them has."""
-    if len(rows) == len(values.run):
-        return values
-
-    def taken(column: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(column[row] for row in rows)
-
-    return replace(
-        values,
-        started_at=taken(values.started_at), campaign=taken(values.campaign), method=taken(values.method),
-        run=taken(values.run), day=taken(values.day), warm_up=taken(values.warm_up),
-        parameters={
-            name: replace(series, values=taken(series.values), u=taken(series.u))
-            for name, series in values.parameters.items()
-            if any(value is not None for value in taken(series.values))
-        },
-        conditions={
-            name: taken(column)
-            for name, column in values.conditions.items()
-            if any(value is not None for value in taken(column))
-        },
-    )  # fmt: skip
 
 
 def _most_urgent(request: Request, name: str, names: list[str]) -> str:

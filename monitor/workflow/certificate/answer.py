@@ -44,7 +44,8 @@ class CertificatesAnswer:
 
 @dataclass(frozen=True)
 class CertificateFileAnswer:
-    """A certificate's state and the file that was written; ``notes`` name what the laboratory's file says in vain."""
+    """A certificate's state and the file that was written; ``notes`` name other certificates of
+    the same runs that are in force, and what the laboratory's file says in vain."""
 
     certificate: CertificateState = field(metadata=INLINED)
     file: str

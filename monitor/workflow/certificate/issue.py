@@ -26,6 +26,7 @@ from monitor.reporting.signature.signing import sign, signer_of
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
 from monitor.store import (
     Database,
+    certificates_in_force,
     last_anchor,
     load_certificate,
     mark_certificate,
@@ -45,6 +46,7 @@ from monitor.workflow.certificate.files import finish_left, keep_issued, path_of
 from monitor.workflow.certificate.grounds import grounds_against, judged_grounds
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
+    Measured,
     check_adjustment,
     check_day,
     check_number,
@@ -81,6 +83,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     replaced = None
     if request.replaces is not None:
         replaced = replaced_by(db, request.replaces, request.reason, request.draft, campaign)
+    in_force = _in_force(db, request, measured)
     keep_issued(db, path_of(request.out, request.number or next_number(db, day.year)))
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     stored = {run.run: stored_uncertainty(db, campaign, run.run, model, request.asked) for run in measured}
@@ -115,14 +118,25 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
             refused, missing_items(recorded(request.number or next_number(db, day.year)))
         )
     written = _numbered(db, request, recorded, inputs, day.year)
-    return dataclasses.replace(written, notes=_not_printed(request, stated))
+    return dataclasses.replace(written, notes=(*in_force, *_not_printed(request, stated)) or None)
 
 
-def _not_printed(request: CertificateRequest, stated: LaboratoryFile) -> tuple[str, ...] | None:
+def _in_force(db: Database, request: CertificateRequest, measured: Sequence[Measured]) -> tuple[str, ...]:
+    """Which certificates of the same runs are in force besides the one that is amended."""
+    runs = {of.run for of in measured}
+    numbers = [
+        number
+        for number, certified in certificates_in_force(db, request.campaign)
+        if certified & runs and number not in (request.replaces, request.number)
+    ]
+    return (messages.certificates_in_force(request.campaign, numbers),) if numbers else ()
+
+
+def _not_printed(request: CertificateRequest, stated: LaboratoryFile) -> tuple[str, ...]:
     """What the laboratory says of conformity, where a statement by a rule stands in its place."""
     said = stated.conformity
     if request.conformity is None or said is None:
-        return None
+        return ()
     if isinstance(said, NotApplicable):
         return (messages.conformity_asked_for_after_all(request.conformity, said.statement),)
     return (messages.conformity_replaced(request.conformity, said),)

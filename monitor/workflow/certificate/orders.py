@@ -10,6 +10,7 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import NotApplicable, Replaced
+from monitor.said import reason as said_reason
 from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
 from monitor.workflow.certificate.inputs import MadeWith
 
@@ -39,15 +40,20 @@ def next_number(db: Database, year: int) -> str:
     return f"{year}-{last + 1:04d}"
 
 
-def check_number(db: Database, number: str) -> None:
-    """Before anything is computed: a number is a line of text, and is used once. Raises InputError."""
+def check_written(number: str) -> None:
+    """Raise InputError for a number that is no line of visible letters."""
     if not number.strip():
         raise InputError("the number of a certificate is not blank; leave --number out for the next free one")
     if number != number.strip() or not number.isprintable() or len(number) > _LONGEST_NUMBER:
         raise InputError(
             f"the number of a certificate is one line of at most {_LONGEST_NUMBER} visible letters without blanks "
-            f"around it, not {number!r}"
+            f"around it, not {number[:_LONGEST_NUMBER]!r}{'...' if len(number) > _LONGEST_NUMBER else ''}"
         )
+
+
+def check_number(db: Database, number: str) -> None:
+    """Before anything is computed: a number is a line of text, and is used once. Raises InputError."""
+    check_written(number)
     try:
         old = load_certificate(db, number)
     except NotFoundError:
@@ -119,15 +125,14 @@ def replaced_by(db: Database, number: str, reason: str, draft: bool, campaign: C
         raise InputError(f"certificate {number} is {old.state}; only an issued one can be replaced")
     if draft:
         raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
-    if not reason.strip():
-        raise InputError(f"say why certificate {number} is replaced: --reason TEXT")
+    reason = said_reason(reason, f"say why certificate {number} is replaced: --reason TEXT")
     if old.machine != campaign.machine.id:
         raise InputError(
             f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {old.machine}: "
             "it cannot replace it"
         )
     issued_on = date.fromisoformat(str(old.record["issued_on"]))
-    return Replaced(number, issued_on, reason.strip(), old.pdf_sha256)
+    return Replaced(number, issued_on, reason, old.pdf_sha256)
 
 
 def runs_of(old: StoredCertificate) -> tuple[int | None, int | None]:

@@ -15,7 +15,8 @@ from monitor.workflow.moments import at_machine, check_period
 class TrendRequest:
     """Follow the parameters of a machine; moments without an offset from UTC are by the clock of the shop.
 
-    ``parameter`` alone, runs from ``since`` on, of the ``campaigns`` (empty: all), under a ``model`` (by default the
+    ``parameter`` alone, runs from ``since`` on and before ``until``, of the ``campaigns`` (empty: all), of a ``method``
+    (None: every one), those that ``warm_up`` alone or (False) the others alone, under a ``model`` (by default the
     method's own). The control charts compare with a ``reference`` period (by default the first third). ``reliability``
     is the wanted probability of being in tolerance until the ``next_check``; ``volumetric_limit_um`` takes the place of
     the machine file's. ``figures`` are drawn into a folder. ``weekly_looks`` adds what looks at the whole fleet
@@ -33,8 +34,12 @@ class TrendRequest:
     volumetric_limit_um: float | None = None
     figures: Path | None = None
     weekly_looks: bool = False
+    until: datetime | None = None
+    method: str | None = None
+    warm_up: bool | None = None
 
     def __post_init__(self) -> None:
+        check_period(self.since, self.until)
         check_period(*(self.reference or (None, None)))
         if not 0.0 < self.reliability < 1.0:
             raise InputError(f"--reliability {self.reliability:g}: a probability lies between 0 and 1")
@@ -53,6 +58,7 @@ class TrendRequest:
         return replace(
             self,
             since=at_machine(db, self.machine, self.since),
+            until=at_machine(db, self.machine, self.until),
             next_check=at_machine(db, self.machine, self.next_check),
             reference=reference,
         )

@@ -130,7 +130,7 @@ def _history(db: Database, request: TrendRequest) -> tuple[MachineHistory, dict[
     numbered = numbered_by(db, machine)
     if is_new or numbered != by:
         history = read(numbered)
-    history = selected_campaigns(history, request.campaigns)
+    history = _shown(selected_campaigns(history, request.campaigns), request)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
         every = history.parameters
         hint = did_you_mean(request.parameter, every)
@@ -138,6 +138,18 @@ def _history(db: Database, request: TrendRequest) -> tuple[MachineHistory, dict[
             f"machine {machine} has no parameter {request.parameter!r}; {hint}it has {', '.join(every) or 'none yet'}"
         )
     return history, refused
+
+
+def _shown(history: MachineHistory, request: TrendRequest) -> MachineHistory:
+    """The runs before the end of the period, of a method, that warm up or do not, as far as these are asked for."""
+    is_shown = np.ones(len(history.run), dtype=np.bool_)
+    if request.until is not None:
+        is_shown &= history.seconds < request.until.timestamp()
+    if request.method is not None:
+        is_shown &= history.method == request.method
+    if request.warm_up is not None:
+        is_shown &= history.warm_up == request.warm_up
+    return history.part(is_shown)
 
 
 def _answer(
@@ -271,7 +283,10 @@ def _of_older_version(db: Database, request: TrendRequest) -> list[str]:
 
 
 def _why_none(request: TrendRequest) -> str:
-    return messages.no_identified_run(request.machine, request.campaigns, request.since)
+    is_narrowed = (request.until, request.method, request.warm_up) != (None, None, None)
+    return messages.no_identified_run(
+        request.machine, request.campaigns, request.since, is_narrowed=is_narrowed
+    )
 
 
 def _next_check(history: MachineHistory, request: TrendRequest) -> float:
