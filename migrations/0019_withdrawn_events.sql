@@ -2,7 +2,7 @@
 -- `v_events`, and all that reads events, leave them out. An entry of the audit holds whole rows of `event`, which so
 -- gets no further column.
 
-CREATE TABLE withdrawn_event (
+CREATE TABLE IF NOT EXISTS withdrawn_event (
     event_id INTEGER PRIMARY KEY,
     reason VARCHAR NOT NULL,
     software_version VARCHAR NOT NULL,
@@ -29,7 +29,7 @@ COMMENT ON COLUMN v_events.kind IS 'What kind of event (no unit)';
 COMMENT ON COLUMN v_events.description IS 'What happened (no unit)';
 COMMENT ON COLUMN v_events.recorded_at IS 'When it was recorded (UTC)';
 
-CREATE VIEW v_withdrawn_events AS
+CREATE OR REPLACE VIEW v_withdrawn_events AS
 SELECT e.machine, e.happened_at, e.kind, e.description, e.recorded_at, w.withdrawn_at, w.reason, w.event_id
 FROM withdrawn_event AS w JOIN event AS e USING (event_id)
 ORDER BY w.withdrawn_at, w.event_id;
