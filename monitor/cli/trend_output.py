@@ -193,16 +193,16 @@ def _table(answer: TrendAnswer) -> None:
 def _freedoms(answer: TrendAnswer) -> str:
     """By what the u of the latest means is known, with its degrees of freedom."""
     means = (parameter.mean for parameter in answer.parameters.values())
-    known = [mean for mean in means if mean.latest_degrees_of_freedom is not None]
-    if not known:
+    with_freedoms = [mean for mean in means if mean.latest_degrees_of_freedom is not None]
+    if not with_freedoms:
         return ""
     freedoms = sorted(
-        mean.few_degrees_of_freedom for mean in known if mean.few_degrees_of_freedom is not None
+        mean.few_degrees_of_freedom for mean in with_freedoms if mean.few_degrees_of_freedom is not None
     )
     if not freedoms:
         return ", u by the scatter of runs within days"
     few = freedoms[0]
-    more = "" if few == freedoms[-1] and len(freedoms) == len(known) else " or more"
+    more = "" if few == freedoms[-1] and len(freedoms) == len(with_freedoms) else " or more"
     return f", u by the scatter of runs within days ({few} degree{'' if few == 1 else 's'} of freedom{more})"
 
 

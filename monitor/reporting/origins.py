@@ -18,6 +18,10 @@ class ForecastMethod(StrEnum):
     )
 
 
+#: By what a parameter that is out of tolerance is to be checked at once.
+OUT_OF_TOLERANCE = "the latest runs are out of tolerance"
+
+
 class TimeSource(StrEnum):
     """Where the time of a probing and of an indexation comes from."""
 

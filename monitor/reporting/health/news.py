@@ -236,7 +236,7 @@ _CHECKS: Mapping[CheckKind, str] = {
     CheckKind.NO_RUN_YET: "now: no run yet",
     CheckKind.FIRST_RUN: "its first run",
     CheckKind.ONE_DAY: "now: the latest day alone shows the step of {parameter}",
-    CheckKind.ONE_DAY_NO_TOLERANCE: "now: the latest day alone shows the step of {parameter}",
+    CheckKind.ONE_DAY_NO_TOLERANCE: "now: the latest day alone shows the step of {parameter}; no tolerances are stated",
     CheckKind.NO_TOLERANCE: "no forecast: the campaign states no tolerances",
     CheckKind.NO_FORECAST: "no forecast: fewer than three days since the last change",
     CheckKind.SHORT_HISTORY: "next week: {span:.0f} days of history allow no longer forecast",

@@ -53,12 +53,12 @@ def latest_day(t: Array, means: Array, more: float = 0.0) -> LatestDay | None:
         return None
     time = (t - t.mean()) / np.ptp(t)
     every = [
-        found
+        apart_by
         for base in (np.ones((days, 1)), np.column_stack([np.ones(days), time]))
-        for found in _by_correlations(np.diff(t), base, means, more)
+        for apart_by in _by_correlations(np.diff(t), base, means, more)
     ]
-    least = max(every, key=lambda found: found.p_value)
-    return replace(least, times_others=min(found.times_others for found in every))
+    least = max(every, key=lambda apart_by: apart_by.p_value)
+    return replace(least, times_others=min(apart_by.times_others for apart_by in every))
 
 
 def _by_correlations(apart: Array, base: Array, means: Array, more: float) -> list[LatestDay]:
@@ -67,7 +67,7 @@ def _by_correlations(apart: Array, base: Array, means: Array, more: float) -> li
     judged = [_beside(rho ** np.maximum(steps, 1e-3) if rho else np.zeros_like(steps), base, means, more)
               for rho in _CORRELATIONS]  # fmt: skip
     best = max(likelihood for likelihood, _ in judged)
-    return [found for likelihood, found in judged if likelihood >= best - _REFUTED]
+    return [apart_by for likelihood, apart_by in judged if likelihood >= best - _REFUTED]
 
 
 def _beside(
@@ -82,9 +82,9 @@ def _beside(
     before, latest = white[:-1], white[-1]
     q, r = np.linalg.qr(before[:, :-1])
     y = before[:, -1]
-    left = y - q @ (q.T @ y)
+    unexplained = y - q @ (q.T @ y)
     dof = len(y) - r.shape[1]
-    variance = float(left @ left) / dof
+    variance = float(unexplained @ unexplained) / dof
     likelihood = -0.5 * dof * np.log(variance) - np.log(alone[:-1]).sum() - np.log(np.abs(np.diag(r))).sum()
     coefficients = np.linalg.solve(r, q.T @ y)
     reach = np.linalg.solve(r.T, latest[:-1])
@@ -93,4 +93,4 @@ def _beside(
     size = off * float(alone[-1])
     u = float(np.sqrt(variance * (1.0 + reach @ reach) * alone[-1] ** 2 + more))
     p_value = float(2.0 * scipy.special.stdtr(dof, -abs(size) / u))
-    return float(likelihood), LatestDay(size, u, p_value, abs(off) / float(np.abs(left).max()))
+    return float(likelihood), LatestDay(size, u, p_value, abs(off) / float(np.abs(unexplained).max()))

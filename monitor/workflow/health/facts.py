@@ -35,7 +35,7 @@ from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
-from monitor.workflow.history.other_instruments import between_instruments
+from monitor.workflow.history.other_instruments import OtherInstruments, between_instruments
 from monitor.workflow.history.past import ParameterPast, splitting_events
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -119,29 +119,10 @@ def changes_noted(
 ) -> list[Change]:
     """Everything that changed, the latest first; ``runs`` are those of the campaign that was explained."""
     moments = splitting_events(events)
-    noted, between = [], between_instruments(history, past, moments)
+    noted: list[Change] = []
+    between = between_instruments(history, past, moments)
     for parameter in past.values():
-        still_open = not_put_right(parameter.search.changes)
-        for change in parameter.search.changes:
-            at = moment_of(change.at, parameter.series)
-            after = moment_of(change.interval[0], parameter.series)
-            others, unit = between.get(change), parameter.series.unit
-            besides = [] if others is None else [others.in_words(unit)]
-            if parameter.is_of_latest_day(change):
-                besides.append(ONE_DAY)
-            what = ParameterChanged(
-                change.parameter, change.kind, change.size, change.u, unit, "; ".join(besides)
-            )
-            is_open = (
-                change in still_open
-                and not week.holds(at)
-                and week.begins - at <= OPEN_FOR
-                and not any(event >= change.interval[0] for event in moments)
-                and not (others is not None and others.may_be_all)
-            )
-            noted.append(
-                Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at), is_open or None)
-            )
+        noted += _found_changes(parameter, moments, between, week)
         noted += _settling(parameter, week)
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
@@ -154,6 +135,31 @@ def changes_noted(
             noted.append(Change(ChangeKind.CHANGE, None, at, moved, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)
+
+
+def _found_changes(
+    parameter: ParameterPast,
+    events: Sequence[float],
+    between: Mapping[FoundChange, OtherInstruments],
+    week: Week,
+) -> Iterator[Change]:
+    """Yield the changes of a parameter that the search found."""
+    remaining = not_put_right(parameter.search.changes)
+    for change in parameter.search.changes:
+        at = moment_of(change.at, parameter.series)
+        after = moment_of(change.interval[0], parameter.series)
+        others, unit = between.get(change), parameter.series.unit
+        besides = [] if others is None else [others.in_words(unit)]
+        if parameter.is_of_latest_day(change):
+            besides.append(ONE_DAY)
+        what = ParameterChanged(
+            change.parameter, change.kind, change.size, change.u, unit, "; ".join(besides)
+        )
+        is_explained = any(event >= change.interval[0] for event in events) or (
+            others is not None and others.may_be_all
+        )
+        is_open = change in remaining and not is_explained and timedelta() < week.begins - at <= OPEN_FOR
+        yield Change(ChangeKind.CHANGE, after, at, what, change.p_value, week.holds(at), is_open or None)
 
 
 def not_put_right(changes: Sequence[FoundChange]) -> list[FoundChange]:

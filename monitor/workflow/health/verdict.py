@@ -239,11 +239,12 @@ def state_of(
         return State.MAY_BE_OUT_OF_TOLERANCE
     if not evaluated:
         return State.NOT_EVALUATED
-    if any(change.kind is ChangeKind.CHANGE and change.this_week for change in noted):
+    counting = [change for change in noted if change.counts]
+    if any(change.this_week for change in counting):
         return State.CHANGED
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
         return State.MODEL_FAILS
-    if any(change.counts for change in noted):
+    if counting:
         return State.CHANGED
     if drifts:
         return State.DRIFTS

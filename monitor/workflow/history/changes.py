@@ -193,14 +193,14 @@ def _latest_step(piece: Series, level: float) -> Change | None:
     if alike.day_count >= FEWEST_DAYS - 1:
         before = alike
     (t, y, _, _), (t_last, y_last, _, begins) = day_means(before), day_means(latest)
-    found = latest_day(
+    stands_out = latest_day(
         np.append(t, t_last.mean()), np.append(y, y_last.mean()), _more_than_before(latest, before)
     )
-    if found is None or not found.p_value < level or found.times_others < FAR:
+    if stands_out is None or not stands_out.p_value < level or stands_out.times_others < FAR:
         return None
     at = float(begins.min())
     between = (float(piece.t[~last].max(initial=-np.inf)), at)
-    return Change(piece.name, "step", 0, at, between, found.size, found.u, found.p_value)
+    return Change(piece.name, "step", 0, at, between, stands_out.size, stands_out.u, stands_out.p_value)
 
 
 def _more_than_before(latest: Series, before: Series) -> float:

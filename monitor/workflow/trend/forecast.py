@@ -8,7 +8,7 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Cause, Lack, Part, refused
-from monitor.reporting.origins import ForecastMethod
+from monitor.reporting.origins import OUT_OF_TOLERANCE, ForecastMethod
 from monitor.statistics import Trend, backtest, predict
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
@@ -17,8 +17,6 @@ from monitor.workflow.history.forecast import crossing_dates, drift_forecast, pr
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import ForecastStart, ForecastTest, LimitForecast
 
-#: By what a parameter that is out of tolerance is to be checked at once.
-OUT_OF_TOLERANCE = "the latest runs are out of tolerance"
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
 #: Days foretold at most, evenly spread: of five years of weeks all of them would be most of the time of a page.
@@ -67,10 +65,10 @@ def _out_of_tolerance(
     """The forecast of a parameter whose ``latest`` mean is beyond its limit: it is to be checked at once, whatever its
     line foretells, and a run at the next ``check`` is in tolerance at most as surely as from that level on."""
     assert none.limit is not None
-    now = replace(none, recommended_interval_days=0.0, recommended_by=OUT_OF_TOLERANCE)
+    at_once = replace(none, recommended_interval_days=0.0, recommended_by=OUT_OF_TOLERANCE)
     of_drift = drift_forecast(drift, none.limit, check, reliability)
     if of_drift is None or of_drift.ahead is None or drift.stated is None:
-        return replace(now, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
+        return replace(at_once, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
     line, inside = of_drift.line, float(of_drift.ahead.probability[0])
     higher = latest - float(predict(line, of_drift.origin)[0])
     from_latest = probability_inside(
@@ -80,7 +78,7 @@ def _out_of_tolerance(
     if none.beyond_since is None:
         at, interval = crossing_dates(of_drift.ahead.crossing, of_drift.ahead.horizon, of_drift.offset)
     return replace(
-        now,
+        at_once,
         crosses_limit_at=at,
         crosses_limit_interval=interval,
         in_tolerance_at_next_check=min(inside, from_latest),
