@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 import threading
 from datetime import date
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from monitor.web.pages.fleet import _advises
 from monitor.web.users import Role, User
 from monitor.web.words import how_long_ago, what_breaks
 from monitor.workflow.explain.ties import Tie, TieBreak
+from monitor.workflow.fleet.answer import FleetAnswer
 from monitor.workflow.plan.test_answer import TestAnswer as InstrumentTest
 from tests.web.test_pages import looked_at
 
@@ -97,3 +100,21 @@ def test_a_page_that_waits_asks_whether_it_is_worth_to_be_loaded_again(local: An
 def test_the_fleet_says_how_long_ago_a_machine_was_measured(local: Any) -> None:
     looked_at(local, "/machine?name=HU40-T")
     assert re.search(r"last run \d+ \w+ ago, 20\d\d-\d\d-\d\d<", looked_at(local, "/"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "advised"),
+    [
+        ([("A", 1, None)], (True, True)),
+        ([("A", 30, 6.0), ("A", 30, None)], (False, False)),
+        ([("A", 30, 6.0), ("B", 3, None)], (True, True)),
+        ([], (True, True)),
+    ],
+)
+def test_the_fleet_advises_what_it_lacks(
+    rows: list[tuple[str, int, float | None]], advised: tuple[bool, bool]
+) -> None:
+    """Of thirty campaigns with tolerances it asked for campaigns of earlier months and for tolerances."""
+    table = [SimpleNamespace(machine=machine, days=days, limit=limit) for machine, days, limit in rows]
+    advises = _advises(cast(FleetAnswer, SimpleNamespace(table=table)))
+    assert (advises.earlier_campaigns, advises.tolerances) == advised

@@ -218,7 +218,7 @@ def falling_chart(
     held_out = [step.heldout_rms_um for step in versions]
     traces: list[Trace] = [
         _steps(names, fitted, "RMS on all runs", "@blue", "circle"),
-        _steps(names, held_out, "RMS on held-out runs", "@orange", "diamond"),
+        _steps(names, held_out, "RMS on what was held out", "@orange", "diamond"),
     ]
     if proposed is not None:
         label = f"with {proposed.effect}"

@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 IDENTIFY = "identify all"
 #: The question after all machines and parameters.
 ASKED: tuple[str, Mapping[str, Any]] = ("fleet", {"top": 0})
+#: So many days a drift needs at least.
+DAYS_OF_A_DRIFT = 5
 #: Machines of one page.
 PAGE_SIZE = 40
 _USUAL = ATTENTION.index(Attention.AS_USUAL)
@@ -208,6 +210,28 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
     return sorted(rows, key=lambda row: ranks[row.attention])
 
 
+@dataclass(frozen=True)
+class _Advises:
+    """What would tell more of the machines: ``earlier_campaigns`` where one has too few days for a drift,
+    ``tolerances`` where one has no parameter with a limit."""
+
+    earlier_campaigns: bool = True
+    tolerances: bool = True
+
+
+def _advises(answer: FleetAnswer | None) -> _Advises:
+    """What the fleet's table lacks; everything while there is none."""
+    if answer is None:
+        return _Advises()
+    days: dict[str, int] = {}
+    limited = {row.machine for row in answer.table if row.limit is not None}
+    for row in answer.table:
+        days[row.machine] = max(days.get(row.machine, 0), row.days)
+    return _Advises(
+        any(count < DAYS_OF_A_DRIFT for count in days.values()) or not days, set(days) != limited or not days
+    )
+
+
 def _older(answer: FleetAnswer | None) -> list[tuple[OlderVersion, list[str]]]:
     """Return the versions that numbers are of beside the newest one, each with its machines."""
     machines: dict[OlderVersion, list[str]] = {}
@@ -266,7 +290,7 @@ def routes() -> APIRouter:
             how_long_ago=how_long_ago, today=datetime.now(UTC).date(),
             states=[(label, urgency, counts[label]) for label, urgency in CLASSES.items() if counts[label]],
             refusal=refusal, state=state, plant=plant, since=period["since"], until=period["until"],
-            plants=sorted({row.plant for row in rows if row.plant}),
+            plants=sorted({row.plant for row in rows if row.plant}), advises=_advises(answer),
             unlisted=[row.machine for row in rows if row.urgency is NOT_IDENTIFIED],
             not_identified=() if answer is None else answer.not_identified,
             older=_older(answer),
