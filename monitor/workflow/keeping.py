@@ -13,7 +13,7 @@ import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.exceptions import InputError
-from monitor.reporting import messages
+from monitor.reporting import keeping_messages, messages
 from monitor.store import (
     CHANGES,
     AuditEntry,
@@ -106,7 +106,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
             anchored = anchored_entry(db, request.anchor)
             entry = None if anchored is None else anchored.entry
             if anchored is None:
-                faults.append(messages.anchor_unknown(request.anchor.strip()))
+                faults.append(keeping_messages.anchor_unknown(request.anchor.strip()))
     # Computed outside: nobody waits for a fit.
     seed = secrets.randbits(32) if request.seed is None else request.seed
     recomputation = (
@@ -236,11 +236,11 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     assert span is not None  # of those made by this version
     new_file = copy.path == request.target.name
     if not new_file:
-        message = messages.nothing_to_back_up(request.target, copy.path)
+        message = keeping_messages.nothing_to_back_up(request.target, copy.path)
     elif span.previous is None:
-        message = messages.backup_made(request.target, len(copy.tables), rows)
+        message = keeping_messages.backup_made(request.target, len(copy.tables), rows)
     else:
-        message = messages.increment_made(
+        message = keeping_messages.increment_made(
             request.target, (span.first_entry, span.last_entry), rows, span.previous
         )
     return BackupAnswer(
@@ -291,9 +291,11 @@ def restore_backup(request: RestoreRequest) -> RestoreAnswer:
     """Make a database from a backup. Raises StoreError where the backup is not what its manifest says."""
     restored = restore(request.source, request.target, request.at)
     made_at = restored.backup.made_at[:19].replace("T", " ")
-    message = messages.backup_restored(request.target, made_at, request.at)
+    message = keeping_messages.backup_restored(request.target, made_at, request.at)
     if restored.last_entry is not None:
-        message += messages.restored_up_to(restored.last_entry, restored.files, verified=not restored.faults)
+        message += keeping_messages.restored_up_to(
+            restored.last_entry, restored.files, verified=not restored.faults
+        )
     return RestoreAnswer(
         request.target,
         restored.backup.sha256,

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from monitor.exceptions import InputError
-from monitor.reporting import messages
+from monitor.reporting import keeping_messages
 from monitor.store import Database, archive_faults, archive_files, archived_count, check_machine, compact
 
 
@@ -51,13 +51,15 @@ def archive(db: Database, request: ArchiveRequest) -> ArchiveAnswer:
     if request.before is None:
         with db.reading():
             faults, count = tuple(archive_faults(db, request.folder)), archived_count(db)
-        message = messages.archive_checked(request.folder, count, len(faults))
+        message = keeping_messages.archive_checked(request.folder, count, len(faults))
         return ArchiveAnswer(0, count, 0, message, faults)
     if request.machine is not None:
         check_machine(db, request.machine)
     moment = request.before.astimezone(UTC).replace(tzinfo=None)
     moved = archive_files(db, request.folder, moment, machine=request.machine)
-    message = messages.files_archived(request.folder, moved.files, moved.campaigns, moved.bytes, moment)
+    message = keeping_messages.files_archived(
+        request.folder, moved.files, moved.campaigns, moved.bytes, moment
+    )
     return ArchiveAnswer(moved.campaigns, moved.files, moved.bytes, message)
 
 
@@ -77,5 +79,5 @@ def compact_database(db: Database) -> CompactAnswer:
     if db.is_lake:
         raise InputError(f"{db.path} is a lake: merge its files (docs/scale.md)")
     result = compact(db)
-    message = messages.compacted(db.path, result.bytes_before, result.bytes_after, result.rows)
+    message = keeping_messages.compacted(db.path, result.bytes_before, result.bytes_after, result.rows)
     return CompactAnswer(Path(db.path), result.bytes_before, result.bytes_after, result.rows, message)

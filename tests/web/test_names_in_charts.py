@@ -72,9 +72,7 @@ def test_a_history_of_one_run_is_drawn_between_days() -> None:
         campaign=("A", "A"), method=("A", "A"), run=(1, 2), day=(1, 2), warm_up=(False, False),
         parameters={"A": ParameterValues("A", (1.0, 2.0), (0.1, 0.1), 2.0)}, conditions={},
     )  # fmt: skip
-    begin, end = map(
-        datetime.fromisoformat, trend_chart(two, "A", None).document["layout"]["xaxis"]["range"]
-    )
+    begin, end = map(datetime.fromisoformat, trend_chart(two, "A", None).document["layout"]["xaxis"]["range"])
     assert datetime(2026, 3, 1, tzinfo=UTC) < begin < datetime(2026, 3, 2, tzinfo=UTC)
     assert datetime(2026, 3, 4, tzinfo=UTC) < end < datetime(2026, 3, 5, tzinfo=UTC)
 

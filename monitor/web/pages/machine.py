@@ -93,6 +93,7 @@ def routes() -> APIRouter:
     router.get("/machine/values.csv")(_values_csv)
     router.get("/machine/parameters")(_table_of_all)
     router.get("/machine/periods")(_two_periods)
+    router.post("/machine/event/withdraw")(_withdraw_event)
 
     @router.post("/machine/event")
     async def event(request: Request) -> Response:
@@ -111,16 +112,16 @@ def routes() -> APIRouter:
             return led_back_to_the_form(request, refused, "/machine", {"name": machine}, "event")
         return led_back(request, "/machine", {"name": machine}, "events")
 
-    @router.post("/machine/event/withdraw")
-    async def withdraw_event(request: Request) -> Response:
-        """Let an event count no longer."""
-        async with read_form(request) as form:
-            machine, number = form.text("machine"), whole_number("number", form.text("number"))
-        document = {"machine": machine, "number": number, "reason": form.texts.get("reason", "")}
-        await asked_once(request, form, "withdraw event", document)
-        return led_back(request, "/machine", {"name": machine}, "events")
-
     return router
+
+
+async def _withdraw_event(request: Request) -> Response:
+    """Let an event count no longer."""
+    async with read_form(request) as form:
+        machine, number = form.text("machine"), whole_number("number", form.text("number"))
+    document = {"machine": machine, "number": number, "reason": form.texts.get("reason", "")}
+    await asked_once(request, form, "withdraw event", document)
+    return led_back(request, "/machine", {"name": machine}, "events")
 
 
 def _event_document(form: Form) -> dict[str, Any]:
