@@ -15,6 +15,8 @@ FORMS = {
     "/import": Role.ENGINEER,
     "/fleet/identify": Role.ENGINEER,
     "/machine/event": Role.ENGINEER,
+    "/machine/event/withdraw": Role.ENGINEER,
+    "/campaign/withdraw": Role.APPROVER,
     "/model/add": Role.ENGINEER,
     "/model/undo": Role.ENGINEER,
     "/work/cancel": Role.VIEWER,

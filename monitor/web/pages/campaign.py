@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, NotFoundError
+from monitor.web.asking import check_role
 from monitor.web.charts.chart import Chart
 from monitor.web.charts.statistics import cloud_chart, correlation_chart, p_value_chart, region_chart
 from monitor.web.forms import asked_once, read_form, whole_number
@@ -82,6 +83,7 @@ def routes() -> APIRouter:
         async with read_form(request) as form:
             name, typed = form.text("campaign"), form.texts.get("typed", "")
             document = {"campaign": name, "reason": form.texts.get("reason", "")}
+        check_role(request.state.user, "withdraw campaign")
         if typed != name:
             raise InputError(f"type the name of the campaign, '{name}', to withdraw it, not '{typed[:60]}'")
         answer = await asked_once(request, form, "withdraw campaign", document)
