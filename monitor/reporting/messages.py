@@ -209,6 +209,11 @@ def certificates_in_force(campaign: str, numbers: Sequence[str]) -> str:
     )
 
 
+def why_replaced(number: str) -> str:
+    """Return that a certificate is replaced only with a reason."""
+    return f"say why certificate {number} is replaced: --reason TEXT"
+
+
 def campaign_withdrawn(campaign: str) -> str:
     """Return what is said of a campaign that counts no longer."""
     return f"{campaign}: withdrawn, it no longer counts; its name is free for the corrected folder"
