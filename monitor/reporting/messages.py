@@ -139,21 +139,6 @@ def only_understood(campaign: str, rows: int, runs: int | None = None) -> str:
     return f"{campaign}: understood, {counted}; nothing was stored"
 
 
-def certificates_in_force(campaign: str, numbers: Sequence[str]) -> str:
-    """Return that other certificates of the same runs are in force."""
-    several = len(numbers) > 1
-    return (
-        f"of the same runs of {campaign} {'certificates' if several else 'certificate'} {', '.join(numbers)} "
-        f"{'are' if several else 'is'} in force: withdraw {'them' if several else 'it'}, or amend "
-        f"{'one of them' if several else 'it'} instead of issuing another"
-    )
-
-
-def why_replaced(number: str) -> str:
-    """Return what is asked of whoever replaces a certificate."""
-    return f"say why certificate {number} is replaced: --reason TEXT"
-
-
 def campaign_withdrawn(campaign: str) -> str:
     """Return what is said of a campaign that counts no longer."""
     return f"{campaign}: withdrawn, it no longer counts; its name is free for the corrected folder"
@@ -326,14 +311,6 @@ def before_all_runs(machine: str, first: datetime) -> str:
     return (
         f"recorded, and it lies before the first run of {machine} ({first:%Y-%m-%d %H:%M} UTC): it splits nothing "
         "until earlier runs are imported; an event that is wrong can be withdrawn"
-    )
-
-
-def long_before_all_runs(machine: str, at: datetime, first: datetime) -> str:
-    """Return that an event lies long before the first run of its machine, in UTC, and how it is confirmed."""
-    return (
-        f"{at:%Y-%m-%d} lies more than a year before the first run of {machine} ({first:%Y-%m-%d} UTC): give the time "
-        "it had, or confirm that it was so long before (--before-runs; the box beside the time); nothing was recorded"
     )
 
 

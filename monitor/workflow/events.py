@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 from monitor.exceptions import InputError, did_you_mean
-from monitor.reporting import messages
+from monitor.reporting import messages, record_messages
 from monitor.said import check_letters
 from monitor.store import (
     NOTE,
@@ -52,7 +52,8 @@ class EventRequest:
             return
         if not self.text.strip():
             raise InputError("say in words what happened, for example 'B axis encoder changed'")
-        check_letters(self.text, "what happened")
+        for line in self.text.splitlines():
+            check_letters(line.replace("\t", " "), "what happened")
         check_letters(self.kind, "the kind")
         word = self.text.strip().lower()
         if self.kind == NOTE and word in USUAL_KINDS:
@@ -152,7 +153,7 @@ def _refuse_long_before(db: Database, request: EventRequest, at: datetime) -> No
     first = _first_run(db, request.machine)
     if first is None or request.before_runs or at.astimezone(UTC).replace(tzinfo=None) >= first - LONG_BEFORE:
         return
-    raise InputError(messages.long_before_all_runs(request.machine, at, first))
+    raise InputError(record_messages.long_before_all_runs(request.machine, at, first))
 
 
 def _notes(db: Database, request: EventRequest) -> Iterator[str]:

@@ -12,7 +12,7 @@ from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
 from monitor.records import VOLUMETRIC
-from monitor.reporting import messages
+from monitor.reporting import messages, record_messages
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.completeness import RefusedGroundsError, missing_items
 from monitor.reporting.certificate.dcc_elements import NEWEST
@@ -129,7 +129,7 @@ def _in_force(db: Database, request: CertificateRequest, measured: Sequence[Meas
         for number, certified in certificates_in_force(db, request.campaign)
         if certified & runs and number not in (request.replaces, request.number)
     ]
-    return (messages.certificates_in_force(request.campaign, numbers),) if numbers else ()
+    return (record_messages.certificates_in_force(request.campaign, numbers),) if numbers else ()
 
 
 def _not_printed(request: CertificateRequest, stated: LaboratoryFile) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ from datetime import date
 from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.records import Campaign, Run
+from monitor.reporting import record_messages
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import NotApplicable, Replaced
-from monitor.reporting.messages import why_replaced
 from monitor.said import reason as said_reason
 from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
 from monitor.workflow.certificate.inputs import MadeWith
@@ -126,7 +126,7 @@ def replaced_by(db: Database, number: str, reason: str, draft: bool, campaign: C
         raise InputError(f"certificate {number} is {old.state}; only an issued one can be replaced")
     if draft:
         raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
-    reason = said_reason(reason, why_replaced(number))
+    reason = said_reason(reason, record_messages.why_replaced(number))
     if old.machine != campaign.machine.id:
         raise InputError(
             f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {old.machine}: "
