@@ -311,7 +311,9 @@ def test_campaigns_that_one_machine_cannot_have_made_at_once_are_not_mixed(
         )
         # The example campaigns state no tolerances: nothing is claimed about them.
         assert row["probability_out"] is None
-        assert row["next_check"] == "no forecast: the campaign states no tolerances"
+        assert (
+            row["next_check"] == "now: the latest day alone shows the step of EB0C; no tolerances are stated"
+        )
         chosen = ReportOptions(campaigns=("hidden-reversal-x",))
         with pdf_unread():
             other = report(db, "2026-W10", out=tmp_path, made_at=MADE, options=chosen)
