@@ -74,8 +74,10 @@ class Context:
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
     the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
     nothing says them; ``instruments`` what read the rows, None where a method has one instrument alone; ``stretch``
-    (n,) numbers what was measured without a break, None where that is the run; ``measured`` the probings whose ranges
-    scale shapes and drivers where these probings are only planned or a part of them, None where these are it;
+    (n,) numbers the run as it was measured where runs are one set-up, None where that is ``run``; ``set_up`` (n,)
+    numbers what was measured before an instrument was set up by hand, None where none was; ``measured`` the probings
+    whose ranges scale shapes and drivers where these probings are only planned or a part of them, None where these are
+    it;
     ``approach`` (n, J) is the sign of the move that ended at a row where the readings say so and positions do not, else
     0; ``resting`` names the targets beside the machine; ``stops_are_stated``: the file says where the axes stop that
     were brought to a target; ``part_of`` are the probings of the campaign of which these are the rows ``rows`` (n,), in
@@ -96,6 +98,7 @@ class Context:
     sight: Array | None = None
     instruments: InstrumentRows | None = None
     stretch: npt.NDArray[np.int64] | None = None
+    set_up: npt.NDArray[np.int64] | None = None
     approach: npt.NDArray[np.int64] | None = None
     measured: Context | None = None
     resting: frozenset[str] = frozenset()
@@ -109,6 +112,17 @@ class Context:
     @property
     def stretches(self) -> tuple[npt.NDArray[np.int64], ...]:
         """The rows of each stretch without a break: before it nobody knows where the axes were."""
+        if self.set_up is None:
+            return self._as_measured
+        return tuple(
+            rows[self.set_up[rows] == number]
+            for rows in self._as_measured
+            for number in np.unique(self.set_up[rows])
+        )
+
+    @property
+    def _as_measured(self) -> tuple[npt.NDArray[np.int64], ...]:
+        """The rows of each run as it was measured."""
         of = self.run if self.stretch is None else self.stretch
         return tuple(np.flatnonzero(of == number) for number in np.unique(of))
 
@@ -229,7 +243,7 @@ class Context:
     def run_order(self) -> Array:
         """From 0 at a run's first row to 1 at its last, by their order (n,)."""
         order = np.zeros(len(self))
-        for rows in (np.flatnonzero(self.run == number) for number in np.unique(self.run)):
+        for rows in self._as_measured:
             order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
         return order
 

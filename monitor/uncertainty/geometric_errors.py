@@ -131,5 +131,10 @@ def _commanded(geometric: GeometricErrors, positions: Array, inside: bool) -> Co
         target=np.concatenate([old.target, np.repeat(old.target[:1], count)]),
         nominal=np.concatenate([old.nominal, np.zeros((count, 3))]),
         columns=columns,
+        set_up=(
+            None
+            if old.set_up is None
+            else np.concatenate([old.set_up, np.full(count, old.set_up[of_run][-1])])
+        ),
         approach=None if old.approach is None else np.concatenate([old.approach, np.zeros(pairs.shape, int)]),
     )

@@ -7,7 +7,7 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.methods import campaign_method
-from monitor.methods.instruments.assembly import between_set_ups
+from monitor.methods.instruments.assembly import set_ups
 from monitor.workflow.instruments.too_well import read_too_well
 from tests.discovery.ball_bars import ball_bars, named
 
@@ -28,10 +28,10 @@ def test_setups_that_are_read_by_turns_stand_there_together(tmp_path):
     campaign = ball_bars(tmp_path, lambda *_: (0.0, 0.0, 0.0))
     context = campaign_method(campaign).problem_of(campaign).context
     by_turns = np.arange(len(context)) % 2
-    np.testing.assert_array_equal(between_set_ups(context, by_turns), 0)
+    np.testing.assert_array_equal(set_ups(context, by_turns), 0)
     blocks = np.repeat([0, 1, 2], [100, 100, 86])
-    np.testing.assert_array_equal(between_set_ups(context, blocks), blocks)
-    np.testing.assert_array_equal(between_set_ups(context, np.where(blocks == 2, 0, blocks)), 0)
+    np.testing.assert_array_equal(set_ups(context, blocks), blocks)
+    np.testing.assert_array_equal(set_ups(context, np.where(blocks == 2, 0, blocks)), 0)
 
 
 def test_a_play_and_a_lag_are_told_across_the_planes(tmp_path):

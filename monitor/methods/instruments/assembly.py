@@ -59,7 +59,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     context = replace(context, sight=_sight(setups, number), nominal=_places(context, parts))
     context = replace(context, instruments=_instrument_rows(context, parts))
-    context = replace(context, stretch=between_set_ups(context, number))
+    context = replace(context, set_up=set_ups(context, number))
     context = replace(context, approach=turned_beyond(context, parts))
     absent = _absent(context, added)
     problem = InstrumentProblem(
@@ -77,20 +77,18 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     return problem.foreseen() if problem.added else problem
 
 
-def between_set_ups(context: Context, number: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The stretches (n,) without a break: whoever sets up the next instrument (``number`` (n,) of the setup of each
-    row) moves the axes by hand. Setups that are read by turns stand there together."""
-    stretch = np.zeros(len(number), dtype=np.int64)
-    last = 0
+def set_ups(context: Context, number: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """The number (n,) in its run of what was measured between two set-ups: whoever sets up the next instrument
+    (``number`` (n,) of the setup of each row) moves the axes by hand. Setups that are read by turns stand there
+    together."""
+    between = np.zeros(len(number), dtype=np.int64)
     for run in np.unique(context.run):
         rows = np.flatnonzero(context.run == run)
         changes = np.flatnonzero(np.diff(number[rows])) + 1
         # A change is for good where no setup before it comes after it.
-        for_good = [at for at in changes.tolist() if not {*number[rows[:at]]} & {*number[rows[at:]]}]
-        for block in np.split(rows, for_good):
-            stretch[block] = last
-            last += 1
-    return stretch
+        for at in changes.tolist():
+            between[rows[at:]] += not {*number[rows[:at]]} & {*number[rows[at:]]}
+    return between
 
 
 def _absent(context: Context, added: tuple[ParsedEffect, ...]) -> dict[str, str]:

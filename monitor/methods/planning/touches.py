@@ -81,6 +81,7 @@ def planned_context(
         target=np.array(targets),
         nominal=nominal,
         columns=mean,
+        set_up=None,
         approach=None,
     )
 

@@ -21,6 +21,7 @@ from monitor.reporting.certificate.completeness import (
 )
 from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
+from monitor.said import check_number_of_certificate
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form, whole_number
@@ -203,9 +204,7 @@ def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
     if draft:
         if texts.get("number"):
             # A preview has a number of its own; that of the form is judged as it will be.
-            from monitor.workflow.certificate.orders import check_written
-
-            check_written(texts["number"])
+            check_number_of_certificate(texts["number"])
         return {**document, "draft": True, "number": PREVIEW.format(campaign)[:60]}
     if texts.get("replaces"):
         return {**document, "replaces": texts["replaces"], "reason": texts.get("reason", "")}

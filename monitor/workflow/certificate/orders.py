@@ -11,14 +11,12 @@ from monitor.records import Campaign, Run
 from monitor.reporting import record_messages
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import NotApplicable, Replaced
-from monitor.said import reason as said_reason
+from monitor.said import check_number_of_certificate, reason as said_reason
 from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
 from monitor.workflow.certificate.inputs import MadeWith
 
 #: The two states of a machine that a certificate may describe (ISO/IEC 17025:2017, 7.8.4.1 d).
 AS_FOUND, AS_LEFT = "as found", "as left"
-#: A number stands in a line on every page, in a file's name and in other certificates.
-_LONGEST_NUMBER = 60
 
 
 @dataclass(frozen=True)
@@ -41,20 +39,9 @@ def next_number(db: Database, year: int) -> str:
     return f"{year}-{last + 1:04d}"
 
 
-def check_written(number: str) -> None:
-    """Raise InputError for a number that is no line of visible letters."""
-    if not number.strip():
-        raise InputError("the number of a certificate is not blank; leave --number out for the next free one")
-    if number != number.strip() or not number.isprintable() or len(number) > _LONGEST_NUMBER:
-        raise InputError(
-            f"the number of a certificate is one line of at most {_LONGEST_NUMBER} visible letters without blanks "
-            f"around it, not {number[:_LONGEST_NUMBER]!r}{'...' if len(number) > _LONGEST_NUMBER else ''}"
-        )
-
-
 def check_number(db: Database, number: str) -> None:
     """Before anything is computed: a number is a line of text, and is used once. Raises InputError."""
-    check_written(number)
+    check_number_of_certificate(number)
     try:
         old = load_certificate(db, number)
     except NotFoundError:

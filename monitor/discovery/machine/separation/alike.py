@@ -79,6 +79,7 @@ def _anywhere(context: Context, strokes: Mapping[str, tuple[float, float]]) -> C
         sight=None,
         instruments=None,
         stretch=None,
+        set_up=None,
         approach=None,
         measured=context,
     )

@@ -140,6 +140,7 @@ def _context(context: Context, rows: npt.NDArray[np.int64], positions: Array, ta
         sight=None,
         instruments=None,
         stretch=None,
+        set_up=None,
         approach=None,
         measured=context,
     )

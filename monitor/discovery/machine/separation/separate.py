@@ -125,6 +125,7 @@ class _Touches:
             target=self.target,
             nominal=self.nominal,
             columns=columns,
+            set_up=None,
             approach=None,
             measured=present,
         )
