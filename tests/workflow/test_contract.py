@@ -118,6 +118,7 @@ def test_the_faces_ask_nothing_but_the_questions_of_the_contract() -> None:
     assert _asked_by("web") == set()
     # What people in Python and the pages ask: the kinematic model alone, and what the command line has in other words.
     assert questions - command_line == {
+        "events:events",
         "explain.residual_vectors:residual_vectors",
         "explain.residuals_by_driver:residuals_by_driver",
         "history.periods:periods",
