@@ -46,6 +46,7 @@ def test_a_play_and_a_lag_are_told_across_the_planes(tmp_path):
     assert effects["EYY:lag"] == pytest.approx(-0.5e-3, abs=6e-5)
 
 
+@pytest.mark.slow
 def test_sides_of_a_play_that_have_no_solution_end_no_search(tmp_path):
     """With what the play of X does at the first rows of each plane as unknowns the fit of this campaign does not end
     (of twelve seeds one)."""

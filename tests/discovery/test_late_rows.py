@@ -89,6 +89,7 @@ def test_a_late_angle_of_a_table_is_told_among_micrometres(tmp_path: Path, rows:
     assert mistake.rms_undone < 2.5e-4 < mistake.rms_as_recorded
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four-instruments", "hidden-reversal-x", "tracked-robot"])
 def test_what_a_machine_hides_is_no_late_column(name: str) -> None:
     campaign = _read(EXAMPLES / name)

@@ -69,6 +69,7 @@ def test_axes_that_are_kept_still_are_not_told() -> None:
     assert list(still_columns(along_x)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["J3", "J5"])
 def test_a_joint_that_moved_unseen_is_told_by_the_points_of_a_tracker(axis: str) -> None:
     campaign = _read(EXAMPLES / "tracked-robot")

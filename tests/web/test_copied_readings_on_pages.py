@@ -50,6 +50,7 @@ def test_copies_are_said_on_every_page_that_shows_their_numbers(path: Path, serv
     assert "notes of its import" not in client.get("/machine?name=CENTRE-4").text
 
 
+@pytest.mark.slow
 def test_a_withdrawn_copy_is_said_no_more(path: Path, serve: Any) -> None:
     with Database(path, threads=1) as db:
         withdraw_campaign(db, "other", "a copy")

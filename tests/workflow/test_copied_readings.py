@@ -93,6 +93,7 @@ def test_every_answer_says_that_its_readings_are_copies(db: Database) -> None:
     assert identify(db, IdentifyRequest("other")).copied_readings is None
 
 
+@pytest.mark.slow
 def test_rows_that_repeat_earlier_ones_are_told_where_numbers_are(db: Database) -> None:
     said = (RowsRepeated(1, 25, 26, 1, may_be_passes=False),)
     assert identify(db, IdentifyRequest("twice")).copied_readings == said
@@ -105,6 +106,7 @@ def test_rows_that_repeat_earlier_ones_are_told_where_numbers_are(db: Database) 
     assert [each.campaign for each in listed.copied or ()] == ["other", "again", "next-day"]
 
 
+@pytest.mark.slow
 def test_no_certificate_of_copies_but_for_one_measurement_under_two_names(db: Database) -> None:
     def of(name: str) -> list[Ground]:
         return list(copied_grounds(db, load_campaign(db, name)))
