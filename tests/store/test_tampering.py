@@ -19,6 +19,7 @@ from monitor.store import (
     clear_refusals,
     import_campaign,
     import_curve,
+    record_event,
     record_refusal,
     save_analysis,
     save_identification,
@@ -26,6 +27,7 @@ from monitor.store import (
     save_selection,
     verify_audit,
     withdraw_campaign,
+    withdraw_event,
 )
 
 #: A database of which these were altered is not opened (test_migrations).
@@ -71,6 +73,10 @@ def all_tables(
     save_identification(db, identification)
     save_analysis(db, "trend", {"a": 1}, method="guf", machine=three.machine.id)
     withdraw_campaign(db, "two", "wrong balls")
+    number = record_event(
+        db, three.machine.id, datetime(2026, 2, 1, tzinfo=UTC), "crash", "of another machine"
+    )
+    withdraw_event(db, three.machine.id, number, "of another machine")
     curve = read_campaign(EXAMPLES / "load-cell")
     assert isinstance(curve, CurveCampaign)
     import_curve(db, curve)

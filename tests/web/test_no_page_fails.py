@@ -33,6 +33,7 @@ USUAL = {
 }  # fmt: skip
 #: What each form sends that is looked at; a new form has to be written down here.
 FORMS = {
+    "/campaign/withdraw": {"reason": "x", "typed": "x"},
     "/certificate/new": {
         "button": "issue", "run": "1", "replaces": "", "reason": "x", "method": "guf", "issued_on": "2026-01-01",
         "conformity": "simple", "number": "1", "customer.name": "x", "laboratory.language": "en",
@@ -44,6 +45,7 @@ FORMS = {
     "/login": {"name": "ada", "token": "guessed", "then": "/", "typed": "x"},
     "/logout": {},
     "/machine/event": {"text": "x", "at": "2026-01-01T00:00:00Z", "kind": "crash"},
+    "/machine/event/withdraw": {"number": "1", "reason": "x"},
     "/model/add": {"effect": "EXX:const", "to": "instruments", "new_name": "", "note": "", "latest": ""},
     "/model/undo": {"effect": "EXX:const", "model": "instruments", "latest": ""},
     "/work/again": {"number": "1", "then": "/"},
