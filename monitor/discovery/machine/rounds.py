@@ -204,16 +204,22 @@ class _Rounds:
 
     def round(self) -> ChainRound:
         """The effects under the present suspects and correlation, and the fit with those that can be fitted."""
-        conditions = self.suspects.conditions, self.correlation, self.sides, *self.unfitted
+        conditions = self._conditions
         if conditions not in self.before.rounds:
             searched = self._round(self._near())
             if sides := self._new_sides(searched):
                 self.sides += sides
                 searched = self._round(searched if self._is_able(searched) else None)
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
-            self.before.rounds[conditions] = replace(searched, scene=replace(searched.scene))
+            searched = replace(searched, scene=replace(searched.scene))
+            self.before.rounds |= dict.fromkeys((conditions, self._conditions), searched)
         self.sides = self.before.rounds[conditions].sides
         return replace(self.before.rounds[conditions], suspects=self.suspects)
+
+    @property
+    def _conditions(self) -> tuple[object, ...]:
+        """What a search depends on."""
+        return self.suspects.conditions, self.correlation, self.sides, *self.unfitted
 
     def _new_sides(self, searched: ChainRound) -> tuple[ChainEffect, ...]:
         """What plays do where nobody knows on which side they are, of errors of which it is not among the unknowns of
