@@ -60,7 +60,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
-    output.listing(answer.events, "nothing was recorded yet")
+    output.listing(answer.events, "no event is recorded that counts")
     for note in answer.notes:
         output.say(f"note: {note}")
     if options.text is not None and options.kind == NOTE:
