@@ -339,7 +339,10 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     wholes = Pool(tuple(whole for _, whole in errors.values()))
     counts = range(max(len(ordered), 1))
     promising = [_promising(scene, wholes, ordered[:count]) for count in counts]
-    for symbol, (shapes, whole) in errors.items():
+    # What is likeliest comes first, so that the rest have to be worth more.
+    likeliest = [error_of(each.candidate) for each in weigh_beside(scene, wholes, ordered[:-1])]
+    for symbol in sorted(errors, key=likeliest.index):
+        shapes, whole = errors[symbol]
         # One error after the other: the sawtooths of all together would be as much as the whole catalogue.
         edges = edges_of(scene, shapes[0])
         for count in counts:
