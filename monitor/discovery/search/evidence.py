@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import attrgetter
-from typing import Generic
+from typing import Generic, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,8 +39,7 @@ MOST_PRODUCTS = 4_000_000
 STANDS_OUT = 3.0
 
 
-@dataclass(frozen=True)
-class Evidence(Generic[CandidateT]):
+class Evidence(NamedTuple, Generic[CandidateT]):
     """The evidence for one candidate: F with ``rank`` degrees of freedom in its numerator, its p-value and score.
 
     ``too_large`` says that it would need coefficients beyond what a machine in use is likely to have.
