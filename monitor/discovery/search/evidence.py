@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from operator import attrgetter
 from typing import Generic, NamedTuple
 
 import numpy as np
@@ -129,6 +128,12 @@ class Pool(Generic[CandidateT]):
         return grams
 
     @cached_property
+    def family(self) -> npt.NDArray[np.int64]:
+        """The number (n,) of the family of each candidate."""
+        numbers: dict[str, int] = {}
+        return np.array([numbers.setdefault(each.family, len(numbers)) for each in self.candidates])
+
+    @cached_property
     def tries(self) -> Array:
         """The number of variants of each candidate that are searched."""
         return np.array([float(candidate.variant.tries) for candidate in self.candidates])
@@ -192,12 +197,34 @@ def weigh(
     basis = orthonormal(selected)
     remainder = without(basis, residual[:, None])[:, 0]
     squares = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
-    return _weighed(pool, pool.products(basis), pool.products(remainder), squares)
+    weights = _weighed(pool, pool.products(basis), pool.products(remainder), squares)
+    return weights.of(pool, weights.order)
 
 
-def _weighed(
-    pool: Pool[CandidateT], overlap: Array, onto: Array, squares: tuple[float, int]
-) -> list[Evidence[CandidateT]]:
+@dataclass(frozen=True)
+class _Weights:
+    """The evidence (n,) for each candidate of a pool."""
+
+    explained: Array
+    rank: npt.NDArray[np.int64]
+    f: Array
+    p_value: Array
+    score: Array
+    too_large: npt.NDArray[np.bool_]
+
+    @property
+    def order(self) -> npt.NDArray[np.int64]:
+        """The numbers of the candidates, the most convincing first."""
+        return np.argsort(-self.score, kind="stable")
+
+    def of(self, pool: Pool[CandidateT], numbers: npt.NDArray[np.int64]) -> list[Evidence[CandidateT]]:
+        """The evidence for some candidates of the pool."""
+        arrays = (self.explained, self.rank, self.f, self.p_value, self.score, self.too_large)
+        values = (array[numbers].tolist() for array in arrays)
+        return list(map(Evidence, map(pool.candidates.__getitem__, numbers.tolist()), *values))
+
+
+def _weighed(pool: Pool[CandidateT], overlap: Array, onto: Array, squares: tuple[float, int]) -> _Weights:
     """Weigh every candidate of a pool by the products of its columns with an orthonormal basis (K, r) of what is
     selected and with what that leaves (K,), of which ``squares`` is the sum of squares with its degrees of freedom."""
     total, dof = squares
@@ -213,8 +240,7 @@ def _weighed(
         )
         large[members] = np.sqrt(np.sum((coefficients / pool.lengths[rows]) ** 2, axis=-1))
     rank[large > BEYOND * pool.largest] = 0
-    weighed = evidence_of(pool, explained, rank, (total, dof), large > pool.largest)
-    return sorted(weighed, key=attrgetter("score"), reverse=True)
+    return _weights(pool, explained, rank, (total, dof), large > pool.largest)
 
 
 def weigh_beside(
@@ -230,15 +256,34 @@ def weigh_in(
     beside: Remainder, candidates: Sequence[CandidateT] | Pool[CandidateT]
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate in what selected effects leave, the most convincing first."""
-    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
     if isinstance(candidates, Pool):
-        overlap = candidates.overlap(beside)
-        return _weighed(candidates, overlap, candidates.onto(beside, overlap), squares)
+        weights = _weighed_again(beside, candidates)
+        return weights.of(candidates, weights.order)
     # Nothing is gained by products with each selected effect of candidates that are weighed once.
     pool = Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    return _weighed(pool, pool.products(beside.basis), pool.products(beside.residual), squares)
+    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    weights = _weighed(pool, pool.products(beside.basis), pool.products(beside.residual), squares)
+    return weights.of(pool, weights.order)
+
+
+def best_of_families_in(
+    beside: Remainder, pool: Pool[CandidateT], able: npt.NDArray[np.bool_] | None = None
+) -> list[Evidence[CandidateT]]:
+    """The best of every family of a pool in what selected effects leave, most convincing first; only of those that are
+    ``able`` (n,), if given."""
+    weights = _weighed_again(beside, pool)
+    order = weights.order if able is None else weights.order[able[weights.order]]
+    first = np.unique(pool.family[order], return_index=True)[1]
+    return weights.of(pool, order[np.sort(first)])
+
+
+def _weighed_again(beside: Remainder, pool: Pool[CandidateT]) -> _Weights:
+    """Weigh every candidate of a pool that remembers its products with selected effects."""
+    overlap = pool.overlap(beside)
+    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    return _weighed(pool, overlap, pool.onto(beside, overlap), squares)
 
 
 def explained_by(
@@ -269,6 +314,18 @@ def evidence_of(
 ) -> list[Evidence[CandidateT]]:
     """Evidence for the candidates of a pool that explain sums of squares (n,) with ranks (n,) of a ``residual`` with
     this sum of squares and degrees of freedom."""
+    weights = _weights(pool, explained, rank, residual, too_large)
+    return weights.of(pool, np.arange(len(pool.candidates)))
+
+
+def _weights(
+    pool: Pool[CandidateT],
+    explained: Array,
+    rank: npt.NDArray[np.int64],
+    residual: tuple[float, int],
+    too_large: npt.NDArray[np.bool_],
+) -> _Weights:
+    """The numbers of `evidence_of`."""
     total, dof = residual
     able = (rank > 0) & (dof > rank) & (total > 0)
     number, other = np.where(able, rank, 1), np.where(able, dof - rank, 1)
@@ -277,8 +334,7 @@ def evidence_of(
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
     score = scores_of(explained, rank, residual, odds) - pool.behind
-    values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
-    return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
+    return _Weights(np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
 
 
 def scores_of(

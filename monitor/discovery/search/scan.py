@@ -15,7 +15,7 @@ from typing import Generic
 import numpy as np
 
 from monitor.discovery.search.acceptance import Acceptance
-from monitor.discovery.search.evidence import Evidence, best_of_families, pool_of, weigh_beside
+from monitor.discovery.search.evidence import Evidence, best_of_families_in, pool_of, weigh_beside
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
 from monitor.discovery.search.steps import step_by_step
@@ -123,8 +123,8 @@ class _Steps(Generic[CandidateT]):
         return self._weighed.answer(selected, None, lambda: self._weigh(selected))
 
     def _weigh(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
-        weighed = weigh_beside(self.scene, self.pool, selected)
-        return best_of_families(self.rules.separable(selected, weighed))
+        able = self.rules.separable(selected, self.pool.candidates)
+        return best_of_families_in(self.scene.remainders.beside(selected), self.pool, able)
 
     def evidence(self, candidate: CandidateT, others: Sequence[CandidateT]) -> Evidence[CandidateT]:
         """Evidence for one candidate beside others."""

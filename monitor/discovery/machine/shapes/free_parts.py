@@ -169,9 +169,7 @@ def most_together(
     least = np.log(max(before.degrees_of_freedom - int(first[-1]), 1))
     ranks = {id(each.candidate): each.rank for each in weigh_in(before, may_stay)}
     prices = [
-        ranks[id(each)] * least
-        + 2.0 * np.log(each.variant.tries * each.variant.odds)
-        + price_of_parts(each)
+        ranks[id(each)] * least + 2.0 * np.log(each.variant.tries * each.variant.odds) + price_of_parts(each)
         for each in may_stay
     ]
     most = -np.inf
@@ -179,7 +177,7 @@ def most_together(
         numbers = np.flatnonzero(np.repeat((True, *stay), np.diff(first, prepend=0)))
         gain = before.degrees_of_freedom * np.log(total / max(products.left_by(numbers.tolist()), 1e-300))
         most = max(most, float(gain - np.dot(prices, stay)))
-    return priced(scene, leading) + most - price_of_parts(new)
+    return float(priced(scene, leading) + most - price_of_parts(new))
 
 
 def parts_worth_keeping(
