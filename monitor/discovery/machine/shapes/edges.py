@@ -76,7 +76,7 @@ class Edges:
         price = (rough.columns.shape[1] - 1) * float(np.log(freedom)) + steps.price(1, leading)
         alone, most = (most_together(self.scene, rough, leading, some) - price for some in ([], may_stay))
         leeway = LEEWAY_OF_STEPS + PART_OF_STEPS * max(alone - priced(self.scene, leading), 0.0)
-        return most + leeway > worth
+        return bool(most + leeway > worth)
 
 
 def edges_of(scene: ChainScene, shape: ChainCandidate) -> Edges:
