@@ -51,7 +51,7 @@ def test_what_a_scan_adds_to_or_takes_from_is_searched_anew(searched, change):
     findings = result.findings[:1]
     if change == "one more":
         candidate = next(each for each in scene.candidates if each.effect.text == "EZZ:poly3")
-        evidence = replace(result.findings[0].evidence, candidate=candidate)
+        evidence = result.findings[0].evidence._replace(candidate=candidate)
         findings = (*result.findings, replace(result.findings[0], evidence=evidence))
     assert still_found(scene, (scene, replace(result, findings=findings)), (), 0.01) is None
 
