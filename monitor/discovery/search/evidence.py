@@ -17,7 +17,7 @@ import numpy.typing as npt
 import scipy
 
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import eigen, orthonormal, without
 from monitor.discovery.search.remainder import Remainder
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.discovery.search.together import together
@@ -292,8 +292,7 @@ def explained_by(
     """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
     coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show. Directions with a
     part (squared) of at most ``least`` (...) are held."""
-    # Of one coefficient the product is its own eigenvalue.
-    values, vectors = np.linalg.eigh(gram) if gram.shape[-1] > 1 else (gram[..., 0], np.ones_like(gram))
+    values, vectors = eigen(gram)
     keep = values > (SMALLEST_REMAINDER if least is None else least[..., None])
     along = np.einsum("...ij,...i->...j", vectors, onto)
     inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
