@@ -34,6 +34,8 @@ ODDS_OF_TOO_LARGE = 400.0
 BEYOND = 100.0
 # So many products with selected effects are remembered, some hundreds of MB of a few columns each at most.
 MOST_PRODUCTS = 4_000_000
+# Scores that are one to so many decimals differ by rounding: no answer hangs on the last bits of an exact tie.
+SAME = 4
 # So many standard deviations of a coefficient are put down to noise before its size is judged.
 STANDS_OUT = 3.0
 
@@ -214,8 +216,8 @@ class _Weights:
 
     @property
     def order(self) -> npt.NDArray[np.int64]:
-        """The numbers of the candidates, the most convincing first."""
-        return np.argsort(-self.score, kind="stable")
+        """The numbers of the candidates, the most convincing first; of those that say the same the first."""
+        return np.argsort(-np.round(self.score, SAME), kind="stable")
 
     def of(self, pool: Pool[CandidateT], numbers: npt.NDArray[np.int64]) -> list[Evidence[CandidateT]]:
         """The evidence for some candidates of the pool."""
