@@ -327,7 +327,7 @@ class _Page:
         return ParameterTrend(
             unit=series.unit,
             drift=drift_statement(drift),
-            mean=latest_mean(drift.whole),
+            mean=latest_mean(drift),
             changes=tuple(
                 replace(
                     dated_change(
