@@ -57,6 +57,7 @@ from monitor.workflow.fleet.answer import FleetAnswer
 from monitor.workflow.fleet.answer import OlderVersion
 from monitor.workflow.health.request import ReportAnswer
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.refuted import ContradictedStatement
 from monitor.workflow.history.refuted import ModelRefuted
 from monitor.workflow.history.refuted import RefutedCampaign
 from monitor.workflow.identify.answer import CurveNoise
@@ -385,6 +386,10 @@ class TypedFleetAnswer(Answer[FleetAnswer]):
     def simulated(self) -> Mapping[str, tuple[str, ...]] | None: ...
     @property
     def same_hours(self) -> Mapping[str, tuple[tuple[str, ...], ...]] | None: ...
+    @property
+    def statements_contradicted(self) -> Mapping[str, ContradictedStatement] | None: ...
+    @property
+    def unexplained(self) -> dict[str, str]: ...
 
 class TypedImportAnswer(Answer[ImportAnswer]):
     @property
@@ -563,6 +568,8 @@ class TypedTrendAnswer(Answer[TrendAnswer]):
     def refers_to(self) -> Mapping[str, str]: ...
     @property
     def model_refuted(self) -> ModelRefuted | None: ...
+    @property
+    def statement_contradicted(self) -> ContradictedStatement | None: ...
 
 class TypedUncertaintyAnswer(Answer[UncertaintyAnswer]):
     @property

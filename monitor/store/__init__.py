@@ -169,7 +169,9 @@ if TYPE_CHECKING:
         tolerance_types as tolerance_types,
     )
     from monitor.store.past.lack_of_fit import (
+        ContradictingMachine as ContradictingMachine,
         RefutedMachine as RefutedMachine,
+        contradicting_machines as contradicting_machines,
         refuted_machines as refuted_machines,
         unexplained_machines as unexplained_machines,
     )
@@ -264,7 +266,8 @@ else:
             "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
             "past.history": "FEWEST_STEADY CampaignFit MachineHistory latest_tolerances machine_history "
             "tolerance_types",
-            "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
+            "past.lack_of_fit": "ContradictingMachine RefutedMachine contradicting_machines refuted_machines "
+            "unexplained_machines",
             "past.simulated": "simulated_campaigns",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "earlier_frames identified_runs latest_frames machine_descriptions machine_runs machine_topology "

@@ -31,7 +31,8 @@ def db(tmp_path: Path) -> Iterator[Database]:
 
 def _starts(db: Database, campaign: str) -> list[datetime]:
     rows = db.rows(
-        "SELECT started_at FROM run JOIN campaign USING (campaign_id) WHERE campaign = ? ORDER BY 1", [campaign]
+        "SELECT started_at FROM run JOIN campaign USING (campaign_id) WHERE campaign = ? ORDER BY 1",
+        [campaign],
     )
     return [at.replace(tzinfo=UTC) for (at,) in rows]
 

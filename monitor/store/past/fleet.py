@@ -116,8 +116,8 @@ class FleetSums(GroupSums):
     mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where the parameter was refused
     there. Groups of other campaigns that overlap that day are part of it: ``latest_groups`` counts them all,
     ``latest_m`` and ``latest_mm`` are the sums of their m and m². ``same_hours`` are the groups of machines of which
-    some overlap. ``since_d`` is the last recorded event before the last run (days since 1970, NaN: none); runs before it
-    are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
+    some overlap. ``since_d`` is the last recorded event before the last run (days since 1970, NaN: none); runs before
+    it are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
     without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
     it). ``last_value`` and ``last_u`` are of the last run of the machine (NaN where the parameter was refused there),
     ``check_d`` is when it is measured next, as far after its last run as its campaigns lie apart (days since 1970).

@@ -105,8 +105,8 @@ FROM {groups} AS g JOIN run AS r USING (campaign_id) JOIN identified_values AS v
 WHERE CASE WHEN places IS NULL THEN place IS NOT NULL ELSE list_contains(places, place) END
 """
 
-# A recorded event splits the history of a machine, as in `monitor trend`: runs that began before the last event count no
-# more. An event after the last run splits nothing yet, a note never.
+# A recorded event splits the history of a machine, as in `monitor trend`: runs that began before the last event count
+# no more. An event after the last run splits nothing yet, a note never.
 SINCE = f"""
 CREATE OR REPLACE TEMP TABLE fleet_since AS
 WITH happened AS (

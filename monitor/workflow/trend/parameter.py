@@ -69,7 +69,7 @@ _CHANCE = 0.01
 
 
 def latest_mean(drift: PieceDrift) -> LatestMean:
-    """The mean of the last day's steady runs since the last event, with its standard uncertainty and degrees of freedom.
+    """The mean of the last day's steady runs since the last event, with standard uncertainty and degrees of freedom.
 
     A day of another campaign that overlaps it is part of it, as in the table of all machines. Of several runs u is
     the scatter of runs within days by their number, and what it has of the calibrations that they rest on; of a single
