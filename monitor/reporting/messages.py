@@ -141,6 +141,11 @@ def machines_contradicting(machines: Mapping[str, tuple[str, float]], most: int)
     )
 
 
+def more_copies(count: int) -> str:
+    """Return how many more campaigns hold runs of others than are named, and what names them."""
+    return f"{count} more campaign{'s hold' if count > 1 else ' holds'} runs of others; `monitor campaigns` names all"
+
+
 def campaigns_of_same_hours(machine: str, campaigns: Sequence[str]) -> str:
     """Return which ``campaigns`` a machine cannot all have made, and what to do about it."""
     return (

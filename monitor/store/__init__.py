@@ -116,6 +116,7 @@ if TYPE_CHECKING:
         CopiedCampaign as CopiedCampaign,
         CopiedRun as CopiedRun,
         campaign_notes as campaign_notes,
+        campaign_numbers as campaign_numbers,
         copied_campaigns as copied_campaigns,
         copied_runs as copied_runs,
         copy_notes as copy_notes,
@@ -245,7 +246,8 @@ else:
             "certificates": "StoredCertificate certificate_numbers certificates_in_force find_certificate "
             "list_certificates load_certificate mark_certificate save_certificate",
             "connection": "Database",
-            "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes copied_campaigns copied_runs copy_notes "
+            "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes campaign_numbers copied_campaigns copied_runs "
+            "copy_notes "
             "noted_campaigns",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",

@@ -28,6 +28,7 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
+from monitor.workflow.copied_readings import copies_in_history
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -85,6 +86,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
             db, "trend", to_document(answer), method=WHOLE, machine=request.machine, seed=SEED, repeated=False,
             latest=latest,
         )  # fmt: skip
+    answer = replace(answer, copied_readings=copies_in_history(db, answer.campaigns))
     if request.weekly_looks:
         from monitor.workflow.history.weekly_looks import weekly_notices
 
