@@ -1,7 +1,7 @@
 """All machines at once: every parameter of every machine, what needs attention first.
 
 Means, pooled variances, Bartlett, ANOVA and drift are computed from sums that the database makes; nothing is stored.
-Of each machine the days since its last recorded event count (`monitor event`).
+Of each machine the runs since its last recorded event count (`monitor event`).
 """
 
 from __future__ import annotations
