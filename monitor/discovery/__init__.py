@@ -10,7 +10,13 @@ from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes.cures import Mistake
-from monitor.discovery.machine.mistakes.late_rows import find_late_rows, find_late_rows_without_fit
+from monitor.discovery.machine.mistakes.late_rows import (
+    LateRows,
+    find_late_rows,
+    find_late_rows_without_fit,
+    late_rows,
+    late_rows_without_fit,
+)
 from monitor.discovery.machine.mistakes.mistakes import (
     find_mistakes,
     find_other_names,
@@ -32,6 +38,7 @@ __all__ = [
     "ChainMissing",
     "Explanation",
     "Fit",
+    "LateRows",
     "Mistake",
     "RobustFit",
     "Verdict",
@@ -49,6 +56,8 @@ __all__ = [
     "fit",
     "is_far",
     "is_gross",
+    "late_rows",
+    "late_rows_without_fit",
     "nearest_readings",
     "only_misread",
     "robust_fit",
