@@ -29,10 +29,12 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     exchanged_axes,
     measured_columns,
     reading_mistakes,
+    sign_turned,
     turned_axes,
     unit_mistakes,
 )
 from monitor.discovery.machine.mistakes.cures import (
+    NOISE_TIMES,
     Maker,
     Mistake,
     cured_rms,
@@ -43,6 +45,7 @@ from monitor.discovery.machine.mistakes.cures import (
     without_gross,
 )
 from monitor.discovery.machine.mistakes.fewer_rows import MOST_RUNS, fewer_rows
+from monitor.discovery.machine.mistakes.plays import beside_shown_plays
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
@@ -64,6 +67,9 @@ AS_WELL = 13.8
 FORESEEN = 0.5
 #: A setup with less than this part of all rows is fitted alone in less time than one step of all takes.
 SMALL = 1 / 15
+#: The sign of all that was read is the likeliest of mistakes: half of ``BY_CHANCE`` is its own, where what is turned so
+#: agrees with the others altogether.
+OF_SIGN = 2
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
@@ -116,6 +122,20 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
     if not isinstance(ability, Instruments):
         return ()
     campaign = without_gross(campaign, first)
+    mistakes = _mistakes(campaign, problem_of, problem_of, first)
+    if mistakes or first.rms < NOISE_TIMES * first.sigma:
+        return mistakes
+    # What plays and lags leave hides whether who is doubted agrees; and who reads them otherwise contradicts by them.
+    beside = beside_shown_plays(campaign, problem_of)
+    fit = None if beside is None else fitted(campaign, beside)
+    return () if beside is None or fit is None else _mistakes(campaign, beside, problem_of, fit)
+
+
+def _mistakes(campaign: Campaign, problem_of: Maker, as_given: Maker, first: Fit) -> tuple[Mistake, ...]:
+    """The mistakes of a campaign beside the effects of a problem; what they leave is said of the problem ``as_given``.
+    """
+    ability = campaign_method(campaign).instruments
+    assert isinstance(ability, Instruments)
     tried, of_tried = campaign, first
     if len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
         tried = replace(campaign, probings=campaign.probings.rows(rows))
@@ -134,7 +154,8 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
             alike = [cure for cure in cures if cure.fit.sum_of_squares <= least + AS_WELL]
             mistakes = []
             for cure in sorted(alike, key=lambda cure: cure.fit.sum_of_squares):
-                fit = cure.fit if tried is campaign else fitted(cure.undone(campaign), problem_of)
+                is_fitted = tried is campaign and problem_of is as_given
+                fit = cure.fit if is_fitted else fitted(cure.undone(campaign), as_given)
                 if fit is not None:
                     mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains, untried))
             return tuple(mistakes)
@@ -200,9 +221,11 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
     one."""
     rows = _rows_of(campaign, doubted.setups)
     is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
-    of_readings, of_axes = _trials(_part(campaign, rows), doubted)
+    part = _part(campaign, rows)
+    of_sign = _of_sign(part)
+    of_readings, of_axes = _trials(part, doubted)
     count = len(of_readings) + len(of_axes)
-    if _by_chance(doubted, 0.0, count, is_quiet=doubted.is_quiet) >= BY_CHANCE:
+    if _by_chance(doubted, 0.0, min(count, OF_SIGN), is_quiet=doubted.is_quiet) >= BY_CHANCE:
         # It contradicts by so little that even who agrees in full, with a mistake undone, may do so by chance.
         return []
     total = first.sum_of_squares
@@ -215,7 +238,7 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
                 continue
             problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
             fit = None if problem is None else fitted_problem(problem)
-            if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
+            if fit is not None and _is_cured(campaign, first, fit, run, doubted, count, is_sign=what == of_sign):
                 what = f"{what.split(' (`')[0]} {doubted.in_words}"
                 explains = doubted.is_still or _explains(
                     max(fit.degrees_of_freedom, 1), first.sum_of_squares, fit.sum_of_squares
@@ -224,6 +247,12 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         if cures:
             return cures
     return []
+
+
+def _of_sign(part: Campaign) -> str:
+    """The words of the sign of all that was measured in some rows."""
+    measured = measured_columns(part)
+    return next((what for what, _ in all_signs(measured)), sign_turned(", ".join(measured)))
 
 
 def _trials(part: Campaign, doubted: _Doubted) -> tuple[list[Trial], list[Trial]]:
@@ -256,8 +285,11 @@ def _worth_fitting(undone: Campaign, problem_of: Maker, limit: float) -> ChainPr
     return problem if problem is not None and sum_after_one_step(problem) <= limit else None
 
 
-def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
-    """Whether who is doubted agrees in a ``fit`` with one of ``count`` mistakes undone."""
+def _is_cured(
+    campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int, *, is_sign: bool
+) -> bool:
+    """Whether who is doubted agrees in a ``fit`` with one of ``count`` mistakes undone, the sign of all that it reads
+    where it ``is_sign``."""
     if fit.sum_of_squares >= first.sum_of_squares and not doubted.is_still:
         return False
     ability = campaign_method(campaign).instruments
@@ -268,7 +300,10 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
         return is_in_order and (contrast is None or contrast.p > DOUBTFUL)
     if contrast is None or contrast.directions < doubted.directions:
         return False
-    return _by_chance(doubted, contrast.size, count, is_quiet=doubted.is_quiet and is_in_order) < BY_CHANCE
+    is_quiet = doubted.is_quiet and is_in_order
+    if is_sign and contrast.p > DOUBTFUL:
+        count = min(count, OF_SIGN)
+    return _by_chance(doubted, contrast.size, count, is_quiet=is_quiet) < BY_CHANCE
 
 
 def _by_chance(doubted: _Doubted, size: float, count: int, *, is_quiet: bool) -> float:
