@@ -65,30 +65,29 @@ def _shown(fit: Fit, setup: Array) -> set[str]:
             basis = orthonormal(by_local[rows].reshape(len(rest), -1))
             # As they were without any of them.
             rest = without(basis, rest - plays @ solution.common)
-            seen = _seen_in(rest, basis, plays)
-            shown.update(names[each] for each in seen)
+            shown.update(names[each] for each in _shown_by(rest, basis, plays))
     return shown
 
 
-def _seen_in(rest: Array, basis: Array, plays: Array) -> list[int]:
+def _shown_by(rest: Array, basis: Array, plays: Array) -> list[int]:
     """The columns (N, k) that what is left of a setup (N,) shows beside a ``basis`` of its unknowns, the plainest
     first."""
     least = SMALL * np.linalg.norm(plays, axis=0)
     plays = without(basis, plays)
-    seen: list[int] = []
-    while len(seen) < plays.shape[1]:
+    columns: list[int] = []
+    while len(columns) < plays.shape[1]:
         size = np.linalg.norm(plays, axis=0)
         is_left = size > least
         along = np.where(is_left, rest @ plays / np.where(is_left, size, 1.0), 0.0)
         best = int(np.argmax(np.abs(along)))
-        free = max(len(rest) - basis.shape[1] - len(seen) - 1, 1)
-        left = (float(rest @ rest) - along[best] ** 2) / free
-        if along[best] ** 2 <= SHOWN**2 * max(left, 1.0):
+        free = max(len(rest) - basis.shape[1] - len(columns) - 1, 1)
+        scatter = (float(rest @ rest) - along[best] ** 2) / free
+        if along[best] ** 2 <= SHOWN**2 * max(scatter, 1.0):
             break
         unit = plays[:, best] / size[best]
         rest, plays = rest - along[best] * unit, plays - np.outer(unit, unit @ plays)
-        seen.append(best)
-    return seen
+        columns.append(best)
+    return columns
 
 
 def plays_of(problem: ChainProblem) -> list[ParsedEffect]:

@@ -70,6 +70,8 @@ SMALL = 1 / 15
 #: The sign of all that was read is the likeliest of mistakes: half of ``BY_CHANCE`` is its own, where what is turned so
 #: agrees with the others altogether.
 OF_SIGN = 2
+#: Beside plays all rows are looked at, which of more than this takes too long.
+MOST_ROWS_OF_PLAYS = 2000
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
@@ -122,22 +124,29 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
     if not isinstance(ability, Instruments):
         return ()
     campaign = without_gross(campaign, first)
-    mistakes = _mistakes(campaign, problem_of, problem_of, first)
-    if mistakes or first.rms < NOISE_TIMES * first.sigma:
+    mistakes = _mistakes(campaign, problem_of, first)
+    if mistakes or first.rms < NOISE_TIMES * first.sigma or len(campaign.probings) > MOST_ROWS_OF_PLAYS:
         return mistakes
     # What plays and lags leave hides whether who is doubted agrees; and who reads them otherwise contradicts by them.
     beside = beside_shown_plays(campaign, problem_of)
     fit = None if beside is None else fitted(campaign, beside)
-    return () if beside is None or fit is None else _mistakes(campaign, beside, problem_of, fit)
+    if beside is None or fit is None:
+        return ()
+    plays = fit.problem.added[len(first.problem.added) :]
+    in_model = f" (with {' and '.join(effect.text for effect in plays)} in the model)"
+    mistakes = _mistakes(campaign, beside, fit, beside_plays=True)
+    return tuple(replace(mistake, what=mistake.what + in_model) for mistake in mistakes)
 
 
-def _mistakes(campaign: Campaign, problem_of: Maker, as_given: Maker, first: Fit) -> tuple[Mistake, ...]:
-    """The mistakes of a campaign beside the effects of a problem; what they leave is said of the problem ``as_given``.
-    """
+def _mistakes(
+    campaign: Campaign, problem_of: Maker, first: Fit, *, beside_plays: bool = False
+) -> tuple[Mistake, ...]:
+    """The mistakes of a campaign without gross readings, of which of very many rows some are tried; beside plays all
+    rows, since between some of them the moves would be others, and signs alone."""
     ability = campaign_method(campaign).instruments
     assert isinstance(ability, Instruments)
     tried, of_tried = campaign, first
-    if len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
+    if not beside_plays and len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
         tried = replace(campaign, probings=campaign.probings.rows(rows))
         refitted = fitted(tried, problem_of)
         if refitted is None:
@@ -149,13 +158,16 @@ def _mistakes(campaign: Campaign, problem_of: Maker, as_given: Maker, first: Fit
             ability.scatters(of_tried.problem, of_tried.solution, int(run)),
         )
         if doubted:
-            cures = [cure for each in doubted for cure in _cures(tried, problem_of, of_tried, int(run), each)]
+            cures = [
+                cure
+                for each in doubted
+                for cure in _cures(tried, problem_of, of_tried, int(run), each, only_sign=beside_plays)
+            ]
             least = min((cure.fit.sum_of_squares for cure in cures), default=0.0)
             alike = [cure for cure in cures if cure.fit.sum_of_squares <= least + AS_WELL]
             mistakes = []
             for cure in sorted(alike, key=lambda cure: cure.fit.sum_of_squares):
-                is_fitted = tried is campaign and problem_of is as_given
-                fit = cure.fit if is_fitted else fitted(cure.undone(campaign), as_given)
+                fit = cure.fit if tried is campaign else fitted(cure.undone(campaign), problem_of)
                 if fit is not None:
                     mistakes.append(Mistake(cure.what, first.rms, fit.rms, cure.explains, untried))
             return tuple(mistakes)
@@ -216,15 +228,19 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> tup
     return [*doubted, *too_still, *scattering[:MOST_TRIED]], untried
 
 
-def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
+def _cures(
+    campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted, *, only_sign: bool
+) -> list[_Cure]:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
-    one."""
+    one; or the sign of all that it reads alone."""
     rows = _rows_of(campaign, doubted.setups)
     is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
     part = _part(campaign, rows)
     of_sign = _of_sign(part)
     of_readings, of_axes = _trials(part, doubted)
-    count = len(of_readings) + len(of_axes)
+    if only_sign:
+        of_readings, of_axes = [trial for trial in of_readings if trial[0] == of_sign], []
+    count = max(len(of_readings) + len(of_axes), OF_SIGN)
     if _by_chance(doubted, 0.0, min(count, OF_SIGN), is_quiet=doubted.is_quiet) >= BY_CHANCE:
         # It contradicts by so little that even who agrees in full, with a mistake undone, may do so by chance.
         return []
@@ -238,7 +254,9 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
                 continue
             problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
             fit = None if problem is None else fitted_problem(problem)
-            if fit is not None and _is_cured(campaign, first, fit, run, doubted, count, is_sign=what == of_sign):
+            if fit is not None and _is_cured(
+                campaign, first, fit, run, doubted, count, is_sign=what == of_sign
+            ):
                 what = f"{what.split(' (`')[0]} {doubted.in_words}"
                 explains = doubted.is_still or _explains(
                     max(fit.degrees_of_freedom, 1), first.sum_of_squares, fit.sum_of_squares

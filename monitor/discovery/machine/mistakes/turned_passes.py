@@ -34,7 +34,7 @@ WORTH_SHARE, MOST_LEFT = 0.2, 0.25
 MOST_TOGETHER = 8
 #: So many that are foreseen to leave least are fitted, where that is less than so many times what is left as recorded:
 #: a play that is put right in one pass adds to it until it is fitted.
-MOST_TRIED, FORESEEN = 8, 4.0
+MOST_TRIED, FORESEEN = 6, 2.0
 #: Passes that do the same leave sums of squares that differ by less: odds of a thousand to one.
 AS_WELL = 13.8
 
@@ -46,6 +46,11 @@ class _Pass:
     setup: str
     rows: npt.NDArray[np.int64]
     source: npt.NDArray[np.int64]
+
+    @property
+    def keeps_first(self) -> bool:
+        """Whether its first row keeps its place."""
+        return bool(self.source[0] == self.rows[0])
 
     def in_words(self, campaign: Campaign) -> str:
         """Which readings stand in the opposite order."""
@@ -126,17 +131,17 @@ def _best_of(
 ) -> tuple[_Latest, _Pass, tuple[_Pass, ...]] | None:
     """What follows of the pass that put right leaves least, and those that do as well; None where none takes enough
     away."""
-    foreseen = [
-        (_foreseen(latest.without_plays, problem_of(undone)), number, undone)
-        for number, each in enumerate(passes)
-        for undone in each.undone(latest.campaign)
-    ]
-    foreseen.sort(key=lambda trial: trial[:2])
+    foreseen = sorted(
+        (remains, number, way)
+        for number, remains in enumerate(_foreseen(latest, problem_of, passes))
+        for way in range(2)
+    )
     excess = _excess(latest.fit)
     cures: list[tuple[float, int, Campaign, Fit]] = []
-    for remains, number, undone in foreseen[:MOST_TRIED]:
+    for remains, number, way in foreseen[:MOST_TRIED]:
         if remains > FORESEEN * latest.without_plays.sum_of_squares:
             break
+        undone = passes[number].undone(latest.campaign)[way]
         fit = fitted(undone, problem_with_plays)
         if fit is not None and _excess(fit) < (1.0 - WORTH_SHARE) * excess:
             cures.append((fit.sum_of_squares, number, undone, fit))
@@ -159,16 +164,27 @@ def _best_of(
     return _Latest(undone, fit, without_plays), passes[best], tuple(alike)
 
 
-def _foreseen(latest: Fit, problem: ChainProblem) -> float:
-    """The sum of squares that is foreseen of a problem in which a pass is put right, by the derivatives of a fit."""
-    solution = latest.solution
-    change = problem.vectors(solution.local, solution.common) - latest.vectors
-    white = problem.padded(np.where(latest.has_weight, change / problem.sigma, 0.0))
-    rest = solution.last.residual.copy()
-    rest[:, : white.shape[1]] += white
-    basis = latest.nuisance.basis
-    rest -= np.einsum("rnp,rp->rn", basis, np.einsum("rnp,rn->rp", basis, rest))
-    return float(np.sum(rest**2))
+def _foreseen(latest: _Latest, problem_of: Maker, passes: Sequence[_Pass]) -> Iterator[float]:
+    """The sum of squares that is foreseen with each pass put right, by the derivatives of the fit without plays."""
+    fit = latest.without_plays
+    solution, basis = fit.solution, fit.nuisance.basis
+    # Passes share no rows but with their own other order: two problems say what all of them read.
+    changes: dict[bool, Array] = {}
+    for keeps_first in {each.keeps_first for each in passes}:
+        turned = latest.campaign
+        for each in passes:
+            if each.keeps_first is keeps_first:
+                turned = each.undone(turned)[0]
+        change = problem_of(turned).vectors(solution.local, solution.common) - fit.vectors
+        changes[keeps_first] = np.where(fit.has_weight, change / fit.problem.sigma, 0.0)
+    for each in passes:
+        white = np.zeros_like(changes[each.keeps_first])
+        white[each.rows] = changes[each.keeps_first][each.rows]
+        white = fit.problem.padded(white)
+        rest = solution.last.residual.copy()
+        rest[:, : white.shape[1]] += white
+        rest -= np.einsum("rnp,rp->rn", basis, np.einsum("rnp,rn->rp", basis, rest))
+        yield float(np.sum(rest**2))
 
 
 def _passes(campaign: Campaign, problem: ChainProblem) -> Iterator[_Pass]:
