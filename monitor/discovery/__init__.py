@@ -27,6 +27,7 @@ from monitor.discovery.machine.mistakes.mistakes import (
 from monitor.discovery.machine.mistakes.run_mistakes import find_run_mistakes
 from monitor.discovery.machine.mistakes.setup_mistakes import find_setup_mistakes, only_misread
 from monitor.discovery.machine.mistakes.still_axes import find_still_axes
+from monitor.discovery.machine.mistakes.turned_passes import find_turned_passes
 from monitor.discovery.machine.shapes.step_places import Between, nearest_readings
 from monitor.discovery.machine.shapes.steps_of_model import steps_of_model
 from monitor.discovery.machine.version_error import VersionError, version_error
@@ -53,6 +54,7 @@ __all__ = [
     "find_run_mistakes",
     "find_setup_mistakes",
     "find_still_axes",
+    "find_turned_passes",
     "fit",
     "is_far",
     "is_gross",
