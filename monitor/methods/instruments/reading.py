@@ -131,6 +131,10 @@ class Reading(Protocol):
         """Make the reading of a setup from its rows; the rows with the constants of the kind."""
         ...
 
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        """The reading with its first guess made of the rows as they are now; the rows with its constants."""
+        ...
+
     @property
     def numbers(self) -> tuple[str, ...]:
         """Names of the k numbers of a row."""
@@ -182,6 +186,9 @@ class Plain:
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
         return cls(setup), rows
+
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        return self, rows
 
     def holds(self, unknown: str) -> bool:
         """Whether the setup states an unknown as known."""
