@@ -1,7 +1,6 @@
 """Points of another campaign of the same set-up are predicted in the frame of the fitted one, however it is turned.
 
-The machine is a gantry with a turning head, from plain matrices (``tests/simulator/instruments.py``); the tracker that
-sees two reflectors on the head is turned about the vertical by any angle, and leans by 10 mrad.
+The tracker that sees a gantry is turned about the vertical by any angle, and leans by 10 mrad.
 """
 
 from __future__ import annotations
@@ -21,54 +20,7 @@ from monitor.workflow.predict.answer import PredictAnswer
 from monitor.workflow.predict.predict import predict
 from monitor.workflow.predict.request import PredictRequest
 from tests.methods.test_pose_readings import six_numbers
-from tests.simulator.instruments import WAYS, SimulatedAxis, SimulatedChain
-
-U_UM = 10.0
-SETUP = f"""
-[[setups]]
-id = "tracker"
-reading = "point"
-standard_uncertainty_um = {U_UM}
-"""
-TARGETS = {"T1": np.array([150.0, 0.0, -80.0]), "T2": np.array([-60.0, 90.0, -200.0])}
-
-
-def _gantry(bump: float = 0.0) -> SimulatedChain:
-    """X Y Z C with small errors, and a ``bump`` (mm) of the straightness of X at 350 mm."""
-    axes = {
-        letter: SimulatedAxis(letter, "linear", WAYS[letter], errors=(0, 0, 0, 2e-5, -3e-5, 4e-5))
-        for letter in "XYZ"
-    }
-    x = SimulatedAxis(
-        "X",
-        "linear",
-        WAYS["X"],
-        motion=lambda q: (0, bump * float(np.interp(q, [300, 350, 400], [0, 1, 0])), 0, 0, 0, 0),
-    )
-    head = SimulatedAxis("C", "rotary", (0.0, 0.0, 1.0), errors=(0.02, -0.01, 0, 3e-5, 2e-5, 0))
-    return SimulatedChain((x, axes["Y"], axes["Z"], head))
-
-
-def _seen(folder: Path, frame: Rotation, seed: int, *, widest: float = 550.0, bump: float = 0.0) -> Path:
-    """Forty poses with X up to the ``widest``, both reflectors at each."""
-    rng, chain = np.random.default_rng(seed), _gantry(bump)
-    rows = []
-    low, high = [0.0, 0.0, 0.0, -175.0], [widest, 1000.0, 500.0, 175.0]
-    poses = rng.uniform(low, high, (40, 4))
-    poses[:2, 0] = 0.0, widest
-    for pose in poses:
-        readings = dict(zip("XYZC", pose.tolist(), strict=True))
-        tool = chain.pose(readings)
-        for name, place in TARGETS.items():
-            seen = frame.inv().apply(tool[:3, :3] @ place + tool[:3, 3] - [900.0, -1700.0, 400.0])
-            seen += rng.normal(0.0, U_UM / 1e3, 3)
-            point = dict(zip(("point_x_mm", "point_y_mm", "point_z_mm"), seen.tolist(), strict=True))
-            stated = dict(zip(("nominal_x_mm", "nominal_y_mm", "nominal_z_mm"), place.tolist(), strict=True))
-            rows.append({"setup": "tracker", "target": name, **readings, **point, **stated})
-    written = chain.write(folder, SETUP, rows)
-    text = (written / "campaign.toml").read_text(encoding="utf-8")
-    (written / "campaign.toml").write_text(text.replace(f'id = "{folder.name}"', 'id = "gantry"'))
-    return written
+from tests.simulator.seen_gantry import U_UM, seen_gantry
 
 
 def _predicted(folders: list[Path], effect: str | None = None) -> PredictAnswer:
@@ -87,7 +39,7 @@ def test_points_are_predicted_in_one_frame_at_any_angle(tmp_path: Path, degrees:
     """What a reflector's place and its frame cannot be told apart by was guessed for each file alone: 17 to 33 mm were
     left."""
     frame = Rotation.from_euler("xz", [0.01, np.deg2rad(degrees)])
-    folders = [_seen(tmp_path / name, frame, seed) for seed, name in enumerate(("fitted", "other"), 7)]
+    folders = [seen_gantry(tmp_path / name, frame, seed) for seed, name in enumerate(("fitted", "other"), 7)]
     answer = _predicted(folders)
     assert answer.fitted_rms_um == pytest.approx(U_UM, rel=0.2)
     assert answer.rms_um == pytest.approx(U_UM, rel=0.3)
@@ -114,8 +66,8 @@ def test_a_free_shape_stays_that_of_the_fitted_rows(tmp_path: Path) -> None:
     """Its hats were spread over the rows of both files: where the other one goes further, the bump was another one."""
     frame = Rotation.from_euler("z", 0.5)
     folders = [
-        _seen(tmp_path / "fitted", frame, 1, bump=0.2),
-        _seen(tmp_path / "other", frame, 2, bump=0.2, widest=1500.0),
+        seen_gantry(tmp_path / "fitted", frame, 1, bump=0.2),
+        seen_gantry(tmp_path / "other", frame, 2, bump=0.2, widest=1500.0),
     ]
     answer = _predicted(folders, "EYX:free(8)")
     assert answer.fitted_rms_um == pytest.approx(U_UM, rel=0.2)
