@@ -38,10 +38,13 @@ def ideal_rows(context: Context, parts: Sequence[Part]) -> InstrumentRows:
             ideal[part.at, :numbers] = _since_the_first(read, rows.run) if reading.relative else read
         if shown.by_shift is not None and shown.by_turn is None:
             towards[part.at, :numbers] = np.einsum("nka,nab->nkb", shown.by_shift, turned)
-    read_by = [
-        ReadBy(part.id, part.instrument, part.reading.name, len(part.reading.numbers)) for part in parts
-    ]
+    read_by = [_read_by(part) for part in parts]
     return InstrumentRows(tuple(read_by), setup, ideal, towards, LEVER)
+
+
+def _read_by(part: Part) -> ReadBy:
+    reading = part.reading
+    return ReadBy(part.id, part.instrument, reading.name, len(reading.numbers), reading.has_own_frame)
 
 
 def _since_the_first(read: Array, run: npt.NDArray[np.int64]) -> Array:

@@ -122,6 +122,11 @@ class Reading(Protocol):
     staying: ClassVar[tuple[str, ...]]
 
     @property
+    def has_own_frame(self) -> bool:
+        """Whether the numbers are along the axes of a frame of the setup that is not the machine's."""
+        ...
+
+    @property
     def besides(self) -> float:
         """The length in mm that a reading has besides its number, as that of a bar."""
         ...
@@ -178,6 +183,10 @@ class Plain:
     turns: ClassVar[int] = 0
     relative: ClassVar[bool] = False
     staying: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def has_own_frame(self) -> bool:
+        return False
 
     @property
     def besides(self) -> float:

@@ -76,6 +76,10 @@ class Point(Plain):
         return reading, replace(rows, guess=np.concatenate([guess, middle], axis=1))
 
     @property
+    def has_own_frame(self) -> bool:
+        return not self.holds("frame")
+
+    @property
     def numbers(self) -> tuple[str, ...]:
         return ("x", "y") if self.plane else ("x", "y", "z")
 
