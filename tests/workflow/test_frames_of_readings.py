@@ -1,4 +1,4 @@
-"""Whose frame x, y and z are of, where an instrument reads points in a frame of its own: "machine" was said of them."""
+"""In which frame and unit residuals stand: points that an instrument reads in a frame of its own, and angles."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 from scipy.spatial.transform import Rotation
 
+from monitor.cli import main
+from monitor.cli.residual_output import ANGLES
 from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.workflow.explain.machine_answer import frame_of_point, residual_frames
+from tests.methods.test_mount_terms import night
 from tests.simulator.seen_gantry import seen_gantry
 
 
@@ -39,3 +42,19 @@ def test_a_bad_point_says_whose_frame_its_axis_is_of(tmp_path: Path) -> None:
     assert frame_of_point(point, problem) == "setup tracker"
     assert frame_of_point(replace(point, frame="C"), problem) == "axis C itself"
     assert frame_of_point(replace(point, axis="its place"), problem) is None
+
+
+@pytest.mark.slow
+def test_micrometres_of_angles_are_said_to_be_microradians(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Was: "RMS 18 µm" of a mount. Of points nothing is said."""
+    angles = night(tmp_path, 1, stars=30)
+    points = seen_gantry(tmp_path / "points", Rotation.identity(), 1)
+    database = str(tmp_path / "one.duckdb")
+    assert main(["--db", database, "import", str(angles), str(points)]) == 0
+    for verb in ("compare", "predict"):
+        for folder, is_said in ((angles, True), (points, False)):
+            capsys.readouterr()
+            assert main(["--db", database, verb, folder.name]) == 0
+            assert (ANGLES in capsys.readouterr().out) is is_said

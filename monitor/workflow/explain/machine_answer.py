@@ -107,6 +107,7 @@ def machine_comparison(comparison: ChainComparison, problem: ChainProblem) -> Ma
             for kind, parts in comparison.by.items()
         },
         refers_to=residual_frames(problem) or None,
+        are_angles=None if problem.is_length.any() else True,
     )
 
 

@@ -199,6 +199,7 @@ def _answer(
         fitted_rms_um=0.0,
         stated_uncertainty_um=um(float(np.sqrt(np.mean(problem.sigma[np.isfinite(problem.sigma)] ** 2)))),
         components=problem.components,
+        are_angles=None if problem.is_length.any() else True,
         by_target={
             str(target): MachinePart(
                 rms(targets == target), um(float(np.abs(residual[targets == target]).max())),
