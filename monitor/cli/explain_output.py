@@ -147,9 +147,14 @@ def _add(what: str, effects: Sequence[str], to: str) -> None:
 
 def _bad_probing(reading: BadProbing, target_word: str) -> None:
     output.say(
-        f"bad point: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: {reading.axis} is "
-        f"off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
+        f"bad point: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: "
+        f"{_along(reading)} is off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
     )
+
+
+def _along(reading: BadProbing) -> str:
+    """What is off, and in whose frame."""
+    return reading.axis + ("" if reading.refers_to is None else f" (relative to {reading.refers_to})")
 
 
 def _turn(reading: BadProbing) -> str:
@@ -160,7 +165,7 @@ def _turn(reading: BadProbing) -> str:
 def _recurring_probing(reading: BadProbing, target_word: str) -> None:
     output.say(
         f"recurs in most runs: run {reading.run}, sequence {reading.sequence}, {target_word} {reading.target}: "
-        f"{reading.axis} is off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
+        f"{_along(reading)} is off by {reading.size_um:.1f} µm{_turn(reading)}; it was left out"
     )
 
 

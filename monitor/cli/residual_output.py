@@ -11,6 +11,9 @@ from monitor.reporting.curve_finding import correlation
 if TYPE_CHECKING:
     from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 
+#: Said of residuals in µm where nothing but angles was read.
+ANGLES = "all readings are angles: 1 µm stands for 1 µrad, what it comes to at one metre"
+
 
 def four_digits(value: float | None) -> str:
     """A number with four digits; a dash where there is none."""
@@ -34,7 +37,7 @@ def with_uncertainty(value: float | None, u: float | None) -> str:
 def summary(comparison: MachineComparison | CurveComparison) -> None:
     """The comparison in some sentences."""
     # Loaded here: `model list`, which prints no comparison, waits twice as long otherwise.
-    from monitor.workflow.explain.compare_answer import CurveComparison
+    from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 
     curve = comparison if isinstance(comparison, CurveComparison) else None
     number = output.micrometres if curve is None else four_digits
@@ -53,6 +56,8 @@ def summary(comparison: MachineComparison | CurveComparison) -> None:
     )
     model = f"{comparison.campaign}, model {comparison.model}{base}"
     output.say(f"{model}: RMS {number(comparison.rms)} {unit}{expected}; {repeats}")
+    if isinstance(comparison, MachineComparison) and comparison.are_angles:
+        output.say(ANGLES)
     test = comparison.lack_of_fit
     if test.f is not None:
         output.say(f"lack of fit over repeatability: F = {test.f:.2f}, {output.stated('p', test.p)}")

@@ -33,12 +33,13 @@ MOST_REMEMBERED = 20_000
 @dataclass(frozen=True)
 class ReadBy:
     """A setup as effects know it: its ``id``, its ``instrument`` (empty where nobody says it), its ``kind`` of reading,
-    and how many ``numbers`` it reads a row."""
+    how many ``numbers`` it reads a row, and whether they are along the axes of a frame of its own."""
 
     id: str
     instrument: str
     kind: str
     numbers: int
+    has_own_frame: bool = False
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,12 @@ class MethodRules:
     check: Callable[[Plan], Iterable[Fault]] = no_check
     declared: Callable[[Artefact], DeclaredPlaces | None] = nothing_declared
 
+    @property
+    def targets_are_seen(self) -> bool:
+        """Whether something looks at targets where they are: nominal columns say where on the tool, and the axes are
+        not brought there."""
+        return self.needs_setups or self.targets_are_reflectors
+
 
 #: Units of the channels of a method that measures nothing but positions.
 CHANNELS_ONLY = CONDITION_SUFFIXES

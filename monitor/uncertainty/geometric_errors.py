@@ -137,4 +137,6 @@ def _commanded(geometric: GeometricErrors, positions: Array, inside: bool) -> Co
             else np.concatenate([old.set_up, np.full(count, old.set_up[of_run][-1])])
         ),
         approach=None if old.approach is None else np.concatenate([old.approach, np.zeros(pairs.shape, int)]),
+        # Shapes and drivers are scaled by what was measured, as they were when their coefficients were estimated.
+        measured=old.scaling,
     )

@@ -33,3 +33,17 @@ def test_an_axis_that_stands_still_in_the_plan_takes_no_part_away(make: Callable
     planned = replace(still, measured=measured)
     count = flexible_basis(measured, measured.chain.index("X")).shape[1]
     assert flexible_basis(planned, measured.chain.index("X")).shape[1] == count
+
+
+def test_hats_of_a_mount_are_there_at_poses_of_which_nobody_says_where_it_points(
+    make: Callable[..., Context],
+) -> None:
+    """`explain` ended with "operands could not be broadcast": a free shape had eight parts less at poses drawn to ask
+    which effects move alike."""
+    nights = make({"C": np.linspace(0.1, 1.3, 60).tolist(), "B": np.linspace(-2.0, 2.0, 60).tolist()})
+    measured = replace(nights, sight=np.tile([1.0, 0.0, 0.0], (60, 1)))
+    planned = replace(measured.taken(np.array([5, 30, 50])), sight=None, measured=measured)
+    joint = measured.chain.index("C")
+    assert flexible_basis(measured, joint).shape[1] == flexible_basis(nights, joint).shape[1] + 8
+    hats = flexible_basis(measured, joint)[:, -8:]
+    assert np.allclose(flexible_basis(planned, joint)[:, -8:], hats[[5, 30, 50]])

@@ -16,6 +16,8 @@ import pytest
 from monitor.discovery import explain
 from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes.mistakes import find_mistakes
+from monitor.discovery.machine.separation.alike import moves_alike
+from monitor.effects import parse_effect
 from monitor.exceptions import EffectError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
@@ -127,6 +129,15 @@ def test_a_fork_carries_an_axis_that_turns_across_it(tmp_path: Path) -> None:
         method.problem_of(campaign, Model("fork", added=("fork:HA@gravity",)))
     solved = solve_problem(method.problem_of(campaign, Model("fork", added=("fork:DEC@gravity",))))
     assert solved.common.shape == (1,)
+
+
+def test_a_free_shape_of_a_mount_is_compared_at_any_pose(tmp_path: Path) -> None:
+    """`explain` ended with "operands could not be broadcast together"."""
+    campaign = read_campaign(night(tmp_path, 1))
+    context = campaign_method(campaign).problem_of(campaign).context
+    hat, wave = (parse_effect(f"EBDEC:{shape}", context.chain) for shape in ("free(7)", "harmonic1"))
+    assert not moves_alike(context, hat, np.array([1e-5]), wave, {})
+    assert moves_alike(context, hat, np.array([1e-5]), hat, {})
 
 
 def with_columns(folder: Path, change: Callable[[dict[str, str]], dict[str, str]]) -> Path:

@@ -13,8 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from monitor.exceptions import CampaignError
 from monitor.readers import doubts, read_campaign
+from monitor.readers.doubts.unit_doubts import off_places
 from monitor.records import Array, Campaign
 from monitor.workflow.tool_frames import tool_frames
+from tests.simulator.seen_gantry import seen_gantry
 
 HEAD = 'format = 1\ncampaign = "head"\nmethod = "instruments"\n[machine]\nid = "head"\n'
 LINEAR = '[[machine.tool_chain]]\nname = "{0}"\nkind = "linear"\nalong = "{0}"\n'
@@ -118,3 +120,12 @@ def test_a_setup_of_which_no_row_names_a_target_is_its_own(tmp_path: Path) -> No
     assert empty.probings.target.tolist() == named.probings.target.tolist()
     with pytest.raises(CampaignError, match=r"line 3, column target: '' is not a name"):
         with_targets(lambda number, setup: "" if number == 1 else setup)
+
+
+def test_places_on_the_tool_are_no_distances_that_the_axes_go(tmp_path: Path) -> None:
+    """Was: "the distances between points that were probed are 0 times the declared ones" of two reflectors on a head
+    whose places each row states."""
+    campaign = read_campaign(seen_gantry(tmp_path / "seen", Rotation.from_euler("z", 1.0), 1))
+    assert isinstance(campaign, Campaign)
+    assert off_places(campaign) is None
+    assert doubts(campaign, tool_frames(campaign)) == ()

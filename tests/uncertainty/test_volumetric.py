@@ -102,6 +102,20 @@ def test_a_temperature_is_that_of_the_run(context, errors_of):
     np.testing.assert_allclose(found.vectors, [[-3e-3, 0.0, 0.0]], atol=1e-12)
 
 
+@pytest.mark.parametrize("effect", ["EZZ:free(6)", "EZZ:free(13,14)", "EZZ:poly1@room_hPa"])
+def test_far_points_change_nothing_at_the_others(context, errors_of, effect):
+    """The hats of a free shape were spread anew over what was asked for, up to 500 mm beyond what was measured."""
+    sized = replace(context, columns={**context.columns, "room_hPa": np.linspace(0.0, 10.0, len(context))})
+    known = errors_of({effect: [1e-3] * (2 if "," in effect else 1)})
+    place = context.chain.index("Z")
+    asked = np.repeat(_at(context, Z=60.0), 2, axis=0)
+    near = volumetric_error(replace(known, context=sized), asked[:1]).vectors[0]
+    asked[1, place] = context.positions[:, place].max() + 500.0
+    np.testing.assert_allclose(
+        volumetric_error(replace(known, context=sized), asked).vectors[0], near, rtol=1e-12
+    )
+
+
 @pytest.fixture(scope="module")
 def thirteen(errors_of):
     """The thirteen of SAMBA at the thesis's values, with a correlated covariance of about 2 µrad and 0.5 µm."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from monitor.cli import output
+from monitor.cli import output, residual_output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.workflow.predict.predict import predict
@@ -38,6 +38,8 @@ def run(options: Namespace) -> int:
         f"fitted rows {output.micrometres(answer.fitted_rms_um)} µm, stated uncertainty of a reading "
         f"{output.micrometres(answer.stated_uncertainty_um)} µm"
     )
+    if answer.are_angles:
+        output.say(residual_output.ANGLES)
     if answer.resting_rms_um is not None:
         output.say(f"targets beside the machine: RMS {output.micrometres(answer.resting_rms_um)} µm")
     if answer.taken_over:

@@ -137,7 +137,7 @@ def _blocks(context: Context, joint: int) -> list[tuple[Follows, list[Array]]]:
     of_direction = [direction, *(direction * part for part in simple)]
     of_direction += [direction * np.exp(-way / length) for length in BUILD_UP]
     play = [wound_up(context, joint, 2.0 * half * width) for width in PLAY]
-    is_mount = context.sight is not None and turns and _is_part_of_turn(visited)
+    is_mount = context.scaling.sight is not None and turns and _is_part_of_turn(visited)
     return [
         (Follows.POSITION, first),
         (Follows.DIRECTION, of_direction),

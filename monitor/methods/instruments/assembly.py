@@ -11,18 +11,17 @@ from monitor.effects import (
     ArtefactEffect,
     Context,
     InstrumentEffect,
-    InstrumentRows,
     ParsedEffect,
-    ReadBy,
     context_of,
 )
 from monitor.exceptions import DataError, EffectError
-from monitor.machine import Chain, evaluate, orientation
+from monitor.machine import Chain, evaluate
 from monitor.methods.instruments.base import instrument_base
 from monitor.methods.instruments.frames import refuse_other_sizes
+from monitor.methods.instruments.ideal_rows import ideal_rows
 from monitor.methods.instruments.part import Part, scale_id_of, tool_id_of
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.instruments.reading import LEVER, Reading, Rows, Stance, in_mm
+from monitor.methods.instruments.reading import LEVER, Reading, Rows, in_mm
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.point import Point
@@ -58,7 +57,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     _refuse_artefact((*base, *added))
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     context = replace(context, sight=_sight(setups, number), nominal=_places(context, parts))
-    context = replace(context, instruments=_instrument_rows(context, parts))
+    context = replace(context, instruments=ideal_rows(context, parts))
     context = replace(context, set_up=set_ups(context, number))
     context = replace(context, approach=turned_beyond(context, parts))
     absent = _absent(context, added)
@@ -184,41 +183,6 @@ def _places(context: Context, parts: tuple[Part, ...]) -> Array:
         none = np.zeros((len(part.at), len(context.chain.joints), 2, 6))
         places[part.at] = evaluate(context.chain, part.rows.positions, none, work, tool).residual + work
     return places
-
-
-def _instrument_rows(context: Context, parts: tuple[Part, ...]) -> InstrumentRows:
-    """What every row reads, of a machine without errors, for effects of instruments."""
-    count = len(context)
-    most = max(len(part.reading.numbers) for part in parts)
-    ideal, towards = np.full((count, most), np.nan), np.zeros((count, most, 3))
-    setup = np.zeros(count, dtype=np.int64)
-    for index, part in enumerate(parts):
-        setup[part.at] = index
-        rows, reading = part.rows, part.reading
-        none = np.zeros((len(rows), len(context.chain.joints), 2, 6))
-        values = reading.start(1)[np.zeros(len(rows), dtype=np.int64)]
-        work, tool = reading.ends(values, rows)
-        sides = orientation(context.chain, rows.positions, none)
-        turned = np.swapaxes(sides.work, 1, 2) @ sides.tool
-        r = evaluate(context.chain, rows.positions, none, work, tool).residual
-        stance = Stance(r, turned, sides.work, sides.tool)
-        shown = reading.shown(replace(stance, nominal=stance), values, rows)
-        numbers = shown.residual.shape[1]
-        if rows.measured.shape[1] == numbers:
-            read = shown.residual + rows.measured
-            ideal[part.at, :numbers] = _since_the_first(read, rows.run) if reading.relative else read
-        if shown.by_shift is not None and shown.by_turn is None:
-            towards[part.at, :numbers] = np.einsum("nka,nab->nkb", shown.by_shift, turned)
-    read_by = [
-        ReadBy(part.id, part.instrument, part.reading.name, len(part.reading.numbers)) for part in parts
-    ]
-    return InstrumentRows(tuple(read_by), setup, ideal, towards, LEVER)
-
-
-def _since_the_first(read: Array, run: npt.NDArray[np.int64]) -> Array:
-    """Numbers (m, k) less those of the first row of their run."""
-    _, first, of_row = np.unique(run, return_index=True, return_inverse=True)
-    return np.asarray(read - read[first[of_row]])
 
 
 def _column(context: Context, name: str) -> Array:

@@ -153,16 +153,25 @@ def _wrong_unit(parts: Iterable[Part]) -> str | None:
     return None
 
 
-def unsettled(parts: Sequence[Part], bars: Iterable[str]) -> str:
-    """What may keep a fit from settling, as the end of a refusal; ``bars`` kept one direction, so that a centre which
-    is stated some millimetres wrong cannot be mended."""
+def bars_of_one_direction(parts: Iterable[Part]) -> tuple[str, ...]:
+    """Setups whose bar kept one direction, so that its centre is held across it where it was stated."""
+    return tuple(
+        part.id
+        for part in parts
+        if isinstance(part.reading, DistanceReading) and part.reading.keeps_one_direction
+    )
+
+
+def unsettled(parts: Sequence[Part]) -> str:
+    """What may keep a fit from settling, as the end of a refusal: lasers that read something else than the travel, and
+    bars that kept one direction, so that a centre which is stated some millimetres wrong cannot be mended."""
     travels = (f"the readings of setup {name} are {what}" for name, what in other_travels(parts))
     hints = (*travels, *_other_lengths(parts), *_other_tool_points(parts))
     suspected = "".join(f"; {what}" for what in hints)
     return suspected + "".join(
         f"; the bar of setup {name} kept one direction, which shows nothing of its centre across it: state "
         "work_point_mm to 0.1 mm, or add rows with the bar in two other directions"
-        for name in bars
+        for name in bars_of_one_direction(parts)
     )
 
 

@@ -9,7 +9,7 @@ from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.as_stated import as_stated
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
-from monitor.methods.instruments.contradiction import other_travels
+from monitor.methods.instruments.contradiction import bars_of_one_direction, other_travels
 from monitor.methods.instruments.contrasts import contrast, contrasts, scatters
 from monitor.methods.instruments.drifts import drifts
 from monitor.methods.instruments.forecast import InstrumentForecast
@@ -37,7 +37,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
 def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
     """What these setups cannot give a number, whatever the plan."""
     assert isinstance(problem, InstrumentProblem)
-    centres = (TakenUp(f"the centre of {name} across its bar", ()) for name in problem.bars_of_one_direction)
+    centres = (
+        TakenUp(f"the centre of {name} across its bar", ()) for name in bars_of_one_direction(problem.parts)
+    )
     absent = (TakenUp(effect, (), why) for effect, why in problem.left_out.items())
     return (*taken_up(problem.context.chain, problem.setups), *centres, *absent)
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -118,6 +119,11 @@ class Part:
         """Where the search for the unknowns begins (R, q): without drift, scale and tool point as stated."""
         begin = self.reading.start(runs)
         return np.hstack([begin, np.zeros((runs, len(self.unknowns) - begin.shape[1]))])
+
+    def guessed_anew(self) -> Self:
+        """The setup with the first guess of its kind made of its rows as they are now."""
+        reading, rows = self.reading.guessed_anew(self.rows)
+        return replace(self, reading=reading, rows=rows)
 
     def ends(self, values: Array) -> tuple[Array, Array]:
         """Work point and tool point (m, 3) mm in the frames of the last axes, for unknowns (m, q) row by row."""

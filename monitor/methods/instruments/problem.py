@@ -20,10 +20,10 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sessions import KnownFromOthers, Stays, known_from_others
 from monitor.methods.instruments.contradiction import contradiction, displaced_work_points, unsettled
 from monitor.methods.instruments.first_guess import first_guess, stance_at
+from monitor.methods.instruments.ideal_rows import ideal_rows
 from monitor.methods.instruments.mistaken_axes import mistaken_axes
 from monitor.methods.instruments.part import Part, own_columns_of
 from monitor.methods.instruments.reading import Shown, Stance, in_mm
-from monitor.methods.instruments.readings.distance import DistanceReading
 from monitor.methods.instruments.seen_errors import by_error_of, first_order
 from monitor.methods.instruments.separated import projector_on_separated
 from monitor.methods.instruments.touched_points import brought_to_points
@@ -133,19 +133,10 @@ class InstrumentProblem(ChainProblem):
             parts.append(replace(part, rows=replace(part.rows, measured=measured)))
         return replace(self, parts=tuple(parts))
 
-    @cached_property
-    def bars_of_one_direction(self) -> tuple[str, ...]:
-        """Setups whose bar kept one direction, so that its centre is held across it where it was stated."""
-        return tuple(
-            part.id
-            for part in self.parts
-            if isinstance(part.reading, DistanceReading) and part.reading.keeps_one_direction
-        )
-
     @property
     def unsettled(self) -> str:
         """Lasers that read something else than the travel, and bars that kept one direction."""
-        return unsettled(self.parts, self.bars_of_one_direction)
+        return unsettled(self.parts)
 
     @property
     def largest_error(self) -> float:
@@ -426,6 +417,12 @@ class InstrumentProblem(ChainProblem):
             at = np.flatnonzero(where[rows] >= 0)
             parts.append(replace(part, rows=part.rows.taken(where[rows[at]], index[at]), at=at))
         return replace(problem, parts=tuple(parts))
+
+    def guessed_anew(self) -> Self:
+        """The problem with one frame a run for each setup, guessed of all rows that belong to it now."""
+        parts = tuple(part.guessed_anew() for part in self.parts)
+        context = replace(self.context, instruments=ideal_rows(self.context, parts))
+        return replace(self, context=context, parts=parts, separated=None, masks=None)
 
     def _separated_of(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Array | None:
         """The projectors of runs that are copies of whole runs; None where they are not."""

@@ -122,6 +122,11 @@ class Reading(Protocol):
     staying: ClassVar[tuple[str, ...]]
 
     @property
+    def has_own_frame(self) -> bool:
+        """Whether the numbers are along the axes of a frame of the setup that is not the machine's."""
+        ...
+
+    @property
     def besides(self) -> float:
         """The length in mm that a reading has besides its number, as that of a bar."""
         ...
@@ -129,6 +134,10 @@ class Reading(Protocol):
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
         """Make the reading of a setup from its rows; the rows with the constants of the kind."""
+        ...
+
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        """The reading with its first guess made of the rows as they are now; the rows with its constants."""
         ...
 
     @property
@@ -176,12 +185,19 @@ class Plain:
     staying: ClassVar[tuple[str, ...]] = ()
 
     @property
+    def has_own_frame(self) -> bool:
+        return False
+
+    @property
     def besides(self) -> float:
         return self.setup.length or 0.0
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
         return cls(setup), rows
+
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        return self, rows
 
     def holds(self, unknown: str) -> bool:
         """Whether the setup states an unknown as known."""

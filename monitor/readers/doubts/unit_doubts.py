@@ -82,7 +82,8 @@ def declared_places(campaign: Campaign) -> DeclaredPlaces | None:
     rules = method_rules().get(campaign.method)
     declared = None if rules is None else rules.declared(campaign.artefact)
     probings = campaign.probings
-    if declared is not None or not {"nominal_x_mm", "nominal_y_mm"} <= set(probings.channels):
+    is_on_tool = rules is not None and rules.targets_are_seen
+    if declared is not None or is_on_tool or not {"nominal_x_mm", "nominal_y_mm"} <= set(probings.channels):
         return declared
     zero = np.zeros(len(probings.target))
     columns = [probings.channels.get(f"nominal_{axis}_mm", zero) for axis in "xyz"]

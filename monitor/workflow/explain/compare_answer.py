@@ -82,7 +82,8 @@ class MachineComparison(InMicrometres):
     ``expected_rms_um`` is what the stated standard uncertainty would leave, ``repeatability_um`` the standard deviation
     of a coordinate over the runs (None with one run or plans that differ), ``residual_deviation_um`` the RMS per degree
     of freedom. ``by`` breaks the residual down by target, axis, run, part of the run and indexation; ``refers_to`` says
-    in words whose frame x, y and z of the residual are those of, where these are what is read.
+    in words whose frame x, y and z of the residual are those of, where these are what is read; ``are_angles``: every
+    reading is an angle, of which 1 µm stands for 1 µrad, what it comes to at one metre.
     """
 
     campaign: str
@@ -98,6 +99,7 @@ class MachineComparison(InMicrometres):
     verdict: Verdict
     by: Mapping[str, Mapping[str, MachinePart]]
     refers_to: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
+    are_angles: bool | None = field(default=None, metadata=OMITTED)
 
     @property
     def expected_rms(self) -> float:

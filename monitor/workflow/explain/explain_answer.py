@@ -178,7 +178,8 @@ class CurveMissing:
 @dataclass(frozen=True)
 class BadProbing:
     """A probing that contradicts the same one of the other runs; it was left out. ``turn_urad`` is by how much a whole
-    pose is turned, beside what its place is off by."""
+    pose is turned, beside what its place is off by; ``refers_to`` says whose frame ``axis`` is one of, where that is
+    not the machine's."""
 
     run: int
     sequence: int
@@ -187,6 +188,7 @@ class BadProbing:
     size_um: float
     p_value: float
     turn_urad: float | None = field(default=None, metadata=OMITTED)
+    refers_to: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

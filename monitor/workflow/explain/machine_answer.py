@@ -76,11 +76,13 @@ def residual_frames(problem: ChainProblem) -> dict[str, str]:
     """What x, y and z of a residual are stated in, in words; empty where readings are no vectors."""
     if problem.components != COORDINATES:
         return {}
-    work = problem.context.chain.work
+    work, instruments = problem.context.chain.work, problem.context.instruments
     frame = (
         FrameOfReference(FrameKind.OWN_AXIS, work[-1].name) if work else FrameOfReference(FrameKind.MACHINE)
     )
-    return dict.fromkeys(COORDINATES, frame_words(frame))
+    setups = () if instruments is None else instruments.setups
+    frames = [f"setup {setup.id}" if setup.has_own_frame else frame_words(frame) for setup in setups]
+    return dict.fromkeys(COORDINATES, " or ".join(dict.fromkeys(frames)) or frame_words(frame))
 
 
 def machine_comparison(comparison: ChainComparison, problem: ChainProblem) -> MachineComparison:
@@ -105,6 +107,7 @@ def machine_comparison(comparison: ChainComparison, problem: ChainProblem) -> Ma
             for kind, parts in comparison.by.items()
         },
         refers_to=residual_frames(problem) or None,
+        are_angles=None if problem.is_length.any() else True,
     )
 
 
@@ -296,7 +299,9 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         for effect in explanation.missing
     )
     comparison = machine_comparison(explanation.comparison, problem)
-    suspect_data, recurring_data = _probings(explanation.suspect), _probings(explanation.recurring)
+    suspect_data, recurring_data = (
+        _probings(points, problem) for points in (explanation.suspect, explanation.recurring)
+    )
     changes = _changes(explanation)
     scattering = tuple(
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
@@ -359,7 +364,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     )
 
 
-def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
+def _probings(points: Sequence[BadPoint], problem: ChainProblem) -> tuple[BadProbing, ...]:
     """Readings that were left out."""
     um = MICROMETRE.to_display
     return tuple(
@@ -371,9 +376,21 @@ def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
             um(point.size),
             point.p_value,
             None if point.turn is None else MICRORADIAN.to_display(point.turn),
+            frame_of_point(point, problem),
         )
         for point in points
     )
+
+
+def frame_of_point(point: BadPoint, problem: ChainProblem) -> str | None:
+    """Whose frame x, y or z of a bad point is of, in words, where that is not the machine's."""
+    instruments = problem.context.instruments
+    if point.axis not in COORDINATES or instruments is None:
+        return None
+    if point.frame is not None:
+        return frame_words(FrameOfReference(FrameKind.OWN_AXIS, point.frame))
+    setup = instruments.setups[instruments.setup[point.row]]
+    return f"setup {setup.id}" if setup.has_own_frame else None
 
 
 def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:

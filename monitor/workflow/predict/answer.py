@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from monitor.documents import OMITTED
 from monitor.workflow.explain.compare_answer import MachinePart
 
 
@@ -26,7 +27,8 @@ class PredictAnswer:
     any), ``fitted_rms_um`` that of the rows of the fit. ``blocks`` parts were left out in turn, 1
     where the rows are another campaign's; ``components`` names the numbers of a row. Of another campaign's run nobody
     knows the size of the effects ``taken_over`` from the run of the fit, which differ from run to run, nor what those
-    ``from_own_start``, which count from its first reading, had come to before.
+    ``from_own_start``, which count from its first reading, had come to before. ``are_angles``: of every reading 1 µm
+    stands for 1 µrad, what it comes to at one metre.
     """
 
     campaign: str
@@ -42,3 +44,4 @@ class PredictAnswer:
     rows: tuple[PredictedRow, ...]
     taken_over: tuple[str, ...] = ()
     from_own_start: tuple[str, ...] = ()
+    are_angles: bool | None = field(default=None, metadata=OMITTED)

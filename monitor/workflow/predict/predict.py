@@ -41,7 +41,7 @@ def predict(db: Database, request: PredictRequest) -> PredictAnswer:
         return _by_parts(campaign, model)
     other = _machine_campaign(db, request.of)
     joined, rows = beside(campaign, other)
-    problem = _of_one_set_up(machine_problem(joined, model))
+    problem = _of_one_set_up(machine_problem(joined, model), ~rows)
     fitted = fit(problem, rows)
     answer = _answer(campaign, model, problem, rows, fitted.vectors[rows])
     # The joined rows are numbered on; a reader looks for those of the other file.
@@ -108,14 +108,17 @@ def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[n
     return replace(campaign, runs=(run, behind), probings=joined), joined.run == behind.run
 
 
-def _of_one_set_up(problem: ChainProblem) -> ChainProblem:
+def _of_one_set_up(problem: ChainProblem, is_fitted: npt.NDArray[np.bool_]) -> ChainProblem:
     """The problem of two runs as one of a single run, with one frame and one place of every target; times and
-    conditions stay those of each, and nothing goes on from the one to the other."""
+    conditions stay those of each, nothing goes on from the one to the other, and shapes extend over the rows (n,) of
+    the fit, as they do in the model."""
     context = problem.context
     added = tuple(_of_its_stretch(effect) for effect in problem.added)
     apart = replace(problem, added=added, context=replace(context, stretch=context.run))
     # Until now each run has its rows in a frame of its own, a guess that is millimetres off.
-    return apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0])).guessed_anew()
+    joined = apart.taken(np.arange(len(context)), np.full(len(context), problem.runs[0])).guessed_anew()
+    fitted = joined.context.taken(np.flatnonzero(is_fitted))
+    return replace(joined, context=replace(joined.context, measured=fitted))
 
 
 @dataclass(frozen=True)
@@ -196,6 +199,7 @@ def _answer(
         fitted_rms_um=0.0,
         stated_uncertainty_um=um(float(np.sqrt(np.mean(problem.sigma[np.isfinite(problem.sigma)] ** 2)))),
         components=problem.components,
+        are_angles=None if problem.is_length.any() else True,
         by_target={
             str(target): MachinePart(
                 rms(targets == target), um(float(np.abs(residual[targets == target]).max())),

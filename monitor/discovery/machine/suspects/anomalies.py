@@ -32,7 +32,7 @@ CHECKED = 1e-6
 class BadPoint:
     """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``. ``rows`` are
     those of a pose that is bad as a whole; ``turn`` rad is by how much a body of six numbers is turned, whose place is
-    off by ``size``."""
+    off by ``size``; ``frame`` names the axis in whose frame ``axis`` is, where that is not the frame of the reading."""
 
     row: int
     run: int
@@ -44,6 +44,7 @@ class BadPoint:
     chi_square: float = 0.0
     rows: tuple[int, ...] = ()
     turn: float | None = None
+    frame: str | None = None
 
     @property
     def all_rows(self) -> tuple[int, ...]:

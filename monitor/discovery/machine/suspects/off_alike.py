@@ -96,4 +96,5 @@ def _point(fit: Fit, row: int, axis: str, size: float, said: tuple[float, float]
         size=size,
         p_value=min(1.0, p_value),
         chi_square=chi_square,
+        frame=context.chain.joints[-1].name,
     )

@@ -54,18 +54,30 @@ class Point(Plain):
         plane = bool(np.isnan(measured[:, 2]).all())
         rows = replace(rows, measured=measured[:, :2] if plane else measured)
         targets = tuple(str(name) for name in np.unique(rows.target))
-        places = _stated_places(setup, rows, targets)
+        return cls(setup, targets, plane=plane)._placed(rows)
+
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        return self._placed(rows)
+
+    def _placed(self, rows: Rows) -> tuple[Self, Rows]:
+        """The reading with first places of its targets; the rows with the first frame of each run (12) and the middle
+        (3,) of its points, about which a frame turns."""
+        places = _stated_places(self.setup, rows, self.targets)
         guess = np.tile(np.concatenate([np.eye(3).reshape(9), np.zeros(3)]), (len(rows), 1))
-        if "frame" not in setup.known:
-            guess, places = first_frame(rows, places, held="targets" in setup.known)
+        if not self.holds("frame"):
+            guess, places = first_frame(rows, places, held=self.holds("targets"))
         points = seen_points(rows, guess, places)
         spread = points.std(axis=0)
-        flat = plane and bool(spread[2] < FLAT * spread[:2].max())
+        flat = self.plane and bool(spread[2] < FLAT * spread[:2].max())
         middle = np.zeros_like(points)
         for run in np.unique(rows.run):
             middle[rows.run == run] = points[rows.run == run].mean(axis=0)
-        reading = cls(setup, targets, tuple(map(tuple, places.tolist())), plane, flat)
+        reading = replace(self, places=tuple(map(tuple, places.tolist())), flat=flat)
         return reading, replace(rows, guess=np.concatenate([guess, middle], axis=1))
+
+    @property
+    def has_own_frame(self) -> bool:
+        return not self.holds("frame")
 
     @property
     def numbers(self) -> tuple[str, ...]:

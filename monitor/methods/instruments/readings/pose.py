@@ -42,6 +42,11 @@ class Pose(Point):
         reading = replace(reading, plane=False, flat=False)
         return replace(reading, mounted=reading._first_mounts(placed)), placed
 
+    def guessed_anew(self, rows: Rows) -> tuple[Self, Rows]:
+        reading, placed = self._placed(replace(rows, measured=rows.measured[:, :3]))
+        placed = replace(placed, measured=rows.measured)
+        return replace(reading, mounted=reading._first_mounts(placed)), placed
+
     @property
     def numbers(self) -> tuple[str, ...]:
         return ("x", "y", "z", "a", "b", "c")
