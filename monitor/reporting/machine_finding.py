@@ -92,6 +92,26 @@ class RunUnlike(Protocol):
         """What drifted in it, if that is seen."""
 
 
+class ComesNearest(Protocol):
+    """The effect that comes nearest where none is named, ``why`` it is not, and the RMS that it would leave."""
+
+    @property
+    def effect(self) -> str:
+        """Its name."""
+
+    @property
+    def rms_before_um(self) -> float:
+        """What the model leaves."""
+
+    @property
+    def rms_after_um(self) -> float:
+        """What it would leave with the effect."""
+
+    @property
+    def why(self) -> str:
+        """The rule that refuses it, as a clause."""
+
+
 @dataclass(frozen=True)
 class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
@@ -101,7 +121,8 @@ class MachineFinding:
     statement may be wrong. ``not_followed`` are errors that the model has in a
     shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
     ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
-    explains the measurements without what was left out, and the tests of all residuals deny it."""
+    explains the measurements without what was left out, and the tests of all residuals deny it. ``nearest`` comes
+    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -120,6 +141,8 @@ class MachineFinding:
     recurring: int = 0
     unchecked: bool = False
     contradicted: bool = False
+    nearest: ComesNearest | None = None
+    more_is_left: bool = False
 
     @property
     def together(self) -> str:
@@ -171,6 +194,27 @@ UNCHECKED = (
 CONTRADICTED = (
     "The model explains the measurements without what was left out; `monitor compare`, which counts it, says that "
     "something is missing."
+)
+# What is said of an effect that is not named although it stands out of independent noise, and why, by the rule.
+NEAREST = (
+    "The model does not explain the measurements; nearest of the catalogue comes {effect}, which would leave "
+    "{after:.2f} of {before:.2f} µm RMS, but it is not named: {why}."
+)
+WHY_REFUSED = {
+    "noise": "noise that neighbouring readings share, which is seen here, may look the same",
+    "poses": "with every pose counted once it may be chance",
+    "runs": "its size differs from run to run, as if it acted in some of them alone",
+    "other_shapes": "another error in some other shape would do the same",
+    "tracker": "a tracker that wanders would do the same",
+    "size": "it would have to be larger than such an error is, or nearly cancelled by what is free in every run",
+    "held_out": "readings that were left out are not predicted better with it",
+    "flips": "what is left, with signs drawn at random, looks as much like an effect too often",
+    "unsettled": "it did not stand when bad points, noise and other effects were judged again beside it",
+}
+# What is said where more is left with all findings in the model than noise leaves.
+MORE_IS_LEFT = (
+    "With {these} in the model more is left than noise leaves: add {them} and ask again, what is still missing may "
+    "stand out then."
 )
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
@@ -234,6 +278,9 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"Could not be fitted and {'was' if len(finding.unfitted) == 1 else 'were'} skipped: "
             f"{', '.join(finding.unfitted)}."
         )
+    if finding.more_is_left:
+        one = len(finding.missing) == 1
+        sentences.append(MORE_IS_LEFT.format(these="this" if one else "these", them="it" if one else "them"))
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
@@ -299,6 +346,16 @@ def _with_rivals(missing: MissingEffect) -> str:
 
 
 def _missing_sentences(finding: MachineFinding) -> list[str]:
+    if not finding.missing and not finding.explained and finding.nearest is not None:
+        nearest = finding.nearest
+        return [
+            NEAREST.format(
+                effect=nearest.effect,
+                after=nearest.rms_after_um,
+                before=nearest.rms_before_um,
+                why=nearest.why,
+            )
+        ]
     if not finding.missing:
         return [
             f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."

@@ -20,6 +20,7 @@ from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
     WHOLE_PIECE,
+    WHY_REFUSED,
     MachineFinding,
     MissingEffect,
     MistakeFound,
@@ -41,6 +42,7 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
     MovedTarget,
+    NearestEffect,
     Remaining,
     ScatteringTarget,
     StepBetween,
@@ -242,7 +244,19 @@ def _remaining(explanation: Explanation) -> Remaining:
         rms_um=um(final.rms),
         carried_rms_um=rms(~resting) if resting.any() else None,
         resting_rms_um=rms(resting),
+        beyond_noise=explanation.more_is_left or None,
     )
+
+
+def _nearest(explanation: Explanation) -> NearestEffect | None:
+    """The effect that comes nearest where none is named."""
+    nearest, um = explanation.nearest, MICROMETRE.to_display
+    if nearest is None:
+        return None
+    return NearestEffect(
+        nearest.effect, um(nearest.rms_before), um(nearest.rms_after), nearest.refusal,
+        WHY_REFUSED[nearest.refusal],
+    )  # fmt: skip
 
 
 def is_hopeless(explanation: Explanation) -> bool:
@@ -303,6 +317,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         for each in explanation.scatter
     )
     unlike_runs = _unlike_runs(explanation)
+    nearest = _nearest(explanation)
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
     if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -343,6 +358,8 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
+                nearest=nearest,
+                more_is_left=explanation.more_is_left,
             )
         ),
         residual_map=residual_map,
@@ -356,6 +373,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         scattering=scattering,
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
+        nearest=nearest,
     )
 
 
