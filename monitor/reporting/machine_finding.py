@@ -92,6 +92,26 @@ class RunUnlike(Protocol):
         """What drifted in it, if that is seen."""
 
 
+class LooksStepped(Protocol):
+    """An error that looks as if it stepped in a ``run`` from the reading ``sequence`` on."""
+
+    @property
+    def errors(self) -> Sequence[str]:
+        """Its name, first of those that the data do not tell from it."""
+
+    @property
+    def run(self) -> int:
+        """The run."""
+
+    @property
+    def sequence(self) -> int:
+        """The first reading after the step."""
+
+    @property
+    def rms_after_um(self) -> float:
+        """What would be left with the step."""
+
+
 class ComesNearest(Protocol):
     """The effect that comes nearest where none is named, ``why`` it is not, and the RMS that it would leave."""
 
@@ -110,6 +130,10 @@ class ComesNearest(Protocol):
     @property
     def why(self) -> str:
         """The rule that refuses it, as a clause."""
+
+    @property
+    def stepped(self) -> LooksStepped | None:
+        """A step that says more than any effect."""
 
 
 @dataclass(frozen=True)
@@ -199,6 +223,12 @@ CONTRADICTED = (
 NEAREST = (
     "The model does not explain the measurements; nearest of the catalogue comes {effect}, which would leave "
     "{after:.2f} of {before:.2f} µm RMS, but it is not named: {why}."
+)
+# What is said instead where a step within a run says more, which is no effect.
+LOOKS_STEPPED = (
+    "The model does not explain the measurements; no effect of the catalogue stands, but it looks as if {error} "
+    "stepped within run {run}, from sequence {sequence} on, which would leave {after:.2f} of {before:.2f} µm RMS: see "
+    "what was touched, slipped or switched then, and give the readings from there on as a run of their own."
 )
 WHY_REFUSED = {
     "noise": "noise that neighbouring readings share, which is seen here, may look the same",
@@ -347,7 +377,17 @@ def _with_rivals(missing: MissingEffect) -> str:
 
 def _missing_sentences(finding: MachineFinding) -> list[str]:
     if not finding.missing and not finding.explained and finding.nearest is not None:
-        nearest = finding.nearest
+        nearest, stepped = finding.nearest, finding.nearest.stepped
+        if stepped is not None:
+            return [
+                LOOKS_STEPPED.format(
+                    error=" or ".join(_some(stepped.errors)[0]),
+                    run=stepped.run,
+                    sequence=stepped.sequence,
+                    after=stepped.rms_after_um,
+                    before=nearest.rms_before_um,
+                )
+            ]
         return [
             NEAREST.format(
                 effect=nearest.effect,

@@ -15,7 +15,13 @@ from monitor.methods import campaign_method
 from monitor.readers import read_campaign
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain, Y, Z
 
-SETUP = '\n[[setups]]\nid = "sky"\nreading = "direction"\nstandard_uncertainty_urad = 5.0\ntool_direction = [1.0, 0.0, 0.0]\n'
+SETUP = """
+[[setups]]
+id = "sky"
+reading = "direction"
+standard_uncertainty_urad = 5.0
+tool_direction = [1.0, 0.0, 0.0]
+"""
 MOUNT = SimulatedChain((SimulatedAxis("AZ", "rotary", Z, sign=-1), SimulatedAxis("EL", "rotary", Y, sign=-1)))
 STARS, TEETH, NOISE = 120, 180, 5e-6
 WORM = f"ECAZ:harmonic{TEETH}"

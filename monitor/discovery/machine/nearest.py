@@ -7,12 +7,15 @@ It is the one that says most of all in independent noise, in which it stands out
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.evidence.refusal import Refusal
 from monitor.discovery.machine.missing import name_of
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
+from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.suspects.stepped_within import SteppedWithin, stepped_within
 from monitor.discovery.search.evidence import Evidence, pool_of, weigh_beside
 from monitor.discovery.search.scene import family_count
 
@@ -20,12 +23,14 @@ from monitor.discovery.search.scene import family_count
 @dataclass(frozen=True)
 class Nearest:
     """An effect that is not named because of a ``refusal``, and the root mean square in mm that would be left of
-    ``rms_before`` with it in the model."""
+    ``rms_before`` with it in the model. ``stepped``: a step within a run, which the catalogue does not have, says
+    more."""
 
     effect: str
     rms_before: float
     rms_after: float
     refusal: Refusal
+    stepped: SteppedWithin | None = None
 
 
 def nearest_effect(scene: ChainScene, drivers: Sequence[str], rate: float) -> Nearest | None:
@@ -33,6 +38,11 @@ def nearest_effect(scene: ChainScene, drivers: Sequence[str], rate: float) -> Ne
     out at a ``rate`` there."""
     variants = [candidate.variant for candidate in scene.candidates]
     white = scene if scene.fit.whitening is None else scene_of(scene.fit.with_correlation(None), variants)
+    # What is searched only where it stands out was searched in the noise of the scene.
+    later = [*gear_variants(white, (), rate), *drifts_of_runs(white, (), rate)]
+    known = {variant.effect.text for variant in variants}
+    more = scene_of(white.fit, [each for each in later if each.effect.text not in known]).candidates
+    white = replace(white, candidates=(*white.candidates, *more))
     weighed = weigh_beside(white, pool_of(white), ())
     if not weighed or weighed[0].p_value * family_count(white) > rate:
         return None
@@ -42,6 +52,7 @@ def nearest_effect(scene: ChainScene, drivers: Sequence[str], rate: float) -> Ne
         rms_before=white.fit.rms_of(white.remainders.beside(()).residual),
         rms_after=white.fit.rms_of(white.remainders.beside([first]).residual),
         refusal=_why(scene, first, drivers, rate),
+        stepped=stepped_within(white, weighed[0], rate),
     )
 
 
@@ -49,7 +60,8 @@ def _why(scene: ChainScene, nearest: ChainCandidate, drivers: Sequence[str], rat
     """The rule that refuses an effect in the noise of a scene."""
     pool = pool_of(scene)
     evidence: Evidence[ChainCandidate] | None = next(
-        (each for each in weigh_beside(scene, pool, ()) if each.candidate.effect.text == nearest.effect.text), None
+        (each for each in weigh_beside(scene, pool, ()) if each.candidate.effect.text == nearest.effect.text),
+        None,
     )
     if evidence is None or evidence.p_value * family_count(scene) > rate:
         return Refusal.NOISE

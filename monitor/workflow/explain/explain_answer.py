@@ -299,15 +299,27 @@ class Remaining:
 
 
 @dataclass(frozen=True)
+class SteppedError:
+    """An error that looks as if it stepped within a run, from a reading on, and what that would leave: the likeliest of
+    ``errors`` that these data do not tell apart."""
+
+    errors: tuple[str, ...]
+    run: int
+    sequence: int
+    rms_after_um: float
+
+
+@dataclass(frozen=True)
 class NearestEffect:
     """The effect that comes nearest where none is named: what it would leave, and the rule that refuses it, by a word
-    (``refusal``) and as the clause of a sentence (``why``)."""
+    (``refusal``) and as the clause of a sentence (``why``). ``stepped`` says more than any effect, but is none."""
 
     effect: str
     rms_before_um: float
     rms_after_um: float
     refusal: str
     why: str
+    stepped: SteppedError | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -329,8 +341,8 @@ class MachineExplanation:
     ``work_points_elsewhere``, where work points come out further from where they are stated than people misstate them.
     ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
-    of its own. ``runs_left_out`` are those that were broken off, say. ``nearest`` is the effect that comes nearest where
-    something is missing and none is named, None where none stands out at all.
+    of its own. ``runs_left_out`` are those that were broken off, say. ``nearest`` is the effect that comes nearest
+    where something is missing and none is named, None where none stands out at all.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)

@@ -46,6 +46,7 @@ from monitor.workflow.explain.explain_answer import (
     Remaining,
     ScatteringTarget,
     StepBetween,
+    SteppedError,
     UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -253,9 +254,13 @@ def _nearest(explanation: Explanation) -> NearestEffect | None:
     nearest, um = explanation.nearest, MICROMETRE.to_display
     if nearest is None:
         return None
+    step = nearest.stepped
+    stepped = None
+    if step is not None:
+        stepped = SteppedError(step.errors, step.run, step.sequence, um(step.rms_after))
     return NearestEffect(
-        nearest.effect, um(nearest.rms_before), um(nearest.rms_after), nearest.refusal,
-        WHY_REFUSED[nearest.refusal],
+        nearest.effect, um(nearest.rms_before), um(nearest.rms_after), nearest.refusal.value,
+        WHY_REFUSED[nearest.refusal], stepped,
     )  # fmt: skip
 
 
