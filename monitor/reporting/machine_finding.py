@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from monitor.reporting.messages import joined_by_and
+from monitor.reporting.nearest_words import ComesNearest, more_is_left, nearest_sentence
 from monitor.units import MICROMETRE
 
 
@@ -90,50 +91,6 @@ class RunUnlike(Protocol):
     @property
     def as_if(self) -> str | None:
         """What drifted in it, if that is seen."""
-
-
-class LooksStepped(Protocol):
-    """An error that looks as if it stepped in a ``run`` from the reading ``sequence`` on."""
-
-    @property
-    def errors(self) -> Sequence[str]:
-        """Its name, first of those that the data do not tell from it."""
-
-    @property
-    def run(self) -> int:
-        """The run."""
-
-    @property
-    def sequence(self) -> int:
-        """The first reading after the step."""
-
-    @property
-    def rms_after_um(self) -> float:
-        """What would be left with the step."""
-
-
-class ComesNearest(Protocol):
-    """The effect that comes nearest where none is named, ``why`` it is not, and the RMS that it would leave."""
-
-    @property
-    def effect(self) -> str:
-        """Its name."""
-
-    @property
-    def rms_before_um(self) -> float:
-        """What the model leaves."""
-
-    @property
-    def rms_after_um(self) -> float:
-        """What it would leave with the effect."""
-
-    @property
-    def why(self) -> str:
-        """The rule that refuses it, as a clause."""
-
-    @property
-    def stepped(self) -> LooksStepped | None:
-        """A step that says more than any effect."""
 
 
 @dataclass(frozen=True)
@@ -219,33 +176,6 @@ CONTRADICTED = (
     "The model explains the measurements without what was left out; `monitor compare`, which counts it, says that "
     "something is missing."
 )
-# What is said of an effect that is not named although it stands out of independent noise, and why, by the rule.
-NEAREST = (
-    "The model does not explain the measurements; nearest of the catalogue comes {effect}, which would leave "
-    "{after:.2f} of {before:.2f} µm RMS, but it is not named: {why}."
-)
-# What is said instead where a step within a run says more, which is no effect.
-LOOKS_STEPPED = (
-    "The model does not explain the measurements; no effect of the catalogue stands, but it looks as if {error} "
-    "stepped within run {run}, from sequence {sequence} on, which would leave {after:.2f} of {before:.2f} µm RMS: see "
-    "what was touched, slipped or switched then, and give the readings from there on as a run of their own."
-)
-WHY_REFUSED = {
-    "noise": "noise that neighbouring readings share, which is seen here, may look the same",
-    "poses": "with every pose counted once it may be chance",
-    "runs": "its size differs from run to run, as if it acted in some of them alone",
-    "other_shapes": "another error in some other shape would do the same",
-    "tracker": "a tracker that wanders would do the same",
-    "size": "it would have to be larger than such an error is, or nearly cancelled by what is free in every run",
-    "held_out": "readings that were left out are not predicted better with it",
-    "flips": "what is left, with signs drawn at random, looks as much like an effect too often",
-    "unsettled": "it did not stand when bad points, noise and other effects were judged again beside it",
-}
-# What is said where more is left with all findings in the model than noise leaves.
-MORE_IS_LEFT = (
-    "With {these} in the model more is left than noise leaves: add {them} and ask again, what is still missing may "
-    "stand out then."
-)
 # What is said where the search ended at a limit, by its kind.
 LIMITS = {
     "effects": (
@@ -309,8 +239,7 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"{', '.join(finding.unfitted)}."
         )
     if finding.more_is_left:
-        one = len(finding.missing) == 1
-        sentences.append(MORE_IS_LEFT.format(these="this" if one else "these", them="it" if one else "them"))
+        sentences.append(more_is_left(len(finding.missing)))
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
@@ -375,35 +304,20 @@ def _with_rivals(missing: MissingEffect) -> str:
     return f"{missing.effect} (or {rivals}, which these data do not rule out)"
 
 
+def _none_named(finding: MachineFinding) -> str:
+    """What is said where no effect is named."""
+    if finding.explained:
+        return f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
+    if finding.nearest is not None:
+        return nearest_sentence(finding.nearest)
+    if finding.not_followed:
+        return "The model does not explain the measurements, but no other error explains more."
+    return "The model does not explain the measurements, but no effect of the catalogue explains more."
+
+
 def _missing_sentences(finding: MachineFinding) -> list[str]:
-    if not finding.missing and not finding.explained and finding.nearest is not None:
-        nearest, stepped = finding.nearest, finding.nearest.stepped
-        if stepped is not None:
-            return [
-                LOOKS_STEPPED.format(
-                    error=" or ".join(_some(stepped.errors)[0]),
-                    run=stepped.run,
-                    sequence=stepped.sequence,
-                    after=stepped.rms_after_um,
-                    before=nearest.rms_before_um,
-                )
-            ]
-        return [
-            NEAREST.format(
-                effect=nearest.effect,
-                after=nearest.rms_after_um,
-                before=nearest.rms_before_um,
-                why=nearest.why,
-            )
-        ]
     if not finding.missing:
-        return [
-            f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
-            if finding.explained
-            else "The model does not explain the measurements, but no effect of the catalogue explains more."
-            if not finding.not_followed
-            else "The model does not explain the measurements, but no other error explains more."
-        ]
+        return [_none_named(finding)]
     first = finding.missing[0]
     doubtful = _more_of_its_shape(first, finding.missing[1:])
     further = [_with_rivals(missing) for missing in finding.missing[1:] if missing.effect not in doubtful]

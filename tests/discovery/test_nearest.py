@@ -12,7 +12,7 @@ from monitor.discovery.machine.evidence.refusal import Refusal
 from monitor.discovery.machine.explain import Explanation
 from monitor.methods import campaign_method
 from monitor.readers import read_campaign
-from monitor.reporting.machine_finding import WHY_REFUSED
+from monitor.reporting.nearest_words import WHY_REFUSED
 from monitor.workflow.explain.machine_answer import machine_explanation
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain, Y, Z
 

@@ -69,8 +69,8 @@ class Explanation:
     under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
     ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
     there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
-    ``nearest`` is the effect that comes nearest where none is named. ``more_is_left`` with all of ``missing`` in the
-    model than noise leaves.
+    ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
+    of ``missing`` in the model.
     """
 
     comparison: ChainComparison
@@ -92,7 +92,12 @@ class Explanation:
     recurring: tuple[BadPoint, ...] = ()
     unchecked: bool = False
     nearest: Nearest | None = None
-    more_is_left: bool = False
+    beside: Verdict = Verdict.EXPLAINED
+
+    @property
+    def more_is_left(self) -> bool:
+        """Whether more is left with what is missing in the model than noise leaves."""
+        return bool(self.missing) and self.beside is Verdict.SOMETHING_IS_MISSING
 
 
 def variants_of_campaign(
@@ -150,12 +155,9 @@ def explain(
     single, again = _single_and_recurring(latest, alike)
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
-    left = compare(latest.under, campaign.name, model).verdict
-    found = missing or unfollowed or again or unchecked
-    verdict = Verdict.SOMETHING_IS_MISSING if found else left
-    nearest = None
-    if verdict is Verdict.SOMETHING_IS_MISSING and not (missing or unfollowed):
-        nearest = nearest_effect(latest.scene, search.drivers, rate)
+    verdict_beside = compare(latest.under, campaign.name, model).verdict
+    is_found = bool(missing or unfollowed or again or unchecked)
+    verdict = Verdict.SOMETHING_IS_MISSING if is_found else verdict_beside
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
         together=as_given.verdict,
@@ -174,9 +176,18 @@ def explain(
         not_followed=unfollowed,
         recurring=again,
         unchecked=unchecked,
-        nearest=nearest,
-        more_is_left=bool(missing) and left is Verdict.SOMETHING_IS_MISSING,
+        nearest=_nearest(latest, search, verdict, (*missing, *unfollowed)),
+        beside=verdict_beside,
     )
+
+
+def _nearest(
+    latest: ChainRound, search: ChainSearch, verdict: Verdict, named: Sequence[object]
+) -> Nearest | None:
+    """The effect that comes nearest where something is missing and nothing is ``named``."""
+    if named or verdict is not Verdict.SOMETHING_IS_MISSING:
+        return None
+    return nearest_effect(latest.scene, search.drivers, search.rate)
 
 
 def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:

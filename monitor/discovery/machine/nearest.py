@@ -40,8 +40,8 @@ def nearest_effect(scene: ChainScene, drivers: Sequence[str], rate: float) -> Ne
     white = scene if scene.fit.whitening is None else scene_of(scene.fit.with_correlation(None), variants)
     # What is searched only where it stands out was searched in the noise of the scene.
     later = [*gear_variants(white, (), rate), *drifts_of_runs(white, (), rate)]
-    known = {variant.effect.text for variant in variants}
-    more = scene_of(white.fit, [each for each in later if each.effect.text not in known]).candidates
+    searched = {variant.effect.text for variant in variants}
+    more = scene_of(white.fit, [each for each in later if each.effect.text not in searched]).candidates
     white = replace(white, candidates=(*white.candidates, *more))
     weighed = weigh_beside(white, pool_of(white), ())
     if not weighed or weighed[0].p_value * family_count(white) > rate:

@@ -20,7 +20,6 @@ from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
     WHOLE_PIECE,
-    WHY_REFUSED,
     MachineFinding,
     MissingEffect,
     MistakeFound,
@@ -29,6 +28,7 @@ from monitor.reporting.machine_finding import (
     fits_too_well,
     machine_sentences,
 )
+from monitor.reporting.nearest_words import WHY_REFUSED
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, MILLIMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (

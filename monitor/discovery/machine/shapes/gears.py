@@ -93,14 +93,14 @@ def _lengths(fit: Fit, way: Array, position: Array, orders: Array) -> Array:
     if fit.whitening is None:
         return np.full(len(orders), max(float(np.sum(way * way)), 1e-300))
     moved = fit.problem.padded(way[..., None])[..., 0]
-    place = fit.problem.padded(np.broadcast_to(position[:, None, None], (*way.shape, 1)))[..., 0]
+    padded_position = fit.problem.padded(np.broadcast_to(position[:, None, None], (*way.shape, 1)))[..., 0]
     lengths = np.empty(len(orders))
     at_once = max(NUMBERS_AT_ONCE // moved.size, 1)
     for start in range(0, len(orders), at_once):
         some = slice(start, start + at_once)
         # Of calibrated quantities, which stand behind the rows, a turn moves nothing.
         waves = np.zeros((2, len(orders[some]), *fit.solution.last.residual.shape))
-        angle = orders[some, None, None] * place
+        angle = orders[some, None, None] * padded_position
         waves[0, :, :, : moved.shape[1]], waves[1, :, :, : moved.shape[1]] = (
             moved * np.cos(angle),
             moved * np.sin(angle),

@@ -82,13 +82,15 @@ def stepped_within(scene: ChainScene, best: Evidence[ChainCandidate], rate: floa
     if -freedom * np.log1p(-first.explained / total) - price < best.score + UNDECIDED:
         return None
     # Which error it is, and whether it is any, the noise says that it leaves.
-    correlation = fit.whole_noise_design.correlation(
-        _left(scene, first).reshape(fit.solution.last.residual.shape)
-    )
-    noisy = fit.with_correlation(correlation)
+    shape, design = fit.solution.last.residual.shape, fit.whole_noise_design
+    noisy = fit.with_correlation(design.correlation(_left(scene, first).reshape(shape)))
     in_noise = [(step, *_in_noise(noisy, step)) for step in steps if step.run == first.run]
     first, most, p_value = max(in_noise, key=lambda each: each[1])
     if p_value * tries > rate:
+        return None
+    # Noise that walks looks stepped at some moment or other: it has to be the less likely of the two.
+    walking = fit.with_correlation(design.correlation(beside.residual.reshape(shape)))
+    if _deviance(walking) - _deviance(noisy) + most - price < UNDECIDED:
         return None
     likely = sorted((each for each in in_noise if each[1] > most - UNDECIDED), key=lambda each: -each[1])
     return SteppedWithin(
@@ -153,6 +155,14 @@ def _best(scene: ChainScene, drift: ChainEffect, run: int, moments: npt.NDArray[
 
 def _explained(basis: Array, residual: Array) -> float:
     return float(np.sum((basis.T @ residual) ** 2))
+
+
+def _deviance(fit: Fit) -> float:
+    """Minus twice the logarithm of the likelihood of what a model leaves in the noise of a fit."""
+    correlation = None if fit.whitening is None else fit.whitening.correlation
+    design = fit.noise_design_under(correlation, whole=True)
+    residual = without(orthonormal(fit.nuisance.shared), fit.white.reshape(-1, 1))
+    return float(design.deviance(float(np.sum(residual**2)), correlation))
 
 
 def _in_noise(fit: Fit, step: _Step) -> tuple[float, float]:
