@@ -15,7 +15,7 @@ import importlib
 import os
 import pickle
 from collections.abc import Callable, Generator, Iterator, Mapping
-from datetime import date, tzinfo
+from datetime import date, timedelta, tzinfo
 from enum import Enum
 from pathlib import Path
 from types import ModuleType
@@ -41,7 +41,18 @@ ROBUST_FIT = (
 )
 FIT = ("monitor.workflow.uncertainty.evaluation.machine_fit",)
 SEARCH = ("monitor.workflow.explain.explain.explanation_of", "monitor.workflow.health.task.explanation_of")
-COMPUTED_ONCE = (LAYOUT, REGION_FACTORS, JOINT_COVERAGE, ROBUST_FIT, FIT, SEARCH)
+IDENTIFICATION = ("monitor.workflow.identify.identify.compute", "monitor.workflow.identify.every.compute")
+CHANGES = ("monitor.workflow.history.past.search_changes",)
+COMPUTED_ONCE = (
+    LAYOUT,
+    REGION_FACTORS,
+    JOINT_COVERAGE,
+    ROBUST_FIT,
+    FIT,
+    SEARCH,
+    IDENTIFICATION,
+    CHANGES,
+)
 
 #: Classes and their fields on which none of these answers depends. Each database stores the model of a method when it
 #: first identifies with it: by that moment equal questions of two databases would differ.
@@ -76,7 +87,7 @@ def parts_of(value: object) -> Iterator[bytes]:
             yield from parts_of(inner)
     elif isinstance(value, frozenset):
         yield from parts_of(sorted(value))
-    elif isinstance(value, (bytes, str, int, float, type(None), date, tzinfo)):
+    elif isinstance(value, (bytes, str, int, float, type(None), date, timedelta, tzinfo)):
         yield repr(value).encode()
     else:
         raise TypeError(f"{value!r} has no key: a function that takes it cannot be computed once")

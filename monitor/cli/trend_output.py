@@ -32,6 +32,7 @@ FEWEST_RUNS = 10
 
 def say(answer: TrendAnswer) -> None:
     """Print a page: what is out of tolerance first, because whoever reads one line has to read that."""
+    output.copied(answer.copied_readings)
     for name, parameter in answer.parameters.items():
         for sentence in out_of_tolerance(name, parameter):
             output.say(sentence)

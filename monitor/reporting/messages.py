@@ -111,6 +111,41 @@ def machines_lacking(machines: Mapping[str, str], most: int) -> str:
     )
 
 
+#: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
+UNEXPLAINED = "the model does not explain the latest readings"
+
+
+def times_stated(times: float) -> str:
+    """Return how far readings lie from a model, for a place behind the statement that they do not fit."""
+    return f"residuals {times:.2g} times the stated uncertainty"
+
+
+def statement_contradicted(campaign: str, run: int, times: float) -> str:
+    """Return that the last ``run`` of a ``campaign`` contradicts what is stated of its readings, and what to type."""
+    return (
+        f"the residuals of run {run} of {campaign} are {times:.2g} times what the stated uncertainties leave: a "
+        f"statement, a reading or the model is wrong, and the values may be; type `monitor explain {campaign}`"
+    )
+
+
+def machines_contradicting(machines: Mapping[str, tuple[str, float]], most: int) -> str:
+    """Return which ``machines`` have a last run that contradicts what is stated: its campaign, and how many times."""
+    named = ", ".join(
+        f"{machine} ({campaign}: {times_stated(times)})"
+        for machine, (campaign, times) in list(machines.items())[:most]
+    )
+    more = f" and {len(machines) - most} more" if len(machines) > most else ""
+    return (
+        f"the latest readings contradict what is stated of them: {named}{more}; a statement, a reading or the model is "
+        f"wrong; type `monitor explain {next(iter(machines.values()))[0]}`"
+    )
+
+
+def more_copies(count: int) -> str:
+    """Return how many more campaigns hold runs of others than are named, and what names them."""
+    return f"{count} more campaign{'s hold' if count > 1 else ' holds'} runs of others; `monitor campaigns` names all"
+
+
 def campaigns_of_same_hours(machine: str, campaigns: Sequence[str]) -> str:
     """Return which ``campaigns`` a machine cannot all have made, and what to do about it."""
     return (

@@ -116,6 +116,7 @@ if TYPE_CHECKING:
         CopiedCampaign as CopiedCampaign,
         CopiedRun as CopiedRun,
         campaign_notes as campaign_notes,
+        campaign_numbers as campaign_numbers,
         copied_campaigns as copied_campaigns,
         copied_runs as copied_runs,
         copy_notes as copy_notes,
@@ -169,7 +170,9 @@ if TYPE_CHECKING:
         tolerance_types as tolerance_types,
     )
     from monitor.store.past.lack_of_fit import (
+        ContradictingMachine as ContradictingMachine,
         RefutedMachine as RefutedMachine,
+        contradicting_machines as contradicting_machines,
         refuted_machines as refuted_machines,
         unexplained_machines as unexplained_machines,
     )
@@ -243,7 +246,8 @@ else:
             "certificates": "StoredCertificate certificate_numbers certificates_in_force find_certificate "
             "list_certificates load_certificate mark_certificate save_certificate",
             "connection": "Database",
-            "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes copied_campaigns copied_runs copy_notes "
+            "copies_of_runs": "CopiedCampaign CopiedRun campaign_notes campaign_numbers copied_campaigns copied_runs "
+            "copy_notes "
             "noted_campaigns",
             "copies.backup": "take_backup",
             "copies.compaction": "Compaction compact",
@@ -264,7 +268,8 @@ else:
             "past.fleet": "BlockCut FleetSums GroupHours fleet_sums",
             "past.history": "FEWEST_STEADY CampaignFit MachineHistory latest_tolerances machine_history "
             "tolerance_types",
-            "past.lack_of_fit": "RefutedMachine refuted_machines unexplained_machines",
+            "past.lack_of_fit": "ContradictingMachine RefutedMachine contradicting_machines refuted_machines "
+            "unexplained_machines",
             "past.simulated": "simulated_campaigns",
             "past.machine_runs": "MachineDescription RecordedRun campaign_machines campaign_tolerances check_campaigns "
             "earlier_frames identified_runs latest_frames machine_descriptions machine_runs machine_topology "

@@ -95,6 +95,15 @@ def copied_campaigns(db: Database, numbers: Sequence[int] | None = None) -> tupl
     return db.records(CopiedCampaign, _AMONG.format(of_those=of_those, among=among))
 
 
+def campaign_numbers(db: Database, names: Sequence[str]) -> tuple[int, ...]:
+    """The numbers of campaigns by their ``names``; of names that no campaign has none."""
+    rows = db.rows(
+        "SELECT campaign_id FROM campaign WHERE campaign IN (SELECT unnest(?::VARCHAR[])) ORDER BY campaign_id",
+        [list(names)],
+    )
+    return tuple(int(number) for (number,) in rows)
+
+
 def noted_campaigns(db: Database, numbers: Sequence[int]) -> dict[str, int]:
     """How many notes the import of campaigns of some ``numbers`` left, by name, of those with any."""
     rows = db.rows(

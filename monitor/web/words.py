@@ -107,8 +107,6 @@ NOT_IDENTIFIED = Urgency(
     "identify: its readings are here, its errors are not computed from them by this version of its model yet",
 )
 BEING_COMPUTED = Urgency(_OPEN.colour, _OPEN.shape, _OPEN.word, "its numbers are being computed")
-#: The class of machines whose numbers ask for nothing, by a model that does not explain their latest readings.
-UNEXPLAINED = "the model does not explain the latest readings"
 DOES_NOT_FIT = Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "")
 NOT_MEASURED = Urgency(_OPEN.colour, _OPEN.shape, "not measured", "measure it, and import the campaign")
 

@@ -16,8 +16,9 @@ from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.machine.version_error import version_error
 from monitor.discovery.search.amplitudes import amplitudes
-from monitor.discovery.search.evidence import Pool, weigh
+from monitor.discovery.search.evidence import Pool, best_of_families, best_of_families_in, weigh, weigh_beside
 from monitor.discovery.search.held_out import held_out_rms
+from monitor.discovery.search.projection import eigen
 from monitor.effects import parse_effect
 from monitor.methods.samba.method import problem_of
 
@@ -86,6 +87,36 @@ def test_weighing_together_and_alone_agree(seen):
     for candidate in visible.candidates:
         (alone,) = weigh([candidate], visible.residual, none, visible.degrees_of_freedom)
         assert together[candidate.family].score == pytest.approx(alone.score, rel=1e-9)
+
+
+def test_the_best_of_every_family_is_that_of_all(seen):
+    now, visible, _ = seen
+    chain = now.problem.context.chain
+    texts = ("EXX:cyclic10mm", "EXX:cyclic12mm", "EYY:poly2", "EXX:cyclic14mm", "EYY:poly3")
+    scene = scene_of(now, [each for text in texts for each in variants_of(parse_effect(text, chain))])
+    pool = Pool(scene.candidates)
+    selected = list(visible.candidates[:1])
+    expected = best_of_families(weigh_beside(scene, pool, selected))
+    assert best_of_families_in(scene.remainders.beside(selected), pool) == expected
+    able = np.array([each is not expected[0].candidate for each in pool.candidates])
+    best = best_of_families_in(scene.remainders.beside(selected), pool, able)
+    weighed = [
+        each for each in weigh_beside(scene, pool, selected) if each.candidate is not expected[0].candidate
+    ]
+    assert best == best_of_families(weighed)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_eigenvectors_are_those_of_lapack(size):
+    columns = np.random.default_rng(4).normal(size=(30, 2, 5, size))
+    columns[:5, :, :, -1] = 2.0 * columns[:5, :, :, 0]
+    columns[5:8, :, :, -1] = 0.0
+    grams = np.swapaxes(columns, -1, -2) @ columns
+    values, vectors = eigen(grams)
+    assert values == pytest.approx(np.linalg.eigh(grams)[0], abs=1e-12)
+    assert (vectors * values[..., None, :]) @ np.swapaxes(vectors, -1, -2) == pytest.approx(grams, abs=1e-12)
+    identity = np.broadcast_to(np.eye(size), grams.shape)
+    assert np.swapaxes(vectors, -1, -2) @ vectors == pytest.approx(identity, abs=1e-12)
 
 
 def test_a_searched_candidate_pays_for_its_search(seen):

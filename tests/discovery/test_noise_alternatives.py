@@ -164,6 +164,16 @@ def test_likelihoods_are_the_same_whatever_was_asked_before(walked):
     assert after == pytest.approx(first, rel=1e-9)
 
 
+def test_unknowns_that_a_run_lacks_or_has_twice_change_no_likelihood(walked):
+    under = fit(walked(2))
+    residual, design = under.solution.last.residual, under.noise_design
+    expected = dict(design.likelihoods(residual))
+    first, rest = design.basis[..., :1], design.basis[..., 1:]
+    for halves in ([first, np.zeros_like(first)], [first / np.sqrt(2.0)] * 2):
+        same = replace(design, basis=np.concatenate([*halves, rest], axis=-1))
+        assert dict(same.likelihoods(residual)) == pytest.approx(expected, rel=1e-9)
+
+
 def test_noise_doubt_is_the_mean_of_generalised_least_squares_over_the_correlations(walked):
     """Two runs: the weights are restricted likelihoods of their difference, which no shared effect changes; the
     p-values are those of F in generalised least squares of both runs."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from monitor.discovery.machine.noise.correlation import Correlation, is_next
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.search import search_chain, still_found
 from monitor.discovery.machine.shapes import edges
+from monitor.discovery.machine.shapes.free_parts import most_together, priced
 from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects import parse_effect
 from monitor.methods.samba.method import problem_of
@@ -51,7 +53,7 @@ def test_what_a_scan_adds_to_or_takes_from_is_searched_anew(searched, change):
     findings = result.findings[:1]
     if change == "one more":
         candidate = next(each for each in scene.candidates if each.effect.text == "EZZ:poly3")
-        evidence = replace(result.findings[0].evidence, candidate=candidate)
+        evidence = result.findings[0].evidence._replace(candidate=candidate)
         findings = (*result.findings, replace(result.findings[0], evidence=evidence))
     assert still_found(scene, (scene, replace(result, findings=findings)), (), 0.01) is None
 
@@ -70,6 +72,16 @@ def test_noise_hardly_differs_one_step_of_the_grid_apart(first, second, expected
     assert is_next(Correlation(*first), Correlation(*second)) is expected
     assert not is_next(None, Correlation(*second))
     assert not is_next(Correlation(*first, frame=1), Correlation(*second))
+
+
+def test_no_new_effect_and_others_that_stay_are_worth_more_than_their_bound(searched):
+    _, _, scene, _ = searched
+    leading, *others = scene.candidates[:5]
+    for new in scene.candidates[5:]:
+        bound = most_together(scene, new, [leading], others[:3])
+        for count in range(4):
+            for staying in combinations(others[:3], count):
+                assert priced(scene, [leading, new, *staying]) <= bound + 1e-6
 
 
 @pytest.mark.slow

@@ -420,6 +420,21 @@ def test_nothing_is_adjusted_by_values_of_a_model_that_does_not_explain_its_read
     assert {answer.kind: answer.sentence for answer in answers(week)}["do"].startswith("Adjust or compensate")
 
 
+def test_readings_that_contradict_their_statement_are_asked_of_that_first() -> None:
+    model = ModelHealth(
+        "c", "runs", "instruments", "something is missing", "No effect explains more.", 0.5, None, None,
+        None, (), 0.06, None, None, (), times_stated=7.9,
+    )  # fmt: skip
+    sentences = {
+        each.kind: each.sentence for each in answers(fleet(machine("M", "model fails", model=model))[0])
+    }
+    assert sentences["why"] == "No effect explains more; residuals 7.9 times the stated uncertainty."
+    assert sentences["do"].startswith(
+        "See whether campaign.toml states too small an uncertainty, or another unit than the readings have; else look "
+        "at its page for where the model fails, and measure again"
+    )
+
+
 def test_where_work_points_are_elsewhere_the_file_is_looked_at() -> None:
     """Was: look at its page for where the model fails, and measure again."""
     model = ModelHealth(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 pytest.importorskip("fastapi", reason="the extra web is not installed")
 pytest.importorskip("plotly", reason="the extra web is not installed")
 
+from anyio.from_thread import BlockingPortal, start_blocking_portal
 from starlette.testclient import TestClient
 
 from monitor.store import Database
@@ -56,18 +58,29 @@ class Served:
 
 
 @pytest.fixture(scope="module")
-def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def imported(
+    tmp_path_factory: pytest.TempPathFactory, made_once: Callable[[str, Callable[[Path], object]], Path]
+) -> Path:
+    def fill(folder: Path) -> None:
+        with Database(folder / "monitor.duckdb", threads=1) as db:
+            import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
+
     path = tmp_path_factory.mktemp("web") / "monitor.duckdb"
-    with Database(path, threads=1) as db:
-        import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
-    return path
+    return Path(shutil.copy(made_once("imported-for-pages", fill) / "monitor.duckdb", path))
 
 
 Serve = Callable[[Path, bool], Served]
 
 
 @pytest.fixture(scope="module")
-def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
+def event_loop_of_server() -> Iterator[BlockingPortal]:
+    """One event loop for all requests of a module, as a server has: one for each took half of their processor time."""
+    with start_blocking_portal("asyncio") as portal:
+        yield portal
+
+
+@pytest.fixture(scope="module")
+def serve(tmp_path_factory: pytest.TempPathFactory, event_loop_of_server: BlockingPortal) -> Iterator[Serve]:
     closing: list[Callable[[], object]] = []
 
     def start(path: Path, with_users: bool) -> Served:
@@ -84,6 +97,7 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
         client = TestClient(
             gate, base_url="http://127.0.0.1:8765", raise_server_exceptions=False, follow_redirects=False
         )
+        client.portal = event_loop_of_server
         closing.extend([lambda: context.__exit__(None, None, None), gate.close])
         return Served(client, db, tokens)
 

@@ -21,15 +21,26 @@ from monitor.store import Database, import_campaign, load_campaign, withdraw_cam
 from monitor.workflow.certificate.copies import copied_grounds
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
-from monitor.workflow.copied_readings import copied_readings
+from monitor.workflow.copied_readings import MOST_NAMED, copied_readings, copies_in_history
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.instruments.instruments import instruments
+from monitor.workflow.instruments.request import InstrumentsRequest
 from monitor.workflow.intake.campaigns import RunsRequest, campaigns, runs
+from monitor.workflow.run_statistics.request import StatisticsRequest
+from monitor.workflow.run_statistics.statistics import stats
+from monitor.workflow.standards.request import StandardsRequest
+from monitor.workflow.standards.standards import standards
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.volumetric.over_stroke import OverStrokeRequest, over_stroke
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -91,6 +102,60 @@ def test_every_answer_says_that_its_readings_are_copies(db: Database) -> None:
     for copy in ("r-test", "again", "next-day"):
         withdraw_campaign(db, copy, "a copy")
     assert identify(db, IdentifyRequest("other")).copied_readings is None
+
+
+def test_a_history_says_which_of_its_campaigns_hold_runs_of_others(db: Database) -> None:
+    said = [str(each) for each in trend(db, TrendRequest("CENTRE-4")).copied_readings or ()]
+    never = "in every reading, which two measurements never do: withdraw the copy (monitor withdraw)"
+    assert said == [
+        f"1 run of other equals those of r-test {never}".replace(
+            "r-test in", "r-test of machine CENTRE-4 in"
+        ),
+        f"1 run of again equals those of r-test {never}",
+        f"1 run of next-day equals those of r-test {never}",
+    ]
+    assert len(trend(db, TrendRequest("CENTRE-4", campaigns=("again",))).copied_readings or ()) == 1
+    # Rows that a run repeats are not looked for in a history.
+    assert trend(db, TrendRequest("CENTRE-6")).copied_readings is None
+    # What is stored outlives a withdrawal, and so does not say it.
+    (stored,) = db.rows(
+        "SELECT CAST(document AS VARCHAR) FROM analysis WHERE kind = 'trend' AND machine = 'CENTRE-4'"
+    )
+    assert "copied_readings" not in stored[0]
+
+
+def test_of_many_copies_in_a_history_the_first_are_named(table: Campaign) -> None:
+    with Database(":memory:") as db:
+        for number in range(MOST_NAMED + 3):
+            import_campaign(db, replace(table, name=f"copy-{number}", files=()))
+        said = copies_in_history(db, ["copy-0"])
+        assert said is not None
+        assert len(said) == MOST_NAMED + 1
+        assert said[-1] == "2 more campaigns hold runs of others; `monitor campaigns` names all"
+        assert copies_in_history(db, []) is None
+
+
+def test_a_map_tests_of_standards_and_shares_of_instruments_say_it(db: Database) -> None:
+    said = copied_readings(db, load_campaign(db, "other"))
+    assert standards(db, StandardsRequest("other")).copied_readings == said
+    assert instruments(db, InstrumentsRequest("other")).copied_readings == said
+    mapped = volumetric_map(db, VolumetricRequest("other", 1, points=2))
+    assert mapped.copied_readings == said
+    (stored,) = db.rows("SELECT CAST(document AS VARCHAR) FROM analysis WHERE kind = 'volumetric map'")
+    assert "copied_readings" not in stored[0]
+
+
+@pytest.mark.slow
+def test_statistics_of_runs_and_the_map_of_a_page_say_it(tmp_path: Path) -> None:
+    measured = read_campaign(EXAMPLES / "l-shape")
+    assert isinstance(measured, Campaign)
+    with Database(tmp_path / "m.duckdb") as db:
+        import_campaign(db, measured)
+        import_campaign(db, replace(measured, name="again", files=()))
+        said = copied_readings(db, load_campaign(db, "again"))
+        assert said is not None
+        assert stats(db, StatisticsRequest("again")).copied_readings == said
+        assert over_stroke(db, OverStrokeRequest("again", points=2)).map.copied_readings == said
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ def history(latest: float = 0.0, campaigns: int = 6) -> Series:
 def trend_of(series: Series, limit: float) -> ParameterTrend:
     drift = PieceDrift(series, -np.inf)
     return ParameterTrend(
-        "µm", drift_statement(drift), latest_mean(series), (), (), None, (), None, (), None, None, None,
+        "µm", drift_statement(drift), latest_mean(drift), (), (), None, (), None, (), None, None, None,
         limit_forecast(drift, limit, float(series.t[-1]) + 30.0, 0.95), None, None, None, None,
     )  # fmt: skip
 

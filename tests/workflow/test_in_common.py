@@ -27,6 +27,7 @@ from monitor.statistics.trend import trend as statistics_trend
 from monitor.store import Database, import_campaign, load_identification, machine_history
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.changes import ChangeSearch
+from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.in_common import RestsOn, calibrated_alike, calibrated_to, stated_differently
 from monitor.workflow.history.other_instruments import between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past
@@ -226,9 +227,9 @@ def test_the_mean_of_a_days_runs_has_what_they_have_in_common() -> None:
         np.zeros(count), np.zeros(count, dtype=np.bool_), timedelta(),
         common_parts={scale: np.full(count, 1.0)},
     )  # fmt: skip
-    mean = latest_mean(series)
+    mean = latest_mean(PieceDrift(series, -np.inf))
     assert mean.latest_u == pytest.approx(np.hypot(values.std(ddof=1) / np.sqrt(count), 1.0), rel=1e-9)
-    alone = latest_mean(replace(series, common_parts={}))
+    alone = latest_mean(PieceDrift(replace(series, common_parts={}), -np.inf))
     assert alone.latest_u == pytest.approx(values.std(ddof=1) / np.sqrt(count), rel=1e-9)
 
 
@@ -348,7 +349,7 @@ def test_jcgm100_4_2_4_two_runs_of_a_day_have_the_scatter_of_all_days() -> None:
     covered = {2: 0, 30: 0}
     for _ in range(400):
         for days in covered:
-            mean = latest_mean(_two_a_day(rng.normal(0.0, 2.0, (days, 2))))
+            mean = latest_mean(PieceDrift(_two_a_day(rng.normal(0.0, 2.0, (days, 2))), -np.inf))
             dof = mean.latest_degrees_of_freedom
             assert dof in (days, 1)
             covered[days] += abs(mean.latest) <= stats.t(dof).ppf(0.95 / 2 + 0.5) * mean.latest_u
@@ -358,6 +359,6 @@ def test_jcgm100_4_2_4_two_runs_of_a_day_have_the_scatter_of_all_days() -> None:
 def test_a_day_that_scatters_more_than_the_others_has_its_own_u() -> None:
     values = np.random.default_rng(9).normal(0.0, 1.0, (20, 2))
     values[-1] = 0.0, 30.0
-    loose = latest_mean(_two_a_day(values))
+    loose = latest_mean(PieceDrift(_two_a_day(values), -np.inf))
     assert loose.latest_u == pytest.approx(15.0)
     assert loose.latest_degrees_of_freedom == 1

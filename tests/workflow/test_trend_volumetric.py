@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -40,11 +41,17 @@ FACTOR = {"µm": 1e-3, "µrad": 1e-6, "µm/m": 1e-6}
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(
+    tmp_path_factory: pytest.TempPathFactory, made_once: Callable[[str, Callable[[Path], object]], Path]
+) -> Path:
     """A year's half of weekly campaigns that lead, with small scatter, to the example `cold-cold`."""
-    place = tmp_path_factory.mktemp("volumetric") / "m.duckdb"
+    made = made_once("weekly-half-year", _fill) / "m.duckdb"
+    return Path(shutil.copy(made, tmp_path_factory.mktemp("volumetric") / "m.duckdb"))
+
+
+def _fill(folder: Path) -> None:
     rng = np.random.default_rng(3)
-    with Database(place) as db:
+    with Database(folder / "m.duckdb") as db:
         import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
         identify(db, IdentifyRequest("cold-cold"))
         ((machine, topology_of, start),) = db.rows(
@@ -91,7 +98,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
             )
         gather_values(db)
         gather_runs(db)
-    return place
 
 
 @pytest.fixture

@@ -42,6 +42,7 @@ def _part(part: float, u: float) -> str:
 
 
 def _say(answer: InstrumentsAnswer) -> None:
+    output.copied(answer.copied_readings)
     output.say(f"{answer.campaign}, run {answer.run}, model {answer.model}")
     fits = [
         [f"({number})", fit.instrument, ", ".join(fit.setups), str(fit.numbers), f"{fit.rms_in_u:.2f}"]

@@ -1,7 +1,7 @@
 """All machines at once: every parameter of every machine, what needs attention first.
 
 Means, pooled variances, Bartlett, ANOVA and drift are computed from sums that the database makes; nothing is stored.
-Of each machine the days since its last recorded event count (`monitor event`).
+Of each machine the runs since its last recorded event count (`monitor event`).
 """
 
 from __future__ import annotations
@@ -15,15 +15,18 @@ from monitor.cli.database import ask, opened
 from monitor.cli.parser import add_model, common
 from monitor.cli.screen import on_screen
 from monitor.reporting.messages import (
+    UNEXPLAINED,
     attention_words,
     campaigns_of_same_hours,
+    machines_contradicting,
     machines_lacking,
     machines_refuted,
     machines_simulated,
     numbers_of_older_version,
+    times_stated,
 )
 from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
-from monitor.workflow.fleet.attention import Attention
+from monitor.workflow.fleet.attention import ATTENTION, Attention
 from monitor.workflow.fleet.fleet import fleet
 from monitor.workflow.fleet.request import FleetRequest
 
@@ -109,12 +112,33 @@ def _table(answer: FleetAnswer, most: int) -> None:
          "a year", "limit", "Bartlett q", "ANOVA q", "drift q"],
         [
             *(["-", name, "-", NOT_JUDGED, *["-"] * 11] for name in named),
-            *(_cells(row, answer.same_hours or ()) for row in answer.table),
+            *_rows(answer, most),
         ],
         text_columns=6,
     )  # fmt: skip
     if len(named) < len(without):
         output.say(f"{len(without) - len(named)} more without numbers; --top 0 names all")
+
+
+def _rows(answer: FleetAnswer, most: int) -> list[list[str]]:
+    """The rows of parameters, with those of ``most`` machines (0: all) whose numbers ask for nothing by a model that
+    does not explain their latest readings: behind what asks for something, before what is as usual, as on the first
+    page."""
+    rows = [_cells(row, answer.same_hours or ()) for row in answer.table]
+    usual = ATTENTION.index(Attention.AS_USUAL)
+    asking = [row.machine for row in answer.table if ATTENTION.index(row.attention) < usual]
+    if len(asking) == len(answer.table) < answer.rows:
+        # What else asks for something is not shown.
+        return rows
+    contradicted = answer.statements_contradicted or {}
+    unexplained = [
+        ["-", machine, "-", UNEXPLAINED, *["-"] * 11]
+        if machine not in contradicted
+        else ["-", machine, "-", f"{UNEXPLAINED}: {times_stated(contradicted[machine].times)}", *["-"] * 11]
+        for machine in answer.unexplained
+        if machine not in asking
+    ]
+    return rows[: len(asking)] + unexplained[: most or None] + rows[len(asking) :]
 
 
 def _say_of_machines(answer: FleetAnswer) -> None:
@@ -135,6 +159,11 @@ def _say_of_machines(answer: FleetAnswer) -> None:
     if answer.models_refuted:
         latest = {machine: refuted.campaign for machine, refuted in answer.models_refuted.items()}
         output.say(machines_refuted(latest, MOST_NAMED))
+    if answer.statements_contradicted:
+        last = {
+            machine: (each.campaign, each.times) for machine, each in answer.statements_contradicted.items()
+        }
+        output.say(machines_contradicting(last, MOST_NAMED))
     if answer.models_lacking:
         output.say(machines_lacking(answer.models_lacking, MOST_NAMED))
 

@@ -68,6 +68,7 @@ def run(options: Namespace) -> int:
 
 
 def _say(answer: VolumetricAnswer) -> None:
+    output.copied(answer.copied_readings)
     region, worst = answer.region, answer.worst
     strokes = ", ".join(
         f"{name} {low:.4g} to {high:.4g} mm" for name, (low, high) in region.readings_mm.items()

@@ -37,6 +37,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    output.copied(answer.copied_readings)
     for test in on_screen(answer).tests:
         _say(test)
     if answer.left_out:

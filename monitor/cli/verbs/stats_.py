@@ -55,6 +55,7 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     answer = on_screen(answer)
+    output.copied(answer.copied_readings)
     _parameters(answer)
     if answer.moved:
         output.say(

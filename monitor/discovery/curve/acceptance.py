@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery.curve.candidates import at_best_value
 from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
 from monitor.discovery.curve.plausible import is_plausible
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene
 from monitor.discovery.search.acceptance import Acceptance
-from monitor.discovery.search.evidence import Evidence, Pool, pool_of, weigh_beside
+from monitor.discovery.search.evidence import Pool, pool_of, weigh_beside
 from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
@@ -73,9 +74,9 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         return at_best_value(self.scene, selected, index)
 
     def separable(
-        self, selected: Sequence[CurveCandidate], weighed: list[Evidence[CurveCandidate]]
-    ) -> list[Evidence[CurveCandidate]]:
-        """Evidence for candidates whose period, if any, lies far enough from those in the model and selected."""
+        self, selected: Sequence[CurveCandidate], candidates: Sequence[CurveCandidate]
+    ) -> npt.NDArray[np.bool_]:
+        """Those candidates whose period, if any, lies far enough from those in the model and selected."""
         problem = self.scene.curve.problem
         rates: dict[str, list[float]] = {name: [] for name in problem.inputs.numbers}
         for effect in (*problem.effects, *(candidate.effect for candidate in selected)):
@@ -89,7 +90,7 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
             rate, least = 1.0 / effect.value, APART / spans[effect.column]
             return all(abs(other - rate) >= least for other in rates[effect.column])
 
-        return [evidence for evidence in weighed if is_apart(evidence.candidate.effect)]
+        return np.array([is_apart(candidate.effect) for candidate in candidates], dtype=np.bool_)
 
     def outdoes(self, selected: Sequence[CurveCandidate], rival: CurveCandidate) -> bool:
         """Whether a rival still says something beside the selected ones, noise allowed for."""
@@ -151,10 +152,12 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         """The most convincing cycle of an input beside the selected candidates, at its best period."""
         families = {candidate.family for candidate in selected}
         weighed = weigh_beside(self.scene, self._pool, selected)
+        able = self.separable(selected, [evidence.candidate for evidence in weighed])
         cycles = [
             evidence
-            for evidence in self.separable(selected, weighed)
-            if _is_cycle(evidence.candidate, column)
+            for evidence, is_able in zip(weighed, able, strict=True)
+            if is_able
+            and _is_cycle(evidence.candidate, column)
             and (evidence.candidate.effect.free or evidence.candidate.family not in families)
         ]
         if not cycles:

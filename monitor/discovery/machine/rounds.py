@@ -18,8 +18,8 @@ from monitor.discovery.machine.joints.robot_search import (
 )
 from monitor.discovery.machine.missing import told_apart
 from monitor.discovery.machine.noise.correlation import Correlation, caution, is_next
-from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
-from monitor.discovery.machine.search import search_chain, still_found
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, MachineEffect, scene_of
+from monitor.discovery.machine.search import first_found, search_chain, still_found
 from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -168,6 +168,7 @@ class _Found:
 
     rounds: dict[tuple[object, ...], ChainRound] = field(default_factory=dict)
     suspects: dict[tuple[object, ...], Suspects] = field(default_factory=dict)
+    sides: tuple[MachineEffect, ...] = ()
 
 
 class _Rounds:
@@ -195,7 +196,7 @@ class _Rounds:
         self.correlation = correlation
         self.shared = correlation is not None
         self.unfitted: dict[str, None] = {}
-        self.sides: tuple[MachineEffect, ...] = ()
+        self.sides: tuple[MachineEffect, ...] = before.sides
         self._noises: NoiseTurns = Turns()
         self._earlier: Turns[SuspectNames, ChainRound] = Turns()
 
@@ -207,8 +208,7 @@ class _Rounds:
         conditions = self._conditions
         if conditions not in self.before.rounds:
             searched = self._round(self._near())
-            if sides := self._new_sides(searched):
-                self.sides += sides
+            if self._with_new_sides(searched.scene, [finding.candidate for finding in searched.refined]):
                 searched = self._round(searched if self._is_able(searched) else None)
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
             searched = replace(searched, scene=replace(searched.scene))
@@ -221,23 +221,23 @@ class _Rounds:
         """What a search depends on."""
         return self.suspects.conditions, self.correlation, self.sides, *self.unfitted
 
-    def _new_sides(self, searched: ChainRound) -> tuple[ChainEffect, ...]:
-        """What plays do where nobody knows on which side they are, of errors of which it is not among the unknowns of
-        the runs yet."""
+    def _with_new_sides(self, scene: ChainScene, selected: Sequence[ChainCandidate]) -> bool:
+        """Take for unknowns of the runs what plays of selected effects do where nobody knows on which side they are, of
+        errors of which it is none yet; return whether there is any."""
         if self.beside_curves:
-            return ()
+            return False
         errors = {side.term for side in self.sides if isinstance(side, ChainEffect)}
-        candidates = [finding.candidate for finding in searched.refined]
-        sides = unknown_sides(searched.scene, candidates, self.search.rate)
+        sides = unknown_sides(scene, selected, self.search.rate)
         new = tuple(side for side in sides if side.term not in errors)
         if not new:
-            return ()
+            return False
         try:
             self._current((*self.sides, *new))
         except NotConvergedError:
             # What a plan hardly tells from the other unknowns of the runs may have no solution.
-            return ()
-        return new
+            return False
+        self.sides = self.before.sides = (*self.sides, *new)
+        return True
 
     def _current(self, sides: Sequence[MachineEffect]) -> Fit:
         """The fit under the present suspects with what plays do where their side is not known."""
@@ -267,9 +267,8 @@ class _Rounds:
         """Search effects under the present conditions; what was found under ``near`` ones is what is found, where a
         scan that begins with it neither adds to it nor takes from it."""
         suspects, out = self.suspects, self.suspects.left_out(self.search.problem)
-        noisy = self._current(self.sides).with_correlation(self.correlation)
-        again = None if near is None else self._again(noisy, near)
-        scene, result = again or self._scan(noisy)
+        again = None if near is None else self._again(self._noisy(), near)
+        scene, result = again or self._scan()
         result, refined = told_apart(scene, result)
         effects = [finding.candidate.effect for finding in refined]
         under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
@@ -310,11 +309,21 @@ class _Rounds:
         self._noises = Turns()
         return None
 
-    def _scan(self, under: Fit) -> tuple[ChainScene, ChainScan]:
-        """Search effects under a fit: beside the curves of joints, or those of the whole catalogue."""
+    def _noisy(self) -> Fit:
+        """The fit under the present conditions."""
+        return self._current(self.sides).with_correlation(self.correlation)
+
+    def _scan(self) -> tuple[ChainScene, ChainScan]:
+        """Search effects: beside the curves of joints, or those of the whole catalogue."""
+        drivers, rate = self.search.drivers, self.search.rate
         if self.beside_curves:
-            return search_beside_curves(under, self._able, self.search.rate)
-        return search_chain(scene_of(under, self._able), self.search.drivers, self.search.rate)
+            return search_beside_curves(self._noisy(), self._able, rate)
+        scene = scene_of(self._noisy(), self._able)
+        first = first_found(scene, drivers, rate)
+        # Sides that the first scan shows are not to be asked for after a whole search.
+        if self._with_new_sides(scene, first.candidates):
+            return search_chain(scene_of(self._noisy(), self._able), drivers, rate)
+        return search_chain(scene, drivers, rate, first)
 
     def _again(self, under: Fit, near: ChainRound) -> tuple[ChainScene, ChainScan] | None:
         """The findings of a near round under a fit with a scene of all that was searched there; None where they are not

@@ -38,10 +38,13 @@ from monitor.effects.artefact.station import Moved
 MOST_GEARS, MOST_DRIFTS, MOST_MOVES = 12, 60, 4
 
 
-def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
+def search_chain(
+    scene: ChainScene, drivers: Sequence[str], rate: float, first: ChainScan | None = None
+) -> tuple[ChainScene, ChainScan]:
     """Scan a scene, and where a free shape of the model does not follow its error, once more beside all that this error
-    could do; return the scene with the candidates that were added."""
-    searched, result = _searched(scene, drivers, rate)
+    could do; return the scene with the candidates that were added. ``first`` is what `first_found` says, if that is
+    known."""
+    searched, result = _searched(scene, drivers, rate, first)
     if may_be_mimics(searched, result.candidates, rate):
         beside = beside_free_shapes(scene)
         searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
@@ -67,7 +70,14 @@ def still_found(
     return by_error_taken_away(scene, result)
 
 
-def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
+def first_found(scene: ChainScene, drivers: Sequence[str], rate: float) -> ChainScan:
+    """What the first scan of a search finds."""
+    return standing_out(scene, scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate))
+
+
+def _searched(
+    scene: ChainScene, drivers: Sequence[str], rate: float, first: ChainScan | None = None
+) -> tuple[ChainScene, ChainScan]:
     """Scan a scene; where gears, drifts of one run or moves of the station stand out of what it leaves, once more with
     them; at last with tables instead of several shapes."""
 
@@ -80,9 +90,8 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
     drifts: set[str] = set()
     moves: set[str] = set()
     first_moments: dict[type[Moved], tuple[ChainCandidate, ...]] = {}
-    selected: Sequence[ChainCandidate] = ()
+    result = first or first_found(scene, drivers, rate)
     while True:
-        result = standing_out(scene, scanned(scene, selected))
         selected = result.candidates
         new = _not_yet(gear_variants(scene, selected, rate), gears, MOST_GEARS)
         new += _not_yet(drifts_of_runs(scene, selected, rate), drifts, MOST_DRIFTS)
@@ -110,6 +119,7 @@ def _searched(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[C
             scene, result = drift_instead(scene, result, drivers, accepts)
             return axes_of_plate(*plate_instead(scene, result, accepts), accepts)
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))
+        result = standing_out(scene, scanned(scene, selected))
 
 
 def _in_their_own_shapes(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Generic
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery.search.evidence import Evidence, Pool
 from monitor.discovery.search.memory import Memory
@@ -59,10 +60,10 @@ class Acceptance(Generic[CandidateT]):
         return selected[index]
 
     def separable(
-        self, selected: Sequence[CandidateT], weighed: list[Evidence[CandidateT]]
-    ) -> list[Evidence[CandidateT]]:
-        """Evidence for those candidates that the data can separate from the selected ones (a period from another)."""
-        return weighed
+        self, selected: Sequence[CandidateT], candidates: Sequence[CandidateT]
+    ) -> npt.NDArray[np.bool_] | None:
+        """Which candidates (n,) the data can separate from the selected ones (a period from another); None: all."""
+        return None
 
     def outdoes(self, selected: Sequence[CandidateT], rival: CandidateT) -> bool:
         """Whether a rival with better evidence may replace one of the selected candidates."""

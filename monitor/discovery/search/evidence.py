@@ -10,15 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from operator import attrgetter
-from typing import Generic
+from typing import Generic, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import eigen, orthonormal, without
 from monitor.discovery.search.remainder import Remainder
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.discovery.search.together import together
@@ -35,12 +34,13 @@ ODDS_OF_TOO_LARGE = 400.0
 BEYOND = 100.0
 # So many products with selected effects are remembered, some hundreds of MB of a few columns each at most.
 MOST_PRODUCTS = 4_000_000
+# Scores that are one to so many decimals differ by rounding: no answer hangs on the last bits of an exact tie.
+SAME = 4
 # So many standard deviations of a coefficient are put down to noise before its size is judged.
 STANDS_OUT = 3.0
 
 
-@dataclass(frozen=True)
-class Evidence(Generic[CandidateT]):
+class Evidence(NamedTuple, Generic[CandidateT]):
     """The evidence for one candidate: F with ``rank`` degrees of freedom in its numerator, its p-value and score.
 
     ``too_large`` says that it would need coefficients beyond what a machine in use is likely to have.
@@ -130,6 +130,12 @@ class Pool(Generic[CandidateT]):
         return grams
 
     @cached_property
+    def family(self) -> npt.NDArray[np.int64]:
+        """The number (n,) of the family of each candidate."""
+        numbers: dict[str, int] = {}
+        return np.array([numbers.setdefault(each.family, len(numbers)) for each in self.candidates])
+
+    @cached_property
     def tries(self) -> Array:
         """The number of variants of each candidate that are searched."""
         return np.array([float(candidate.variant.tries) for candidate in self.candidates])
@@ -193,12 +199,34 @@ def weigh(
     basis = orthonormal(selected)
     remainder = without(basis, residual[:, None])[:, 0]
     squares = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
-    return _weighed(pool, pool.products(basis), pool.products(remainder), squares)
+    weights = _weighed(pool, pool.products(basis), pool.products(remainder), squares)
+    return weights.of(pool, weights.order)
 
 
-def _weighed(
-    pool: Pool[CandidateT], overlap: Array, onto: Array, squares: tuple[float, int]
-) -> list[Evidence[CandidateT]]:
+@dataclass(frozen=True)
+class _Weights:
+    """The evidence (n,) for each candidate of a pool."""
+
+    explained: Array
+    rank: npt.NDArray[np.int64]
+    f: Array
+    p_value: Array
+    score: Array
+    too_large: npt.NDArray[np.bool_]
+
+    @property
+    def order(self) -> npt.NDArray[np.int64]:
+        """The numbers of the candidates, the most convincing first; of those that say the same the first."""
+        return np.argsort(-np.round(self.score, SAME), kind="stable")
+
+    def of(self, pool: Pool[CandidateT], numbers: npt.NDArray[np.int64]) -> list[Evidence[CandidateT]]:
+        """The evidence for some candidates of the pool."""
+        arrays = (self.explained, self.rank, self.f, self.p_value, self.score, self.too_large)
+        values = (array[numbers].tolist() for array in arrays)
+        return list(map(Evidence, map(pool.candidates.__getitem__, numbers.tolist()), *values))
+
+
+def _weighed(pool: Pool[CandidateT], overlap: Array, onto: Array, squares: tuple[float, int]) -> _Weights:
     """Weigh every candidate of a pool by the products of its columns with an orthonormal basis (K, r) of what is
     selected and with what that leaves (K,), of which ``squares`` is the sum of squares with its degrees of freedom."""
     total, dof = squares
@@ -214,8 +242,7 @@ def _weighed(
         )
         large[members] = np.sqrt(np.sum((coefficients / pool.lengths[rows]) ** 2, axis=-1))
     rank[large > BEYOND * pool.largest] = 0
-    weighed = evidence_of(pool, explained, rank, (total, dof), large > pool.largest)
-    return sorted(weighed, key=attrgetter("score"), reverse=True)
+    return _weights(pool, explained, rank, (total, dof), large > pool.largest)
 
 
 def weigh_beside(
@@ -231,15 +258,34 @@ def weigh_in(
     beside: Remainder, candidates: Sequence[CandidateT] | Pool[CandidateT]
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate in what selected effects leave, the most convincing first."""
-    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
     if isinstance(candidates, Pool):
-        overlap = candidates.overlap(beside)
-        return _weighed(candidates, overlap, candidates.onto(beside, overlap), squares)
+        weights = _weighed_again(beside, candidates)
+        return weights.of(candidates, weights.order)
     # Nothing is gained by products with each selected effect of candidates that are weighed once.
     pool = Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    return _weighed(pool, pool.products(beside.basis), pool.products(beside.residual), squares)
+    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    weights = _weighed(pool, pool.products(beside.basis), pool.products(beside.residual), squares)
+    return weights.of(pool, weights.order)
+
+
+def best_of_families_in(
+    beside: Remainder, pool: Pool[CandidateT], able: npt.NDArray[np.bool_] | None = None
+) -> list[Evidence[CandidateT]]:
+    """The best of every family of a pool in what selected effects leave, most convincing first; only of those that are
+    ``able`` (n,), if given."""
+    weights = _weighed_again(beside, pool)
+    order = weights.order if able is None else weights.order[able[weights.order]]
+    first = np.unique(pool.family[order], return_index=True)[1]
+    return weights.of(pool, order[np.sort(first)])
+
+
+def _weighed_again(beside: Remainder, pool: Pool[CandidateT]) -> _Weights:
+    """Weigh every candidate of a pool that remembers its products with selected effects."""
+    overlap = pool.overlap(beside)
+    squares = float(beside.residual @ beside.residual), beside.degrees_of_freedom
+    return _weighed(pool, overlap, pool.onto(beside, overlap), squares)
 
 
 def explained_by(
@@ -248,8 +294,7 @@ def explained_by(
     """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
     coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show. Directions with a
     part (squared) of at most ``least`` (...) are held."""
-    # Of one coefficient the product is its own eigenvalue.
-    values, vectors = np.linalg.eigh(gram) if gram.shape[-1] > 1 else (gram[..., 0], np.ones_like(gram))
+    values, vectors = eigen(gram)
     keep = values > (SMALLEST_REMAINDER if least is None else least[..., None])
     along = np.einsum("...ij,...i->...j", vectors, onto)
     inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
@@ -270,6 +315,18 @@ def evidence_of(
 ) -> list[Evidence[CandidateT]]:
     """Evidence for the candidates of a pool that explain sums of squares (n,) with ranks (n,) of a ``residual`` with
     this sum of squares and degrees of freedom."""
+    weights = _weights(pool, explained, rank, residual, too_large)
+    return weights.of(pool, np.arange(len(pool.candidates)))
+
+
+def _weights(
+    pool: Pool[CandidateT],
+    explained: Array,
+    rank: npt.NDArray[np.int64],
+    residual: tuple[float, int],
+    too_large: npt.NDArray[np.bool_],
+) -> _Weights:
+    """The numbers of `evidence_of`."""
     total, dof = residual
     able = (rank > 0) & (dof > rank) & (total > 0)
     number, other = np.where(able, rank, 1), np.where(able, dof - rank, 1)
@@ -278,8 +335,7 @@ def evidence_of(
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
     p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
     score = scores_of(explained, rank, residual, odds) - pool.behind
-    values = (np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
-    return list(map(Evidence, pool.candidates, *(each.tolist() for each in values)))
+    return _Weights(np.where(able, explained, 0.0), rank, f, p_value, score, too_large)
 
 
 def scores_of(

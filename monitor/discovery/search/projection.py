@@ -45,6 +45,23 @@ def without(basis: Array, columns: Array) -> Array:
     return remainder
 
 
+def eigen(grams: Array) -> tuple[Array, Array]:
+    """The rising eigenvalues (..., k) and the eigenvectors (..., k, k) of symmetric matrices: of two rows in closed
+    form, since LAPACK takes them one by one."""
+    if grams.shape[-1] == 1:
+        # Of one coefficient the product is its own eigenvalue.
+        return grams[..., 0], np.ones_like(grams)
+    if grams.shape[-1] > 2:
+        values, vectors = np.linalg.eigh(grams)
+        return values, vectors
+    first, between, second = grams[..., 0, 0], grams[..., 0, 1], grams[..., 1, 1]
+    mean, half = (first + second) / 2.0, (first - second) / 2.0
+    radius, angle = np.hypot(half, between), np.arctan2(between, half) / 2.0
+    cosine, sine = np.cos(angle), np.sin(angle)
+    vectors = np.stack([-sine, cosine, cosine, sine], axis=-1).reshape(*grams.shape)
+    return np.stack([mean - radius, mean + radius], axis=-1), np.swapaxes(vectors, -1, -2)
+
+
 def inverse_above(grams: Array, least: float) -> Array:
     """The inverses (..., k, k) of products of columns, symmetric; directions with at most ``least`` are left out.
 

@@ -15,7 +15,7 @@ from typing import Generic
 import numpy as np
 
 from monitor.discovery.search.acceptance import Acceptance
-from monitor.discovery.search.evidence import Evidence, best_of_families, pool_of, weigh_beside
+from monitor.discovery.search.evidence import Evidence, best_of_families_in, pool_of, weigh_beside
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
 from monitor.discovery.search.steps import step_by_step
@@ -115,12 +115,16 @@ class _Steps(Generic[CandidateT]):
         self._alone: Memory[Evidence[CandidateT]] = Memory()
 
     def weighed(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
-        """Evidence for the candidates of the pool that can be separated from the selected ones, given these."""
+        """Evidence for the best of every family in the pool that can be separated from the selected ones, given
+        these."""
         checkpoint()
         self._weighings += 1
         told(FIRST_WEIGHED + (STEPS_END - FIRST_WEIGHED) * (1.0 - SLOWER**self._weighings))
-        weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, self.pool, selected))
-        return self.rules.separable(selected, weighed)
+        return self._weighed.answer(selected, None, lambda: self._weigh(selected))
+
+    def _weigh(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
+        able = self.rules.separable(selected, self.pool.candidates)
+        return best_of_families_in(self.scene.remainders.beside(selected), self.pool, able)
 
     def evidence(self, candidate: CandidateT, others: Sequence[CandidateT]) -> Evidence[CandidateT]:
         """Evidence for one candidate beside others."""
@@ -139,7 +143,7 @@ class _Steps(Generic[CandidateT]):
     ) -> CandidateT | None:
         """The most convincing candidate that stands the control and is ``believed`` beside the selected ones."""
         families = {candidate.family for candidate in selected}.union(fallen)
-        weighed = best_of_families(self.weighed(selected))
+        weighed = self.weighed(selected)
         p_values = [evidence.p_value for evidence in weighed]
         q_values = control_false_discoveries(p_values, rate=self.rate).q_value
         for evidence, q_value in zip(weighed, q_values, strict=True):
@@ -243,7 +247,7 @@ class _Steps(Generic[CandidateT]):
         """Evidence for the selected effect at an index, given the other selected ones, and for all not selected."""
         others = except_for(selected, index)
         families = {candidate.family for candidate in selected}
-        weighed = best_of_families(self.weighed(others))
+        weighed = self.weighed(others)
         evidence = self.evidence(selected[index], others)
         return evidence, [other for other in weighed if other.candidate.family not in families]
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.search.evidence import Evidence, Pool
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import eigen, orthonormal, without
 from monitor.discovery.search.remainder import Remainder
 from monitor.discovery.search.scene import CandidateT
 from monitor.records import Array
@@ -86,7 +86,7 @@ def p_value_by_flips(
     for members, rows, grams in _some_at_once(pool):
         part = overlap[rows] / pool.lengths[rows][..., None]
         gram = grams - part @ np.swapaxes(part, -1, -2)
-        values, vectors = np.linalg.eigh(gram)
+        values, vectors = eigen(gram)
         keep = values > pool.least[members][:, None]
         price = keep.sum(axis=-1) * np.log(max(dof, 1)) + 2.0 * np.log(
             pool.tries[members] * pool.odds[members]

@@ -20,6 +20,8 @@ SEVERAL = ", "
 IN_U = "u"
 #: The unit of runs that equal those of the same machine, where that is what differs.
 AT_ANOTHER_TIME = "started_at"
+#: The units of rows that stand too late beside the readings, or too early.
+LATE, EARLY = "late", "early"
 
 
 class GroundKind(StrEnum):
@@ -37,6 +39,8 @@ class GroundKind(StrEnum):
     SIMULATED = "simulated"
     COPIED_RUNS = "copied-runs"
     COPIED_ROWS = "copied-rows"
+    NOMINAL_READINGS = "nominal-readings"
+    LATE_ROWS = "late-rows"
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,9 @@ class Ground:
     others, by ``size`` in standard uncertainties. Where it may be any of several they are ``several``, each by its
     name; where nobody alone explains it there is no subject. Of copied runs and rows ``size`` counts them; the subject
     is the other campaign, with its machine where that is another, or the number of the first row and of that which it
-    repeats.
+    repeats. Of nominal readings ``size`` counts them; the subject has the numbers of the first and the last, and the
+    setup. Of late rows ``size`` is by how many rows the columns of the subject stand too late, or too early, from the
+    row of the subject on.
     """
 
     kind: GroundKind
@@ -101,6 +107,8 @@ def _key(ground: Ground) -> str:
             return "lack_in_budget"
         case GroundKind.COPIED_RUNS if ground.unit == AT_ANOTHER_TIME:
             return "copied_runs_elsewhen"
+        case GroundKind.LATE_ROWS if ground.unit == EARLY:
+            return "early_rows"
     return ground.kind.value.replace("-", "_")
 
 

@@ -8,7 +8,7 @@ from datetime import datetime
 
 from monitor.reporting.adjusting import SEE_FIRST, adjusting
 from monitor.reporting.health.change_first import change_first
-from monitor.reporting.health.comparison import MissingEffect
+from monitor.reporting.health.comparison import CHECK_STATEMENT, MissingEffect
 from monitor.reporting.health.concern import (
     DRIFT_P,
     binding_shares,
@@ -164,15 +164,7 @@ LOOK_AT_FILE = (
 
 
 def _unexplained(health: MachineHealth) -> str:
-    """The effect that the model lacks; what `explain` answers where none is named."""
-    if health.model is None:
-        return ""
-    if not health.model.missing or health.model.work_points_elsewhere is not None:
-        return health.model.answer
-    effect = health.model.missing[0]
-    unit = "µm" if effect.peak_urad is None else "µrad"
-    size = "" if effect.peak_um is None else f", up to {effect.peak_um:.1f} {unit}"
-    return f"the measurements show what the model does not have: {effect.meaning} ({effect.effect}){size}"
+    return "" if health.model is None else health.model.unexplained
 
 
 def _changed(health: MachineHealth) -> str:
@@ -300,6 +292,8 @@ def to_do(health: MachineHealth) -> str:
         action = f"{missing.remedy.rstrip('.')}; then measure again"
     elif health.state is State.MODEL_FAILS and health.model is not None:
         action = "look at its page for where the model fails, and measure again"
+        if health.model.times_stated is not None:
+            action = f"see whether {CHECK_STATEMENT}; else {action}"
     elif SEE_FIRST in action:
         return _sentence(change_first(health, action))
     elif is_due(health):

@@ -6,6 +6,10 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED, Said
 from monitor.records import Verdict
+from monitor.reporting.messages import times_stated
+
+#: What may be wrong where readings lie many times as far from a model as is stated of them.
+CHECK_STATEMENT = "campaign.toml states too small an uncertainty, or another unit than the readings have"
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ class ModelHealth:
     ``unchanged`` are parameters that stepped between runs of the campaign and have no change in the machine's history.
     ``refuted_p`` is the p-value of lack of fit with the noise of neighbours allowed for, where the readings of the
     campaign refute the model; None where they do not, and where runs of the campaign are still to come.
+    ``times_stated`` is how many times what is stated the residuals are, where they contradict the statement.
     ``work_points_elsewhere`` is what says that the file states work points elsewhere than they come out.
     """
 
@@ -107,8 +112,22 @@ class ModelHealth:
     unchanged: tuple[str, ...] = field(default=(), metadata=OMITTED)
     refuted_p: float | None = field(default=None, metadata=OMITTED)
     work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
+    times_stated: float | None = field(default=None, metadata=OMITTED)
 
     @property
     def is_doubted(self) -> bool:
         """Whether the values of the model may hold a part of what it lacks."""
         return self.refuted_p is not None or self.verdict == Verdict.SOMETHING_IS_MISSING.value
+
+    @property
+    def unexplained(self) -> str:
+        """The effect that the model lacks; what `explain` answers where none is named."""
+        if self.work_points_elsewhere is not None:
+            return self.answer
+        if not self.missing:
+            times = self.times_stated
+            return self.answer if times is None else f"{self.answer.rstrip('.')}; {times_stated(times)}"
+        effect = self.missing[0]
+        unit = "µm" if effect.peak_urad is None else "µrad"
+        size = "" if effect.peak_um is None else f", up to {effect.peak_um:.1f} {unit}"
+        return f"the measurements show what the model does not have: {effect.meaning} ({effect.effect}){size}"

@@ -35,7 +35,7 @@ from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health.sentences import NO_ROTARY_AXES
 from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
-from monitor.reporting.messages import DRIFT_OR_SEASON
+from monitor.reporting.messages import DRIFT_OR_SEASON, times_stated
 from monitor.reporting.numbers import round_result, written
 from monitor.reporting.svg.sparkline import sparkline
 
@@ -348,6 +348,8 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
         lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
+    if model.times_stated is not None:
+        lines.append(("against the statement", times_stated(model.times_stated)))
     if model.refuted_p is not None:
         lines.append(
             (

@@ -116,8 +116,8 @@ class FleetSums(GroupSums):
     mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where the parameter was refused
     there. Groups of other campaigns that overlap that day are part of it: ``latest_groups`` counts them all,
     ``latest_m`` and ``latest_mm`` are the sums of their m and m². ``same_hours`` are the groups of machines of which
-    some overlap. ``since_d`` is the last recorded event before that day (days since 1970, NaN: none); groups before it
-    are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
+    some overlap. ``since_d`` is the last recorded event before the last run (days since 1970, NaN: none); runs before
+    it are left out. ``first_d`` is when the first group began (days since 1970), ``beyond_d`` the first of the runs
     without a break beyond the limit, in the whole history (NaN: the mean of the last day, or its last run, is within
     it). ``last_value`` and ``last_u`` are of the last run of the machine (NaN where the parameter was refused there),
     ``check_d`` is when it is measured next, as far after its last run as its campaigns lie apart (days since 1970).
@@ -163,7 +163,7 @@ def fleet_sums(
 ) -> FleetSums:
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
-    Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
+    Of each machine since its last recorded event, where runs followed it (of a day that it divides these runs).
     Without ``model`` that which each machine is followed by, the method's own where none was chosen. A parameter that
     a machine refused both in its first campaign and on its last day has zero for its origin and loses
     2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
@@ -209,7 +209,14 @@ def _summed(
         queries.CAMPAIGN_TEMPERATURES,
     ):
         db.execute(statement)
-    for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
+    for statement in (
+        queries.GROUPS,
+        queries.SINCE,
+        queries.DIVIDED,
+        queries.ENDED,
+        queries.LATEST,
+        queries.ORIGINS,
+    ):
         db.execute(statement)
     db.set_variables({"apart": apart_d})
     for statement in (queries.LAST_RUN, queries.CHECKS, queries.SHOWN, queries.LIMITS):

@@ -98,18 +98,43 @@ SELECT machine, campaign, began_d, ended_d FROM fleet_group JOIN campaign USING 
 WHERE machine_no IN (SELECT machine_no FROM followed WHERE began_d <= ended_before_d)
 """
 
-# A recorded event splits the history of a machine, as in `monitor trend`: groups that began before the last event count
-# no more. An event after the last group splits nothing yet, a note never.
+# The identified runs of some groups, with their places among those identified.
+_RUNS = """
+SELECT g.* EXCLUDE (degc, places), r.run, r.started_at, list_position(v.runs, r.run) AS place
+FROM {groups} AS g JOIN run AS r USING (campaign_id) JOIN identified_values AS v USING (identification_id)
+WHERE CASE WHEN places IS NULL THEN place IS NOT NULL ELSE list_contains(places, place) END
+"""
+
+# A recorded event splits the history of a machine, as in `monitor trend`: runs that began before the last event count
+# no more. An event after the last run splits nothing yet, a note never.
 SINCE = f"""
 CREATE OR REPLACE TEMP TABLE fleet_since AS
 WITH happened AS (
     SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM v_events JOIN fleet_machine USING (machine)
     WHERE kind <> '{NOTE}'
+), latest AS (
+    SELECT machine_no, max(began_d) AS latest_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY ALL
+), late AS (
+    SELECT fleet_group.* FROM fleet_group JOIN latest USING (machine_no) WHERE ended_d >= latest_d
 ), last AS (
-    SELECT machine_no, max(began_d) AS last_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY machine_no
+    SELECT machine_no, epoch(max(started_at)) / 86400.0 AS last_d FROM ({_RUNS.format(groups="late")}) GROUP BY ALL
 )
 SELECT machine_no, max(at_d) AS since_d FROM happened JOIN last USING (machine_no) WHERE at_d <= last_d
 GROUP BY machine_no
+"""
+
+# Of a group that the event divides the runs after it are one: those before it are of another machine.
+DIVIDED = f"""
+INSERT INTO fleet_group
+WITH divided AS (
+    SELECT fleet_group.*, since_d FROM fleet_group JOIN fleet_since USING (machine_no)
+    WHERE began_d < since_d AND ended_d >= since_d
+)
+SELECT identification_id, campaign_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
+       epoch(max(started_at)) / 86400.0, list(place), CASE WHEN count(degc) = count(*) THEN avg(degc) END
+FROM ({_RUNS.format(groups="divided")}) LEFT JOIN fleet_temperature USING (campaign_id, run)
+WHERE epoch(started_at) / 86400.0 >= since_d
+GROUP BY identification_id, campaign_id, machine_no, heading, began_d
 """
 
 ENDED = """

@@ -16,7 +16,7 @@ from starlette.responses import RedirectResponse, Response
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.adjusting import adjusting
 from monitor.reporting.health.records import History, ParameterHealth
-from monitor.reporting.messages import attention_words
+from monitor.reporting.messages import UNEXPLAINED, attention_words, times_stated
 from monitor.reporting.svg.sparkline import MOST, sparkline
 from monitor.web.days import as_iso
 from monitor.web.desk import Desk
@@ -29,7 +29,6 @@ from monitor.web.words import (
     NOT_IDENTIFIED,
     NOT_MEASURED,
     STOP,
-    UNEXPLAINED,
     URGENCIES,
     WITHOUT_NUMBERS,
     Urgency,
@@ -41,6 +40,7 @@ from monitor.workflow.fleet.attention import ATTENTION, Attention
 
 if TYPE_CHECKING:
     from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow, OlderVersion
+    from monitor.workflow.history.refuted import ContradictedStatement
     from monitor.workflow.history.values import ValuesAnswer
     from monitor.workflow.query import TableAnswer
 
@@ -67,7 +67,8 @@ class MachineRow:
     """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
     first; ``latest`` is the date of its latest run, empty where none is known. ``worst`` is None of a machine without
     numbers. ``unexplained`` is the latest campaign, where the model of the numbers does not explain it: numbers that
-    ask for nothing do not make such a machine usual. ``same_hours`` are campaigns that it cannot all have made, of
+    ask for nothing do not make such a machine usual; ``residuals`` says how far its readings are from what is stated,
+    where they contradict that. ``same_hours`` are campaigns that it cannot all have made, of
     which its numbers are mixed, ``left_out`` those without a part in them. ``topology`` and ``parameters`` name the
     parameters."""
 
@@ -82,6 +83,7 @@ class MachineRow:
     others: tuple[FleetTableRow, ...]
     latest: str
     unexplained: str = ""
+    residuals: str = ""
     same_hours: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     topology: str = ""
@@ -102,6 +104,7 @@ def machine_rows(
     unexplained: Mapping[str, str],
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]],
     left_out: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+    contradicted: Mapping[str, ContradictedStatement] = MappingProxyType({}),
 ) -> list[MachineRow]:
     """Return a row a machine, in the order of the table, which has the most urgent first."""
     rows: dict[str, list[FleetTableRow]] = {}
@@ -126,6 +129,7 @@ def machine_rows(
             others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < _USUAL),
             latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
             unexplained=unexplained.get(machine, ""),
+            residuals=times_stated(contradicted[machine].times) if machine in contradicted else "",
             same_hours=tuple(name for group in same_hours.get(machine, ()) for name in group),
             left_out=left_out.get(machine, ()),
             topology=str(described.get(machine, {}).get("topology") or ""),
@@ -199,11 +203,14 @@ def _with_unnumbered(sums: _Sums, machines: TableAnswer) -> list[MachineRow]:
         ]
     rows: list[MachineRow] = []
     if (answer := sums.answer) is not None:
-        refuted = {machine: latest.campaign for machine, latest in (answer.models_refuted or {}).items()}
-        unexplained = {**(answer.models_lacking or {}), **refuted}
         by_name = {str(row["machine"]): row for row in _described(machines)}
         rows = machine_rows(
-            answer.table, by_name, unexplained, answer.same_hours or {}, answer.left_out or {}
+            answer.table,
+            by_name,
+            answer.unexplained,
+            answer.same_hours or {},
+            answer.left_out or {},
+            answer.statements_contradicted or {},
         )
     rows += unnumbered_rows(machines, {row.machine for row in rows})
     ranks = {label: rank for rank, label in enumerate(CLASSES)}

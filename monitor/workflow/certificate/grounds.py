@@ -9,10 +9,16 @@ from monitor.records import Campaign
 from monitor.reporting.certificate.completeness import RefusedGroundsError
 from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind
 from monitor.store import StoredModel
+from monitor.workflow.uncertainty.file_grounds import nominal_grounds
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 #: Grounds of one run that speak against the others too, whose covariance is pooled with it.
-OF_ANY_RUN = (GroundKind.UNITS, GroundKind.GROSS_READINGS)
+OF_ANY_RUN = (
+    GroundKind.NOMINAL_READINGS,
+    GroundKind.LATE_ROWS,
+    GroundKind.UNITS,
+    GroundKind.GROSS_READINGS,
+)
 
 
 def grounds_against(
@@ -27,16 +33,19 @@ def grounds_against(
         # Loaded here: what is stored waits for no solver.
         from monitor.discovery import robust_fit
         from monitor.workflow.identify.fitting import explained_refusals, machine_problem
+        from monitor.workflow.uncertainty.file_grounds import late_grounds
         from monitor.workflow.uncertainty.grounds import grounds_of
 
         with explained_refusals(campaign, model):
             robust = robust_fit(machine_problem(campaign, model))
-        by_run = [grounds_of(campaign, robust, run) for run in stored]
+        late = late_grounds(campaign, model, robust.fit)
+        by_run = [(*late, *grounds_of(campaign, robust, run)) for run in stored]
     simulated = (
         [Ground(GroundKind.SIMULATED, min(stored), campaign.machine.id)] if campaign.machine.virtual else []
     )
     # Gross readings and units of any run speak against each: once each, before what is the runs' own.
-    grounds = dict.fromkeys([*simulated, *(ground for of_run in by_run for ground in of_run or ())])
+    of_file = nominal_grounds(campaign)
+    grounds = dict.fromkeys([*simulated, *of_file, *(ground for of_run in by_run for ground in of_run or ())])
     return tuple(sorted(grounds, key=lambda ground: ground.kind not in OF_ANY_RUN))
 
 

@@ -24,6 +24,7 @@ from monitor.discovery import (
     find_run_mistakes,
     find_setup_mistakes,
     find_still_axes,
+    find_turned_passes,
     is_far,
     is_gross,
     robust_fit,
@@ -104,6 +105,8 @@ def explanation_of(
         mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes:
         mistakes = find_late_rows(campaign, maker, first)
+    if not mistakes:
+        mistakes = find_turned_passes(campaign, maker, first)
     if not mistakes and is_gross(campaign, first):
         mistakes = find_late_rows_without_fit(campaign, maker)
     if not mistakes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from monitor.documents import OMITTED
 from monitor.reporting.weekly_notice import WeeklyNotices
 from monitor.workflow.fleet.attention import Attention, Onset
-from monitor.workflow.history.refuted import RefutedCampaign
+from monitor.workflow.history.refuted import ContradictedStatement, RefutedCampaign
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,7 @@ class FleetAnswer:
     asked for by its name.
     ``models_refuted`` by machine are latest campaigns whose readings refute the model that the values come from;
     ``models_lacking`` by machine those whose stored comparison says that something is missing from it.
+    ``statements_contradicted`` by machine are the last runs whose residuals are many times what is stated, days or not.
     ``simulated`` by machine are campaigns that nobody measured.
     ``same_hours`` by machine are groups of campaigns that hold runs of the same hours: its numbers mix them.
     """
@@ -106,3 +107,15 @@ class FleetAnswer:
     left_out: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     simulated: Mapping[str, tuple[str, ...]] | None = field(default=None, metadata=OMITTED)
     same_hours: Mapping[str, tuple[tuple[str, ...], ...]] | None = field(default=None, metadata=OMITTED)
+    statements_contradicted: Mapping[str, ContradictedStatement] | None = field(
+        default=None, metadata=OMITTED
+    )
+
+    @property
+    def unexplained(self) -> dict[str, str]:
+        """By machine the latest campaign, where the model of its numbers does not explain the readings."""
+        contradicted = {
+            machine: each.campaign for machine, each in (self.statements_contradicted or {}).items()
+        }
+        refuted = {machine: each.campaign for machine, each in (self.models_refuted or {}).items()}
+        return {**(self.models_lacking or {}), **contradicted, **refuted}

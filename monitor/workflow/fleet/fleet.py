@@ -49,7 +49,7 @@ from monitor.workflow.fleet.steps import split_times
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
 from monitor.workflow.history.forecast import NEXT_CHECK_D
 from monitor.workflow.history.limits_of_type import limits_without_parameter_by_machine
-from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign
+from monitor.workflow.history.refuted import REFUTED_P, RefutedCampaign, statements_contradicted
 from monitor.workflow.history.runs import overlapping
 from monitor.workflow.models import label_of, resolve
 
@@ -171,6 +171,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         tolerances_of_type=tolerance_types(db) or None,
         limits_without_parameter=_limits_without_parameter(db, sums) or None,
         models_refuted=_refuted(db, request.model) or None,
+        statements_contradicted=statements_contradicted(db, request.model) or None,
         simulated=simulated_campaigns(db) or None,
         same_hours=_same_hours(sums.same_hours) or None,
         **_by_their_own_models(db, request.model, numbered),

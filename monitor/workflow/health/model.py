@@ -11,6 +11,7 @@ from monitor.reporting.health.sentences import ErrorOf, ErrorWith, RunsNamed
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.health.runs import Span
+from monitor.workflow.history.refuted import CONTRADICTED
 from monitor.workflow.identify.answer import Estimate
 
 
@@ -34,6 +35,7 @@ def model_health(
     compared = [start for run, start in span.starts.items() if run not in left_out]
     # The days of all of them where none of these was compared.
     days = compared or list(span.starts.values())
+    times = comparison.residual_deviation_um / comparison.stated_uncertainty_um
     return ModelHealth(
         campaign=comparison.campaign,
         runs=RunsNamed(
@@ -80,6 +82,7 @@ def model_health(
         ),
         refuted_p=refuted_p,
         work_points_elsewhere=explanation.work_points_elsewhere,
+        times_stated=times if times > CONTRADICTED else None,
     )
 
 

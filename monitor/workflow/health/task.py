@@ -28,6 +28,7 @@ from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
+from monitor.workflow.uncertainty.file_grounds import late_grounds, nominal_grounds
 from monitor.workflow.uncertainty.grounds import grounds_of
 from monitor.workflow.uncertainty.lack_in_budget import lack_in_budget
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -121,8 +122,9 @@ class _Fitted:
         # What was measured later may speak against a certificate, too.
         if not task.whole:
             return answer
-        grounds = grounds_of(task.past, self.robust, task.run)
-        return replace(answer, grounds=(*grounds, *lack_in_budget(answer)))
+        of_file = (*nominal_grounds(task.past), *late_grounds(task.past, task.model, self.robust.fit))
+        grounds = (*of_file, *grounds_of(task.past, self.robust, task.run), *lack_in_budget(answer))
+        return replace(answer, grounds=grounds)
 
     @property
     def evaluated(self) -> StatedUncertainty:

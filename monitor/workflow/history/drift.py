@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -31,15 +32,27 @@ DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE = 6, 0.2
 
 @dataclass(frozen=True, eq=False)
 class PieceDrift:
-    """The present piece of the steady runs ``whole``, since ``begins`` (days since 1970, -inf: all), and its line."""
+    """The present piece of the steady runs ``whole``, since ``begins`` (days since 1970, -inf: all), and its line.
+
+    ``event`` is the last recorded event that runs followed (-inf: none), at or before ``begins``.
+    """
 
     whole: Series
     begins: float
+    event: float = -np.inf
 
     @cached_property
     def piece(self) -> Series:
         """The steady runs since the last change or event."""
         return self.whole.part(self.whole.t >= self.begins)
+
+    @cached_property
+    def of_latest_day(self) -> npt.NDArray[np.bool_]:
+        """Mask (n,) of the runs of the last day of ``whole``; of a day that the last event divides those after it."""
+        since = self.whole.t >= self.event
+        mask = np.zeros(len(since), dtype=np.bool_)
+        mask[since] = self.whole.part(since).of_last_day
+        return mask
 
     @cached_property
     def span(self) -> float:

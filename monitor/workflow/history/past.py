@@ -62,8 +62,8 @@ def machine_past(history: MachineHistory, events: Sequence[float]) -> dict[str, 
 
 def _drift(steady: Series, search: ChangeSearch, events: Sequence[float]) -> PieceDrift:
     """The present piece of history: since the last event or change."""
-    moments = [at for at in events if at <= steady.t[-1]] + [change.at for change in search.changes]
-    return PieceDrift(steady, max(moments, default=-np.inf))
+    event = max((at for at in events if at <= steady.t[-1]), default=-np.inf)
+    return PieceDrift(steady, max((event, *(change.at for change in search.changes))), event)
 
 
 def _as_stated(search: ChangeSearch, drift: PieceDrift) -> ChangeSearch:

@@ -1,5 +1,5 @@
-"""A sign, a unit or exchanged columns of one setup or instrument, which contradicts the others by them; and columns
-that stand some rows too late."""
+"""A sign, a unit or exchanged columns of one setup or instrument, which contradicts the others by them; columns
+that stand some rows too late; and passes whose readings stand in the opposite order."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ USUAL = 0.01
 def mistaken_setups(
     campaign: Campaign, model: StoredModel, problem: ChainProblem, solution: Solution
 ) -> tuple[LikelyMistake, ...]:
-    """The mistakes of a setup or an instrument that explain why it contradicts the others, or that of columns shifted
-    against the readings; ``solution`` is that of the campaign as recorded. Empty where the residuals are as stated."""
+    """The mistakes of a setup or an instrument that explain why it contradicts the others, or that of columns shifted,
+    or passes turned, against the readings; ``solution`` is that of the campaign as recorded. Empty where the residuals
+    are as stated."""
     if not isinstance(campaign_method(campaign).instruments, Instruments):
         return ()
     # Loaded here: only readings that contradict what is stated need the search.
-    from monitor.discovery import Fit, find_late_rows, find_setup_mistakes
+    from monitor.discovery import Fit, find_late_rows, find_setup_mistakes, find_turned_passes
 
     fit = Fit(problem, solution, np.zeros(len(problem.context), dtype=bool))
     free = max(fit.degrees_of_freedom, 1)
@@ -39,7 +40,11 @@ def mistaken_setups(
     def maker(changed: Campaign) -> ChainProblem:
         return campaign_method(changed).problem_of(changed, stored)
 
-    mistakes = find_late_rows(campaign, maker, fit) or find_setup_mistakes(campaign, maker, fit)
+    mistakes = (
+        find_late_rows(campaign, maker, fit)
+        or find_turned_passes(campaign, maker, fit)
+        or find_setup_mistakes(campaign, maker, fit)
+    )
     um = MICROMETRE.to_display
     return tuple(
         LikelyMistake(each.what, um(each.rms_as_recorded), um(each.rms_undone), each.enough)

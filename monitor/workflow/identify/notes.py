@@ -27,10 +27,10 @@ from monitor.reporting.run_notes import (
     WorkPointsElsewhere,
 )
 from monitor.units import DEGREE
+from monitor.workflow.history.refuted import CONTRADICTED
 
-# Residuals beyond so many stated standard uncertainties: a probe's statement is seldom wrong by a factor of three.
-TOO_LARGE = 3.0
-# And so small a part: no probe is twenty times better than its owner says; readings in inches fit 25 times too well.
+# Residuals of so small a part of the stated standard uncertainties: no probe is twenty times better than its owner
+# says; readings in inches fit 25 times too well.
 TOO_SMALL = 0.05
 # Joints are mastered to some degrees at worst, and axes stand within millimetres of their drawing (five of a hundred
 # parts of a link, and never less than 5 mm): beyond, the machine file says something else than the machine is.
@@ -85,7 +85,7 @@ def _residuals(run: RunIdentification) -> Iterator[ResidualsNoted]:
     if run.degrees_of_freedom < 1:
         return
     times = float(np.sqrt(run.chi_square / run.degrees_of_freedom))
-    if times > TOO_LARGE or times < TOO_SMALL:
+    if times > CONTRADICTED or times < TOO_SMALL:
         yield ResidualsNoted(run.run, times)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, Said
 from monitor.methods.method import ContrastKind
 
 
@@ -141,7 +141,8 @@ class InstrumentsAnswer:
     """The instruments of one run; ``not_determined`` are parameters that all of them together do not separate.
 
     ``by_chance`` is how often at most the least likely E_n of so many comparisons comes about without fault, None where
-    nothing is compared.
+    nothing is compared. ``copied_readings`` says which runs of the campaign equal those of another, and which rows of a
+    run earlier ones.
     """
 
     campaign: str
@@ -151,3 +152,4 @@ class InstrumentsAnswer:
     parameters: tuple[ParameterShares, ...]
     not_determined: tuple[str, ...]
     by_chance: float | None
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)

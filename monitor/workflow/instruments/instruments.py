@@ -18,6 +18,7 @@ from monitor.methods.method import Instruments, InstrumentShare, Unable
 from monitor.records import Array
 from monitor.store import Database
 from monitor.units import Unit
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.identify.fitting import explained_refusals, machine_problem
 from monitor.workflow.instruments.answer import (
     Agreement,
@@ -75,6 +76,7 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
         parameters=parameters,
         not_determined=open_ones,
         by_chance=_by_chance([pair for shares in parameters for pair in shares.agreement]),
+        copied_readings=copied_readings(db, campaign),
     )
 
 

@@ -160,7 +160,8 @@ class GroupCorrelation:
 class StatisticsAnswer:
     """Statistics of a campaign's runs. ``groups`` has the number of runs by group; correlation matrices are over the
     parameters in ``parameter_order``. ``seed`` is that of the test of normality; ``refers_to`` says in words what the
-    parameters are relative to, those that are errors of the chain."""
+    parameters are relative to, those that are errors of the chain. ``copied_readings`` says which of its runs equal
+    those of another campaign, and which rows of a run earlier ones: no part of what is stored."""
 
     campaign: str
     machine: str
@@ -181,6 +182,7 @@ class StatisticsAnswer:
     seed: int
     refers_to: Mapping[str, str]
     matrices: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
     @property

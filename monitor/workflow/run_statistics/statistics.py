@@ -23,6 +23,7 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.units import Unit
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.figure_files import make_folder
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve_for
@@ -219,6 +220,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
         model=identification.model, model_version=identification.model_version, seed=SEED,
         repeated=False,
     )  # fmt: skip
+    answer = replace(answer, copied_readings=copied_readings(db, campaign))
     if request.matrices is not None:
         of_parameters = write_matrices(request.matrices, "parameters", pooled, [unit.name for unit in units])
         of_coordinates = _coordinate_matrices(request.matrices, campaign, runs, groups)

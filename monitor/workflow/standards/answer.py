@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from monitor.documents import Said
+from monitor.documents import OMITTED, Said
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,14 @@ class StandardTest:
 
 @dataclass(frozen=True)
 class StandardsAnswer:
-    """All tests of a campaign; ``left_out`` are setups that no standard here evaluates, ``files`` what was written."""
+    """All tests of a campaign; ``left_out`` are setups that no standard here evaluates, ``files`` what was written.
+
+    ``copied_readings`` says which runs of the campaign equal those of another, and which rows of a run earlier ones.
+    """
 
     campaign: str
     seed: int
     tests: tuple[StandardTest, ...]
     left_out: tuple[str, ...]
     files: tuple[str, ...]
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)

@@ -38,6 +38,7 @@ from monitor.statistics.standards.positioning import USUAL_RUNS, AxisFigures, Po
 from monitor.statistics.standards.rotation import ErrorMotion, error_motion
 from monitor.store import Database
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.standards.answer import StandardFigure, StandardsAnswer, StandardTest, TargetFigures
@@ -90,7 +91,8 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
         files.append(_written(request.csv, tests))
     evaluated_setups = {name for test in tests for name in test.setup.split(", ")}
     left_out = tuple(name for name in wanted if name not in evaluated_setups)
-    return StandardsAnswer(campaign.name, request.seed, tuple(tests), left_out, tuple(files))
+    copied = copied_readings(db, campaign)
+    return StandardsAnswer(campaign.name, request.seed, tuple(tests), left_out, tuple(files), copied)
 
 
 def _evaluated(

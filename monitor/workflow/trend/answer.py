@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import INLINED, OMITTED, WORDED, named
+from monitor.documents import INLINED, OMITTED, WORDED, Said, named
 from monitor.reporting.confounding import Confounding
 from monitor.reporting.lacks import Lack, Undecided
 from monitor.reporting.weekly_notice import WeeklyNotices
@@ -17,7 +17,7 @@ from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.in_common import RestsOn
 from monitor.workflow.history.other_instruments import OtherInstruments
-from monitor.workflow.history.refuted import ModelRefuted
+from monitor.workflow.history.refuted import ContradictedStatement, ModelRefuted
 from monitor.workflow.history.season import Season, SlopeVerdict
 from monitor.workflow.trend.charts_answer import ControlCharts, ParameterCharts
 
@@ -347,7 +347,9 @@ class TrendAnswer:
     ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated;
     ``refers_to`` says in words what the parameters are relative to, those that are errors of the chain.
     ``model_refuted``: campaigns whose readings refute the model that the values come from; None where none does, or
-    where an older version identified them and nothing is known.
+    where an older version identified them and nothing is known. ``statement_contradicted``: the last run, where its
+    residuals are many times what is stated. ``copied_readings`` says which campaigns hold runs of others, of this
+    machine or another: no part of what is stored.
     """
 
     machine: str
@@ -369,3 +371,5 @@ class TrendAnswer:
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
     refers_to: Mapping[str, str] = field(default_factory=dict)
     model_refuted: ModelRefuted | None = field(default=None, metadata=OMITTED)
+    statement_contradicted: ContradictedStatement | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)

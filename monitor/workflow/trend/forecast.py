@@ -33,7 +33,7 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
         return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_TOLERANCE))
     beyond = _beyond_since(drift.whole, limit)
     none = replace(none, beyond_since=beyond)
-    latest = float(drift.whole.values[drift.whole.of_last_day].mean())
+    latest = float(drift.whole.values[drift.of_latest_day].mean())
     if abs(latest) > limit:
         return _out_of_tolerance(none, drift, latest, check, reliability)
     of_drift = drift_forecast(drift, limit, check, reliability)
@@ -89,7 +89,7 @@ def _start(drift: PieceDrift, line: Trend, limit: float) -> ForecastStart:
     """Where the line stands at the last run, and when the latest mean would reach the ``limit`` by its slope."""
     whole, piece = drift.whole, drift.piece
     origin = float(whole.t[-1])
-    last = whole.of_last_day
+    last = drift.of_latest_day
     to_go = limit - float(whole.values[last].mean())
     days = to_go / line.slope if to_go * line.slope > 0.0 and to_go * limit > 0.0 else np.inf
     start = ForecastStart(

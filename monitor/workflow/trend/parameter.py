@@ -68,14 +68,14 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
 _CHANCE = 0.01
 
 
-def latest_mean(steady: Series) -> LatestMean:
-    """The mean of the last day's steady runs, with its standard uncertainty and degrees of freedom.
+def latest_mean(drift: PieceDrift) -> LatestMean:
+    """The mean of the last day's steady runs since the last event, with standard uncertainty and degrees of freedom.
 
     A day of another campaign that overlaps it is part of it, as in the table of all machines. Of several runs u is
     the scatter of runs within days by their number, and what it has of the calibrations that they rest on; of a single
     run it is the stated one, None where there is none.
     """
-    last = steady.of_last_day
+    steady, last = drift.whole, drift.of_latest_day
     count = int(last.sum())
     u, dof = float(steady.u[last][0]), None
     if count > 1:
@@ -117,7 +117,7 @@ def _scatter(steady: Series, last: npt.NDArray[np.bool_]) -> tuple[float, float]
 def calibrations(drift: PieceDrift) -> tuple[RestsOn, ...]:
     """What the runs of the present piece have of calibrated quantities, as far as it counts in the u of a run; of each
     what the latest mean, the line at the last run and the slope are off by for one standard uncertainty."""
-    piece, latest = drift.piece, drift.whole.part(drift.whole.of_last_day)
+    piece, latest = drift.piece, drift.whole.part(drift.of_latest_day)
     of_mean = dict(zip(latest.common_parts, np.abs(latest.common_of_mean), strict=True))
     line, year = drift.line, DAYS_PER_YEAR
     stated = []

@@ -28,6 +28,7 @@ from monitor.store import (
     simulated_campaigns,
     tolerance_types,
 )
+from monitor.workflow.copied_readings import copies_in_history
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
@@ -37,7 +38,12 @@ from monitor.workflow.history.in_common import calibrated_to, stated_differently
 from monitor.workflow.history.limits_of_type import limits_without_parameter
 from monitor.workflow.history.other_instruments import OtherInstruments, between_instruments
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
-from monitor.workflow.history.refuted import ModelRefuted, model_refuted
+from monitor.workflow.history.refuted import (
+    ContradictedStatement,
+    ModelRefuted,
+    model_refuted,
+    statements_contradicted,
+)
 from monitor.workflow.history.runs import same_hours, selected_campaigns
 from monitor.workflow.trend.answer import (
     ParameterTrend,
@@ -80,6 +86,7 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
             db, "trend", to_document(answer), method=WHOLE, machine=request.machine, seed=SEED, repeated=False,
             latest=latest,
         )  # fmt: skip
+    answer = replace(answer, copied_readings=copies_in_history(db, answer.campaigns))
     if request.weekly_looks:
         from monitor.workflow.history.weekly_looks import weekly_notices
 
@@ -165,7 +172,7 @@ def _answer(
     asked = request.parameter
     history = whole if asked is None else whole.own_copy(asked)
     past = {name: parameter for name, parameter in every.items() if asked in (None, name)}
-    refuted = model_refuted(history)
+    refuted, contradicted = model_refuted(history), _contradicted(db, request, history)
     head = TrendAnswer(
         machine=request.machine,
         since=None if request.since is None else request.since.isoformat(),
@@ -181,6 +188,7 @@ def _answer(
             *_of_older_version(db, request),
             *_limits_of_type(db, history, past if request.parameter is None else None),
             *_refuted(refuted),
+            *([] if contradicted is None else [_contradicting(contradicted)]),
             *_calibrations(history),
         ),
         false_alarm=FALSE_ALARM,
@@ -189,6 +197,7 @@ def _answer(
         parameters={},
         refers_to={name: refers_to[name] for name in past if name in refers_to},
         model_refuted=refuted,
+        statement_contradicted=contradicted,
     )
     if not past:
         return head
@@ -249,6 +258,22 @@ def _refuted(refuted: ModelRefuted | None) -> tuple[str, ...]:
     latest = refuted.campaigns[-1]
     names = tuple(campaign.campaign for campaign in refuted.campaigns)
     return (messages.model_refuted(names, refuted.judged, latest.model, latest.p_value),)
+
+
+def _contradicted(
+    db: Database, request: TrendRequest, history: MachineHistory
+) -> ContradictedStatement | None:
+    """The last run, where it contradicts what is stated of its readings and is among those that are shown."""
+    contradicted = statements_contradicted(db, request.model, request.machine).get(request.machine)
+    if contradicted is None:
+        return None
+    is_shown = (history.campaign == contradicted.campaign) & (history.run == contradicted.run)
+    return contradicted if is_shown.any() else None
+
+
+def _contradicting(contradicted: ContradictedStatement) -> str:
+    """That the last run contradicts what is stated, and what looks for the reason."""
+    return messages.statement_contradicted(contradicted.campaign, contradicted.run, contradicted.times)
 
 
 def _calibrations(history: MachineHistory) -> Iterator[str]:
@@ -327,7 +352,7 @@ class _Page:
         return ParameterTrend(
             unit=series.unit,
             drift=drift_statement(drift),
-            mean=latest_mean(drift.whole),
+            mean=latest_mean(drift),
             changes=tuple(
                 replace(
                     dated_change(

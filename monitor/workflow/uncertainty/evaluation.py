@@ -48,6 +48,7 @@ from monitor.workflow.models import resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.beside import Linearised, beside_readings
+from monitor.workflow.uncertainty.file_grounds import late_grounds, nominal_grounds
 from monitor.workflow.uncertainty.grounds import grounds_of
 from monitor.workflow.uncertainty.inputs import (
     calibrated_inputs,
@@ -355,7 +356,9 @@ def _grounds(
     if request.before is not None:
         return None
     try:
-        grounds = grounds_of(result.campaign, robust_fit(result.fit.problem), result.run)
+        robust = robust_fit(result.fit.problem)
+        grounds = grounds_of(result.campaign, robust, result.run)
     except DataError:
         return None
-    return (*grounds, *lack_in_budget(answer))
+    of_file = (*nominal_grounds(result.campaign), *late_grounds(result.campaign, result.model, robust.fit))
+    return (*of_file, *grounds, *lack_in_budget(answer))

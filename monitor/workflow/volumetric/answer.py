@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import OMITTED, named
+from monitor.documents import OMITTED, Said, named
 from monitor.records import Array
 from monitor.reporting.between_points import BetweenPoints, StepPlace
 from monitor.reporting.svg.map_slices import Slice
@@ -75,7 +75,8 @@ class VolumetricAnswer:
     """The volumetric error of one run. ``k`` is the coverage factor of one length for the probability ``p``.
 
     ``refers_to`` says in words what each parameter, in the map or left out of it, is stated relative to, and
-    ``vectors_refer_to`` what the vectors are: not of the same frame.
+    ``vectors_refer_to`` what the vectors are: not of the same frame. ``copied_readings`` says which runs of the
+    campaign equal those of another, and which rows of a run earlier ones: no part of what is stored.
     """
 
     campaign: str
@@ -101,6 +102,7 @@ class VolumetricAnswer:
     step_places: tuple[StepPlace, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     tables: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    copied_readings: tuple[Said, ...] | None = field(default=None, metadata=OMITTED)
 
     @property
     def has_rotary_axes(self) -> bool:

@@ -13,6 +13,7 @@ from monitor.records import Array
 from monitor.reporting.svg.map_slices import Slice, slices_of
 from monitor.store import Database
 from monitor.uncertainty.volumetric import VolumetricError
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose, drawn_axes, ranges_of
@@ -83,13 +84,13 @@ def over_stroke(db: Database, request: OverStrokeRequest) -> OverStrokeAnswer:
     chain = chain_of(campaign.machine)
     drawn_axes(chain, ranges_of(campaign, chain)[0])
     mapped = map_run(db, request.of_run(request.run))
-    stated = map_answer(mapped)
+    stated = replace(map_answer(mapped), copied_readings=copied_readings(db, campaign))
     if request.minus is not None:
         if mapped.evaluated.run == request.minus:
             raise InputError(f"run {request.minus} less itself is zero everywhere; name two different runs")
         other = map_run(db, request.of_run(request.minus))
         mapped = _difference(mapped, other)
-        stated = _by_parameter(map_answer(mapped))
+        stated = replace(_by_parameter(map_answer(mapped)), copied_readings=stated.copied_readings)
     if request.pose >= len(mapped.poses):
         raise InputError(f"pose {request.pose}: the plan has the poses 0 to {len(mapped.poses) - 1}")
     drawn = at_pose(mapped, request.pose)

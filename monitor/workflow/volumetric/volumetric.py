@@ -8,6 +8,7 @@ from datetime import datetime
 from monitor.documents import to_document
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.copied_readings import copied_readings
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.uncertainty.evaluation import evaluate_campaign
 from monitor.workflow.uncertainty.stating import statement
@@ -34,6 +35,7 @@ def volumetric_map(db: Database, request: VolumetricRequest) -> VolumetricAnswer
     mapped = map_run(db, request)
     answer = map_answer(mapped)
     save_map(db, answer, mapped.evaluated.model, request.before)
+    answer = replace(answer, copied_readings=copied_readings(db, mapped.evaluated.campaign))
     if request.figures is not None:
         # The drawing library takes longer to load than most commands to run.
         from monitor.workflow.volumetric.figures import map_figures

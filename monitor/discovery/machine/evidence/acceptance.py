@@ -32,7 +32,7 @@ from monitor.discovery.search.evidence import (
     STANDS_OUT,
     Evidence,
     Pool,
-    best_of_families,
+    best_of_families_in,
     pool_of,
     weigh_beside,
     weigh_in,
@@ -201,7 +201,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         pool = pool_of(self.scene)
         families = {candidate.family for candidate in selected}
         within: list[list[str]] = [[] for _ in selected]
-        for evidence in best_of_families(weigh_beside(self.scene, pool, selected)):
+        for evidence in best_of_families_in(self.scene.remainders.beside(selected), pool):
             candidate = evidence.candidate
             if evidence.p_value * self._families > self.rate or candidate.family in families:
                 continue

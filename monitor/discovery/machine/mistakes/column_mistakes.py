@@ -78,7 +78,12 @@ def reading_mistakes(campaign: Campaign) -> Iterator[Trial]:
     measured = measured_columns(campaign)
     yield from _exchanged_channels(measured, campaign.probings.channels)
     for name in measured:
-        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
+        yield sign_turned(name), _of_channels(_scaled((name,), -1.0))
+
+
+def sign_turned(name: str) -> str:
+    """The words of a column with another sign."""
+    return f"the sign of {name} were the other way round"
 
 
 def all_signs(measured: Sequence[str]) -> Iterator[Trial]:

@@ -45,7 +45,7 @@ MOST_ALIKE, ALIKE = 6, 10.0
 
 
 @dataclass(frozen=True)
-class _Shift:
+class LateRows:
     """The columns of ``axes`` stand ``late`` rows too late from ``row`` of the file on up to the row before ``end``."""
 
     axes: tuple[str, ...]
@@ -70,13 +70,16 @@ class _Shift:
         has_position = (source == rows) | ((source >= self.row) & (source < self.end))
         return np.clip(source, 0, count - 1), has_position
 
+    def columns(self, campaign: Campaign) -> tuple[str, ...]:
+        """The names of the columns in the file."""
+        return tuple(
+            f"{axis.lower()}_{'mm' if campaign.machine.is_linear(axis) else 'deg'}" for axis in self.axes
+        )
+
     def in_words(self, campaign: Campaign) -> str:
         """What is wrong, with the first row of which it is."""
         probings = campaign.probings
-        columns = [
-            f"{axis.lower()}_{'mm' if campaign.machine.is_linear(axis) else 'deg'}" for axis in self.axes
-        ]
-        named = f"{', '.join(columns)} {'stood' if len(columns) == 1 else 'all stood'}"
+        named = f"{', '.join(self.columns(campaign))} {'stood' if len(self.axes) == 1 else 'all stood'}"
         last = "" if self.end == len(probings) else f" to sequence {probings.sequence[self.end - 1]}"
         begin = f"from about sequence {probings.sequence[self.row]} of run {probings.run[self.row]} on{last}"
         rows = f"{abs(self.late)} row{'s' * (abs(self.late) > 1)} too {'late' if self.late > 0 else 'early'}"
@@ -86,9 +89,15 @@ class _Shift:
 def find_late_rows(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Mistake, ...]:
     """The mistake that columns of axes are shifted against the readings; ``first`` is the fit of the campaign as
     recorded. Empty where that leaves noise, or no shift explains nearly all of what is left."""
+    best = late_rows(campaign, problem_of, first)
+    return () if best is None else (Mistake(best[1].in_words(campaign), first.rms, best[0].rms),)
+
+
+def late_rows(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[Fit, LateRows] | None:
+    """The shift of columns behind that mistake, and the fit with it undone; None where there is none."""
     if first.rms < NOISE_TIMES * first.sigma:
-        return ()
-    best: tuple[Fit, _Shift] | None = None
+        return None
+    best: tuple[Fit, LateRows] | None = None
     for shift in _worth_trying(campaign, first):
         settled = _settled(campaign, first, shift)
         fit = None if settled is None else fitted(settled.undone(campaign), problem_of)
@@ -96,10 +105,7 @@ def find_late_rows(campaign: Campaign, problem_of: Maker, first: Fit) -> tuple[M
             continue
         if best is None or fit.sum_of_squares < best[0].sum_of_squares:
             best = fit, settled
-    if best is None:
-        return ()
-    fit, shift = best
-    return (Mistake(shift.in_words(campaign), first.rms, fit.rms),)
+    return best
 
 
 def _explains(first: Fit, fit: Fit) -> bool:
@@ -108,19 +114,19 @@ def _explains(first: Fit, fit: Fit) -> bool:
     return excess < MOST_LEFT * (first.sum_of_squares - max(first.degrees_of_freedom, 1))
 
 
-def _worth_trying(campaign: Campaign, first: Fit) -> list[_Shift]:
+def _worth_trying(campaign: Campaign, first: Fit) -> list[LateRows]:
     """The shifts that are foreseen to leave little, that which leaves least first."""
     problem = first.problem.with_products()
     residual = first.solution.last.residual
     before = float(np.sum(residual**2))
-    foreseen: list[tuple[float, _Shift]] = []
+    foreseen: list[tuple[float, LateRows]] = []
     for axes, positions in _moving(campaign, problem):
         for late in SHIFTS:
             moved, has_position = _moved(problem, first, positions, late)
             shift_found = _best_row(first, moved, has_position)
             if shift_found is not None and shift_found[0] < WORTH_TRYING * before:
                 remains, row, end = shift_found
-                foreseen.append((remains, _Shift(axes, late, row, end)))
+                foreseen.append((remains, LateRows(axes, late, row, end)))
     foreseen.sort(key=lambda pair: pair[0])
     return [shift for _, shift in foreseen[:MOST_TRIED]]
 
@@ -193,7 +199,7 @@ def _best_row(first: Fit, moved: Array, has_position: npt.NDArray[np.bool_]) -> 
     return least
 
 
-def _settled(campaign: Campaign, first: Fit, shift: _Shift) -> _Shift | None:
+def _settled(campaign: Campaign, first: Fit, shift: LateRows) -> LateRows | None:
     """The shift from the row on that it explains best, by fits with it undone; None where these do not converge."""
     problem = first.problem.with_products()
     names = [joint.name for joint in problem.context.chain.joints]
@@ -219,7 +225,7 @@ def _settled(campaign: Campaign, first: Fit, shift: _Shift) -> _Shift | None:
     return shift
 
 
-def _at_rows_of(problem: ChainProblem, joints: Sequence[int], shift: _Shift) -> ChainProblem:
+def _at_rows_of(problem: ChainProblem, joints: Sequence[int], shift: LateRows) -> ChainProblem:
     """The problem with a shift of some joints undone; rows whose positions the file does not have get no weight."""
     context = problem.context
     source, has_position = shift.source(len(context))
@@ -237,6 +243,12 @@ def _squares(problem: ChainProblem, local: Array, common: Array) -> Array:
 def find_late_rows_without_fit(campaign: Campaign, problem_of: Maker) -> tuple[Mistake, ...]:
     """The same of readings that as recorded fit no machine, or leave millimetres: the last rows of a run are fitted by
     themselves with each shift undone, and then as many before them as that holds for."""
+    best = late_rows_without_fit(campaign, problem_of)
+    return () if best is None else (Mistake(best[1].in_words(campaign), float("inf"), best[0].rms),)
+
+
+def late_rows_without_fit(campaign: Campaign, problem_of: Maker) -> tuple[Fit, LateRows] | None:
+    """The shift of columns behind that mistake, and the fit with it undone; None where there is none."""
     end = len(campaign.probings)
     for last in _last_rows(campaign, problem_of):
         for shift in _late_at_end(_rows(campaign, last), problem_of):
@@ -245,8 +257,8 @@ def find_late_rows_without_fit(campaign: Campaign, problem_of: Maker) -> tuple[M
             for tried in (replace(shift_found, end=end), shift_found):
                 fit = fitted(tried.undone(campaign), problem_of)
                 if fit is not None and _is_sound(fit):
-                    return (Mistake(tried.in_words(campaign), float("inf"), fit.rms),)
-    return ()
+                    return fit, tried
+    return None
 
 
 def _last_rows(campaign: Campaign, problem_of: Maker) -> Iterator[npt.NDArray[np.int64]]:
@@ -267,13 +279,13 @@ def _last_rows(campaign: Campaign, problem_of: Maker) -> Iterator[npt.NDArray[np
             return
 
 
-def _late_at_end(tail: Campaign, problem_of: Maker) -> Iterator[_Shift]:
+def _late_at_end(tail: Campaign, problem_of: Maker) -> Iterator[LateRows]:
     """The shifts that each let some last rows fit, of those that are foreseen to leave about the least."""
     names = [axis for axis, values in tail.probings.readings.items() if np.ptp(values) > 0.0]
-    trials: list[tuple[float, _Shift]] = []
+    trials: list[tuple[float, LateRows]] = []
     for axes in [*((axis,) for axis in names), *([tuple(names)] if len(names) > 1 else [])]:
         for late in SHIFTS:
-            shift = _Shift(axes, late, 0, len(tail.probings))
+            shift = LateRows(axes, late, 0, len(tail.probings))
             problem = problem_with(shift.undone(tail), problem_of)
             if problem is not None:
                 trials.append((sum_after_one_step(problem) / len(problem.context), shift))
@@ -286,7 +298,7 @@ def _late_at_end(tail: Campaign, problem_of: Maker) -> Iterator[_Shift]:
             yield shift
 
 
-def _first_row_of(campaign: Campaign, problem_of: Maker, shift: _Shift) -> _Shift:
+def _first_row_of(campaign: Campaign, problem_of: Maker, shift: LateRows) -> LateRows:
     """The shift from the first row on from which all rows behind it fit with it undone."""
     good, bad = shift.row, -1
     while good - bad > 1:

@@ -29,10 +29,12 @@ from monitor.discovery.machine.mistakes.column_mistakes import (
     exchanged_axes,
     measured_columns,
     reading_mistakes,
+    sign_turned,
     turned_axes,
     unit_mistakes,
 )
 from monitor.discovery.machine.mistakes.cures import (
+    NOISE_TIMES,
     Maker,
     Mistake,
     cured_rms,
@@ -43,6 +45,7 @@ from monitor.discovery.machine.mistakes.cures import (
     without_gross,
 )
 from monitor.discovery.machine.mistakes.fewer_rows import MOST_RUNS, fewer_rows
+from monitor.discovery.machine.mistakes.plays import beside_shown_plays
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
@@ -64,6 +67,11 @@ AS_WELL = 13.8
 FORESEEN = 0.5
 #: A setup with less than this part of all rows is fitted alone in less time than one step of all takes.
 SMALL = 1 / 15
+#: The sign of all that was read is the likeliest of mistakes: half of ``BY_CHANCE`` is its own, where what is turned so
+#: agrees with the others altogether.
+OF_SIGN = 2
+#: Beside plays all rows are looked at, which of more than this takes too long.
+MOST_ROWS_OF_PLAYS = 2000
 #: What one step foresees of exchanged axes, whose centres lie elsewhere, may be so many times worse than what is left.
 OF_AXES = 100.0
 #: So many of those that contradict are tried where none is a suspect alone, and of those that contradict themselves.
@@ -116,8 +124,29 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
     if not isinstance(ability, Instruments):
         return ()
     campaign = without_gross(campaign, first)
+    mistakes = _mistakes(campaign, problem_of, first)
+    if mistakes or first.rms < NOISE_TIMES * first.sigma or len(campaign.probings) > MOST_ROWS_OF_PLAYS:
+        return mistakes
+    # What plays and lags leave hides whether who is doubted agrees; and who reads them otherwise contradicts by them.
+    beside = beside_shown_plays(campaign, problem_of)
+    fit = None if beside is None else fitted(campaign, beside)
+    if beside is None or fit is None:
+        return ()
+    plays = fit.problem.added[len(first.problem.added) :]
+    in_model = f" (with {' and '.join(effect.text for effect in plays)} in the model)"
+    mistakes = _mistakes(campaign, beside, fit, beside_plays=True)
+    return tuple(replace(mistake, what=mistake.what + in_model) for mistake in mistakes)
+
+
+def _mistakes(
+    campaign: Campaign, problem_of: Maker, first: Fit, *, beside_plays: bool = False
+) -> tuple[Mistake, ...]:
+    """The mistakes of a campaign without gross readings, of which of very many rows some are tried; beside plays all
+    rows, since between some of them the moves would be others, and signs alone."""
+    ability = campaign_method(campaign).instruments
+    assert isinstance(ability, Instruments)
     tried, of_tried = campaign, first
-    if len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
+    if not beside_plays and len(rows := fewer_rows(campaign.probings)) < len(campaign.probings):
         tried = replace(campaign, probings=campaign.probings.rows(rows))
         refitted = fitted(tried, problem_of)
         if refitted is None:
@@ -129,7 +158,11 @@ def find_setup_mistakes(campaign: Campaign, problem_of: Maker, first: Fit) -> tu
             ability.scatters(of_tried.problem, of_tried.solution, int(run)),
         )
         if doubted:
-            cures = [cure for each in doubted for cure in _cures(tried, problem_of, of_tried, int(run), each)]
+            cures = [
+                cure
+                for each in doubted
+                for cure in _cures(tried, problem_of, of_tried, int(run), each, only_sign=beside_plays)
+            ]
             least = min((cure.fit.sum_of_squares for cure in cures), default=0.0)
             alike = [cure for cure in cures if cure.fit.sum_of_squares <= least + AS_WELL]
             mistakes = []
@@ -195,14 +228,20 @@ def _doubted(every: Sequence[Contrast], scatters: Sequence[SetupScatter]) -> tup
     return [*doubted, *too_still, *scattering[:MOST_TRIED]], untried
 
 
-def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted) -> list[_Cure]:
+def _cures(
+    campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted: _Doubted, *, only_sign: bool
+) -> list[_Cure]:
     """The mistakes of who is doubted that undone let it agree; signs and columns of axes where none of its readings is
-    one."""
+    one; or the sign of all that it reads alone."""
     rows = _rows_of(campaign, doubted.setups)
     is_small = doubted.excess > 0.0 and np.count_nonzero(rows) < SMALL * len(rows)
-    of_readings, of_axes = _trials(_part(campaign, rows), doubted)
-    count = len(of_readings) + len(of_axes)
-    if _by_chance(doubted, 0.0, count, is_quiet=doubted.is_quiet) >= BY_CHANCE:
+    part = _part(campaign, rows)
+    of_sign = _of_sign(part)
+    of_readings, of_axes = _trials(part, doubted)
+    if only_sign:
+        of_readings, of_axes = [trial for trial in of_readings if trial[0] == of_sign], []
+    count = max(len(of_readings) + len(of_axes), OF_SIGN)
+    if _by_chance(doubted, 0.0, min(count, OF_SIGN), is_quiet=doubted.is_quiet) >= BY_CHANCE:
         # It contradicts by so little that even who agrees in full, with a mistake undone, may do so by chance.
         return []
     total = first.sum_of_squares
@@ -215,7 +254,9 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
                 continue
             problem = _worth_fitting(undone_in(campaign), problem_of, np.inf if doubted.is_still else limit)
             fit = None if problem is None else fitted_problem(problem)
-            if fit is not None and _is_cured(campaign, first, fit, run, doubted, count):
+            if fit is not None and _is_cured(
+                campaign, first, fit, run, doubted, count, is_sign=what == of_sign
+            ):
                 what = f"{what.split(' (`')[0]} {doubted.in_words}"
                 explains = doubted.is_still or _explains(
                     max(fit.degrees_of_freedom, 1), first.sum_of_squares, fit.sum_of_squares
@@ -224,6 +265,12 @@ def _cures(campaign: Campaign, problem_of: Maker, first: Fit, run: int, doubted:
         if cures:
             return cures
     return []
+
+
+def _of_sign(part: Campaign) -> str:
+    """The words of the sign of all that was measured in some rows."""
+    measured = measured_columns(part)
+    return next((what for what, _ in all_signs(measured)), sign_turned(", ".join(measured)))
 
 
 def _trials(part: Campaign, doubted: _Doubted) -> tuple[list[Trial], list[Trial]]:
@@ -256,8 +303,11 @@ def _worth_fitting(undone: Campaign, problem_of: Maker, limit: float) -> ChainPr
     return problem if problem is not None and sum_after_one_step(problem) <= limit else None
 
 
-def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int) -> bool:
-    """Whether who is doubted agrees in a ``fit`` with one of ``count`` mistakes undone."""
+def _is_cured(
+    campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doubted, count: int, *, is_sign: bool
+) -> bool:
+    """Whether who is doubted agrees in a ``fit`` with one of ``count`` mistakes undone, the sign of all that it reads
+    where it ``is_sign``."""
     if fit.sum_of_squares >= first.sum_of_squares and not doubted.is_still:
         return False
     ability = campaign_method(campaign).instruments
@@ -268,7 +318,10 @@ def _is_cured(campaign: Campaign, first: Fit, fit: Fit, run: int, doubted: _Doub
         return is_in_order and (contrast is None or contrast.p > DOUBTFUL)
     if contrast is None or contrast.directions < doubted.directions:
         return False
-    return _by_chance(doubted, contrast.size, count, is_quiet=doubted.is_quiet and is_in_order) < BY_CHANCE
+    is_quiet = doubted.is_quiet and is_in_order
+    if is_sign and contrast.p > DOUBTFUL:
+        count = min(count, OF_SIGN)
+    return _by_chance(doubted, contrast.size, count, is_quiet=is_quiet) < BY_CHANCE
 
 
 def _by_chance(doubted: _Doubted, size: float, count: int, *, is_quiet: bool) -> float:

@@ -37,6 +37,8 @@ LIKELIER = 4.6
 PIECE = 4_000_000
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
+# Where each unknown beside those before it has more left than this, all of them are determined.
+WELL_DETERMINED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -164,23 +166,43 @@ GRID = (Correlation(0.0, 0.0), *(Correlation(rho, share) for share in SHARES for
 
 @dataclass(frozen=True)
 class _White:
-    """What the filter of a correlation makes of a plan: the decomposition ``values`` (R, p), ``vectors`` (R, p, p) of
-    the filtered span of what is unknown, and the part of the criterion that no residual changes."""
+    """What the filter of a correlation makes of a plan: ``turned`` (R, p, p) makes an orthonormal basis of the filtered
+    span of what is unknown, of a ``rank`` in all runs; ``logarithm`` is the part of the criterion that no residual
+    changes."""
 
-    values: Array
-    vectors: Array
+    turned: Array
+    rank: int
     logarithm: float
-
-    @property
-    def able(self) -> npt.NDArray[np.bool_]:
-        """Which directions (R, p) of the span the filter leaves to be estimated."""
-        return np.asarray(self.values > SMALLEST_EIGENVALUE)
 
     def fitted(self, onto: Array) -> float:
         """The sum of squares that the span takes of filtered readings, of which ``onto`` (R, p) are the products with
         it."""
-        along = (np.swapaxes(self.vectors, 1, 2) @ onto[..., None])[..., 0]
-        return float(np.sum(along[self.able] ** 2 / self.values[self.able]))
+        return float(np.sum((self.turned @ onto[..., None]) ** 2))
+
+
+def _orthonormal(products: Array) -> tuple[Array, Array, Array]:
+    """What makes orthonormal bases (C, R, p, p) of spans with these products, without the directions of which nothing
+    is left; their ranks (C,) and the logarithms (C,) of the determinants, of all runs."""
+    nothing = np.diagonal(products, axis1=-2, axis2=-1) <= SMALLEST_EIGENVALUE
+    try:
+        # Unknowns that a run lacks are columns of zeros, which say nothing of the others.
+        lower = np.linalg.cholesky(products + nothing[..., None] * np.eye(products.shape[-1]))
+    except np.linalg.LinAlgError:
+        return _orthonormal_of_able(products)
+    lengths = np.diagonal(lower, axis1=-2, axis2=-1)
+    if lengths.min(initial=1.0) ** 2 < WELL_DETERMINED:
+        return _orthonormal_of_able(products)
+    logarithms = 2.0 * np.sum(np.log(lengths), axis=(1, 2))
+    return np.linalg.inv(lower), np.count_nonzero(~nothing, axis=(1, 2)), logarithms
+
+
+def _orthonormal_of_able(products: Array) -> tuple[Array, Array, Array]:
+    """The same where the filter may leave nothing of some combinations."""
+    values, vectors = np.linalg.eigh(products)
+    able = values > SMALLEST_EIGENVALUE
+    lengths = np.sqrt(np.where(able, values, 1.0))
+    turned = np.swapaxes(vectors, -1, -2) * np.where(able, 1.0 / lengths, 0.0)[..., None]
+    return turned, np.count_nonzero(able, axis=(1, 2)), 2.0 * np.sum(np.log(lengths), axis=(1, 2))
 
 
 @dataclass(frozen=True)
@@ -353,7 +375,7 @@ class NoiseDesign:
         """The degrees of freedom under a correlation: of readings, and of what setups state."""
         rest = self._own[1]
         numbers = self._numbers + rest.shape[0] * rest.shape[1]
-        return float(self._share * (numbers - np.count_nonzero(white.able)))
+        return float(self._share * (numbers - white.rank))
 
     @cached_property
     def _known(self) -> dict[Correlation, _White]:
@@ -368,13 +390,10 @@ class NoiseDesign:
         at_once = max(1, PIECE // max(self._own[0].size, 1))
         for first in range(0, len(new), at_once):
             some = slice(first, first + at_once)
-            decomposed = zip(*np.linalg.eigh(self._products(filters, some)), strict=True)
-            for correlation, logarithm, (values, vectors) in zip(
-                new[some], logarithms[some].tolist(), decomposed, strict=True
-            ):
-                able = values > SMALLEST_EIGENVALUE
-                whole = logarithm + float(np.sum(np.log(values[able])))
-                self._known[correlation] = _White(values, vectors, whole)
+            turned, ranks, determinants = _orthonormal(self._products(filters, some))
+            wholes = (logarithms[some] + determinants).tolist()
+            whites = map(_White, turned, ranks.tolist(), wholes)
+            self._known.update(zip(new[some], whites, strict=True))
         return [self._known[correlation] for correlation in correlations]
 
     def _filters(self, correlations: Sequence[Correlation]) -> Filters:

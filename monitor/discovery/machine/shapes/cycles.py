@@ -7,15 +7,16 @@ where its error has no shape of the catalogue: rollers that recirculate, bolts o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.edges import edges_of
 from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import PRICE, priced
 from monitor.discovery.machine.shapes.long_waves import is_at_longest, long_wave
 from monitor.discovery.machine.shapes.refine import refine
-from monitor.discovery.machine.shapes.scale_steps import StepsOfError
-from monitor.discovery.machine.shapes.teeth import TeethOfError
 from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
     SHORTEST_PITCH_MM,
@@ -25,6 +26,7 @@ from monitor.discovery.machine.shapes.variants import (
 )
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes.free import Free
 from monitor.effects.shapes.nodes import Nodes
@@ -41,9 +43,11 @@ def cycle_instead(
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Free | Nodes):
         return []
     cycle = best_cycle(scene, free, others)
-    teeth = TeethOfError(scene, effect).beside(others) if cycle else []
-    steps = [] if effect.joint.turns else StepsOfError(scene, effect).beside(others)
-    best = max((some for some in (cycle, teeth, steps) if some), key=score, default=[])
+    edges = edges_of(scene, free)
+    worth = priced(scene, others) + score([free]) + 2.0 * PRICE - UNDECIDED
+    able = edges if cycle else replace(edges, teeth=None)
+    edged = able.beside(others, [], worth, with_steps=True)
+    best = max((some for some in (cycle, *edged) if some), key=score, default=[])
     return best if best and score(best) >= score([free]) else []
 
 

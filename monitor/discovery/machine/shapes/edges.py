@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.machine.shapes.free_parts import most_together, priced
 from monitor.discovery.machine.shapes.scale_steps import StepsOfError, steps_of
@@ -66,13 +68,15 @@ class Edges:
         may_stay: Sequence[ChainCandidate],
         worth: float,
     ) -> bool:
-        """Whether many steps at once, powers and plays at the price of one step may be worth it."""
+        """Whether many steps at once, powers and plays, each at the price of a coefficient, may be worth it."""
         rough = steps.rough(leading)
         if rough is None:
             return False
-        alone, most = (most_together(self.scene, rough, leading, some) for some in ([], may_stay))
-        leeway = LEEWAY_OF_STEPS + PART_OF_STEPS * (alone - priced(self.scene, leading))
-        return most - steps.price(1, leading) + leeway > worth
+        freedom = self.scene.remainders.beside(leading).degrees_of_freedom
+        price = (rough.columns.shape[1] - 1) * float(np.log(freedom)) + steps.price(1, leading)
+        alone, most = (most_together(self.scene, rough, leading, some) - price for some in ([], may_stay))
+        leeway = LEEWAY_OF_STEPS + PART_OF_STEPS * max(alone - priced(self.scene, leading), 0.0)
+        return bool(most + leeway > worth)
 
 
 def edges_of(scene: ChainScene, shape: ChainCandidate) -> Edges:

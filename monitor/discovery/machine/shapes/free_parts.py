@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from monitor.discovery.machine.shapes.bends import score_beside
 from monitor.discovery.machine.shapes.curves import follows
 from monitor.discovery.machine.shapes.waves import worth_keeping
 from monitor.discovery.search.candidate import Variant
-from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.evidence import weigh_beside, weigh_in
 from monitor.discovery.search.products import Products
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, parse_effect
@@ -154,17 +155,29 @@ def _is_of_moves(candidate: ChainCandidate) -> bool:
 
 def most_together(
     scene: ChainScene,
-    free: ChainCandidate,
+    new: ChainCandidate,
     leading: Sequence[ChainCandidate],
     may_stay: Sequence[ChainCandidate],
 ) -> float:
-    """A bound that the score of leading effects, a free shape and whichever of others stay is not above, whatever these
-    cost: what all of them leave together is the least that some of them leave."""
-    before, beside = (scene.remainders.beside(some) for some in (leading, [*leading, *may_stay]))
-    columns = orthonormal(without(beside.basis, free.columns))
-    remaining = float(beside.residual @ beside.residual - np.sum((columns.T @ beside.residual) ** 2))
-    gain = np.log(float(before.residual @ before.residual) / max(remaining, 1e-300))
-    return priced(scene, leading) + before.degrees_of_freedom * float(gain) - price_of_parts(free)
+    """A bound that the score of leading effects, a new one and whichever of others stay is not above: the columns of
+    the new one cost nothing here, and its parts and what stays their price."""
+    before = scene.remainders.beside(leading)
+    columns = without(before.basis, np.concatenate([each.columns for each in (new, *may_stay)], axis=1))
+    total = float(before.residual @ before.residual)
+    products = Products(columns.T @ columns, columns.T @ before.residual, total, total)
+    first = np.cumsum([each.columns.shape[1] for each in (new, *may_stay)])
+    least = np.log(max(before.degrees_of_freedom - int(first[-1]), 1))
+    ranks = {id(each.candidate): each.rank for each in weigh_in(before, may_stay)}
+    prices = [
+        ranks[id(each)] * least + 2.0 * np.log(each.variant.tries * each.variant.odds) + price_of_parts(each)
+        for each in may_stay
+    ]
+    most = -np.inf
+    for stay in product((False, True), repeat=len(may_stay)):
+        numbers = np.flatnonzero(np.repeat((True, *stay), np.diff(first, prepend=0)))
+        gain = before.degrees_of_freedom * np.log(total / max(products.left_by(numbers.tolist()), 1e-300))
+        most = max(most, float(gain - np.dot(prices, stay)))
+    return float(priced(scene, leading) + most - price_of_parts(new))
 
 
 def parts_worth_keeping(

@@ -328,12 +328,7 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
     ordered = by_error_taken_away(
         scene, ScanResult((*findings_without_rivals(scene, selected, 1),))
     ).candidates
-    shapes_by_error: dict[str, list[ChainCandidate]] = {}
-    for shape in filter(_is_of_shape, scene.candidates):
-        shapes_by_error.setdefault(error_of(shape), []).append(shape)
-    errors = {
-        symbol: (shapes, whole_basis(scene, symbol, shapes[0])) for symbol, shapes in shapes_by_error.items()
-    }
+    errors = _likeliest_errors(scene, ordered[:-1])
     best: list[ChainCandidate] = []
     worth = max(priced(scene, selected), priced(scene, bending_sight(scene))) + margin
     wholes = Pool(tuple(whole for _, whole in errors.values()))
@@ -358,6 +353,19 @@ def _in_place(scene: ChainScene, selected: Sequence[ChainCandidate], margin: flo
                 if score > worth and _foretells_if_free(scene, new, leading):
                     best, worth = [*leading, *_named(scene, new, shapes, leading), *staying], score
     return best
+
+
+def _likeliest_errors(
+    scene: ChainScene, beside: Sequence[ChainCandidate]
+) -> dict[str, tuple[list[ChainCandidate], ChainCandidate]]:
+    """The shapes and the whole basis of every error, the one first that is likeliest in any shape beside effects: what
+    comes later has to be worth more."""
+    shapes: dict[str, list[ChainCandidate]] = {}
+    for shape in filter(_is_of_shape, scene.candidates):
+        shapes.setdefault(error_of(shape), []).append(shape)
+    wholes = [whole_basis(scene, symbol, some[0]) for symbol, some in shapes.items()]
+    weighed = [each.candidate for each in weigh_beside(scene, wholes, beside)]
+    return {error_of(whole): (shapes[error_of(whole)], whole) for whole in weighed}
 
 
 def _foretells_if_free(
