@@ -48,6 +48,7 @@ from monitor.workflow.explain.explain_answer import InstrumentAlias
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.explain_answer import MachineMissing
 from monitor.workflow.explain.explain_answer import MovedTarget
+from monitor.workflow.explain.explain_answer import NearestEffect
 from monitor.workflow.explain.explain_answer import Remaining
 from monitor.workflow.explain.explain_answer import ScatteringTarget
 from monitor.workflow.explain.explain_answer import UnlikeRun
@@ -294,6 +295,8 @@ class TypedExplainAnswer(Answer[ExplainAnswer]):
     def rate(self) -> float | None: ...
     @property
     def runs_left_out(self) -> tuple[RunLeftOut, ...] | None: ...
+    @property
+    def nearest(self) -> NearestEffect | None: ...
     @property
     def unit(self) -> str: ...
     @property

@@ -111,8 +111,9 @@ def _remaining(explanation: MachineExplanation) -> None:
             f"machine {um(remaining.resting_rms_um)} µm"
         )
     expected = um(explanation.comparison.expected_rms_um)
+    beyond = ", which is more than noise leaves" if remaining.beyond_noise else ""
     output.say(
-        f"with what the model lacks added to it: RMS {um(remaining.rms_um)} µm, expected {expected} µm{parts}"
+        f"with what the model lacks added to it: RMS {um(remaining.rms_um)} µm, expected {expected} µm{beyond}{parts}"
     )
 
 

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from monitor.reporting.messages import joined_by_and
+from monitor.reporting.nearest_words import ComesNearest, more_is_left, nearest_sentence
 from monitor.units import MICROMETRE
 
 
@@ -101,7 +102,8 @@ class MachineFinding:
     statement may be wrong. ``not_followed`` are errors that the model has in a
     shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
     ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
-    explains the measurements without what was left out, and the tests of all residuals deny it."""
+    explains the measurements without what was left out, and the tests of all residuals deny it. ``nearest`` comes
+    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -120,6 +122,8 @@ class MachineFinding:
     recurring: int = 0
     unchecked: bool = False
     contradicted: bool = False
+    nearest: ComesNearest | None = None
+    more_is_left: bool = False
 
     @property
     def together(self) -> str:
@@ -234,6 +238,8 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"Could not be fitted and {'was' if len(finding.unfitted) == 1 else 'were'} skipped: "
             f"{', '.join(finding.unfitted)}."
         )
+    if finding.more_is_left:
+        sentences.append(more_is_left(len(finding.missing)))
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
@@ -298,15 +304,20 @@ def _with_rivals(missing: MissingEffect) -> str:
     return f"{missing.effect} (or {rivals}, which these data do not rule out)"
 
 
+def _none_named(finding: MachineFinding) -> str:
+    """What is said where no effect is named."""
+    if finding.explained:
+        return f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
+    if finding.nearest is not None:
+        return nearest_sentence(finding.nearest)
+    if finding.not_followed:
+        return "The model does not explain the measurements, but no other error explains more."
+    return "The model does not explain the measurements, but no effect of the catalogue explains more."
+
+
 def _missing_sentences(finding: MachineFinding) -> list[str]:
     if not finding.missing:
-        return [
-            f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
-            if finding.explained
-            else "The model does not explain the measurements, but no effect of the catalogue explains more."
-            if not finding.not_followed
-            else "The model does not explain the measurements, but no other error explains more."
-        ]
+        return [_none_named(finding)]
     first = finding.missing[0]
     doubtful = _more_of_its_shape(first, finding.missing[1:])
     further = [_with_rivals(missing) for missing in finding.missing[1:] if missing.effect not in doubtful]

@@ -20,6 +20,7 @@ from monitor.discovery.machine.joints.curve_findings import with_curves
 from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.mistakes.cures import Mistake
+from monitor.discovery.machine.nearest import Nearest, nearest_effect
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
@@ -68,6 +69,8 @@ class Explanation:
     under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
     ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
     there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
+    ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
+    of ``missing`` in the model.
     """
 
     comparison: ChainComparison
@@ -88,6 +91,13 @@ class Explanation:
     not_followed: tuple[str, ...] = ()
     recurring: tuple[BadPoint, ...] = ()
     unchecked: bool = False
+    nearest: Nearest | None = None
+    beside: Verdict = Verdict.EXPLAINED
+
+    @property
+    def more_is_left(self) -> bool:
+        """Whether more is left with what is missing in the model than noise leaves."""
+        return bool(self.missing) and self.beside is Verdict.SOMETHING_IS_MISSING
 
 
 def variants_of_campaign(
@@ -145,9 +155,9 @@ def explain(
     single, again = _single_and_recurring(latest, alike)
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
-    verdict = Verdict.SOMETHING_IS_MISSING
-    if not (missing or unfollowed or again or unchecked):
-        verdict = compare(latest.under, campaign.name, model).verdict
+    verdict_beside = compare(latest.under, campaign.name, model).verdict
+    is_found = bool(missing or unfollowed or again or unchecked)
+    verdict = Verdict.SOMETHING_IS_MISSING if is_found else verdict_beside
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
         together=as_given.verdict,
@@ -166,7 +176,18 @@ def explain(
         not_followed=unfollowed,
         recurring=again,
         unchecked=unchecked,
+        nearest=_nearest(latest, search, verdict, (*missing, *unfollowed)),
+        beside=verdict_beside,
     )
+
+
+def _nearest(
+    latest: ChainRound, search: ChainSearch, verdict: Verdict, named: Sequence[object]
+) -> Nearest | None:
+    """The effect that comes nearest where something is missing and nothing is ``named``."""
+    if named or verdict is not Verdict.SOMETHING_IS_MISSING:
+        return None
+    return nearest_effect(latest.scene, search.drivers, search.rate)
 
 
 def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:

@@ -255,7 +255,7 @@ def _likelihood_without(
     return weigh_beside(scene, [best], except_for(rest, index))[0].likelihood
 
 
-def _name(candidate: ChainCandidate) -> str:
+def name_of(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
     searched = candidate.family.endswith(
         (":cyclic", ":sawtooth", ":step", ":windup", ":harmonic", ":table", ":free", ":curve")
@@ -286,12 +286,12 @@ def _missing(
         rivals = [
             pair
             for pair in search.rivals(index, least_likelihood(finding.evidence), coefficients)
-            if _name(pair[0]) != _name(candidate)
+            if name_of(pair[0]) != name_of(candidate)
         ]
     travelled_periods = part_of_bend(effect, scene.fit.problem.context)
     return ChainMissing(
         rank=index + 1,
-        effect=_name(candidate),
+        effect=name_of(candidate),
         description=_described(scene, effect, travelled_periods, coefficients, covariance),
         parameters=effect.parameters(scene.fit.problem.context),
         units=(effect.unit,) * len(coefficients),
@@ -310,7 +310,7 @@ def _missing(
         held_out_after=after.runs,
         held_out_days_before=before.days,
         held_out_days_after=after.days,
-        rivals=tuple(Rival(_name(rival), same) for rival, same in rivals),
+        rivals=tuple(Rival(name_of(rival), same) for rival, same in rivals),
         held_out_poses_before=before.poses,
         held_out_poses_after=after.poses,
         separation=separating_poses(

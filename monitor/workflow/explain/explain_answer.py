@@ -289,7 +289,7 @@ class Remaining:
 
     ``deviation_um`` is the root mean square per degree of freedom, to be compared with ``stated_uncertainty_um``;
     ``carried_rms_um`` is the RMS of the targets that the machine moves and ``resting_rms_um`` that of those beside it,
-    both None where all are of one kind.
+    both None where all are of one kind. ``beyond_noise``: that is more than noise leaves.
     """
 
     deviation_um: float
@@ -297,6 +297,31 @@ class Remaining:
     rms_um: float
     carried_rms_um: float | None
     resting_rms_um: float | None
+    beyond_noise: bool | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class SteppedError:
+    """An error that looks as if it stepped within a run, from a reading on, and what that would leave: the likeliest of
+    ``errors`` that these data do not tell apart."""
+
+    errors: tuple[str, ...]
+    run: int
+    sequence: int
+    rms_after_um: float
+
+
+@dataclass(frozen=True)
+class NearestEffect:
+    """The effect that comes nearest where none is named: what it would leave, and the rule that refuses it, by a word
+    (``refusal``) and as the clause of a sentence (``why``). ``stepped`` says more than any effect, but is none."""
+
+    effect: str
+    rms_before_um: float
+    rms_after_um: float
+    refusal: str
+    why: str
+    stepped: SteppedError | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -318,7 +343,8 @@ class MachineExplanation:
     ``work_points_elsewhere``, where work points come out further from where they are stated than people misstate them.
     ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
-    of its own. ``runs_left_out`` are those that were broken off, say.
+    of its own. ``runs_left_out`` are those that were broken off, say. ``nearest`` is the effect that comes nearest
+    where something is missing and none is named, None where none stands out at all.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -347,6 +373,7 @@ class MachineExplanation:
     work_points_elsewhere: Said | None = field(default=None, metadata=OMITTED)
     rate: float | None = field(default=None, metadata=OMITTED)
     runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
+    nearest: NearestEffect | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ from monitor.reporting.machine_finding import (
     fits_too_well,
     machine_sentences,
 )
+from monitor.reporting.nearest_words import WHY_REFUSED
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, MILLIMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
@@ -41,9 +42,11 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
     MovedTarget,
+    NearestEffect,
     Remaining,
     ScatteringTarget,
     StepBetween,
+    SteppedError,
     UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -245,7 +248,23 @@ def _remaining(explanation: Explanation) -> Remaining:
         rms_um=um(final.rms),
         carried_rms_um=rms(~resting) if resting.any() else None,
         resting_rms_um=rms(resting),
+        beyond_noise=explanation.more_is_left or None,
     )
+
+
+def _nearest(explanation: Explanation) -> NearestEffect | None:
+    """The effect that comes nearest where none is named."""
+    nearest, um = explanation.nearest, MICROMETRE.to_display
+    if nearest is None:
+        return None
+    step = nearest.stepped
+    stepped = None
+    if step is not None:
+        stepped = SteppedError(step.errors, step.run, step.sequence, um(step.rms_after))
+    return NearestEffect(
+        nearest.effect, um(nearest.rms_before), um(nearest.rms_after), nearest.refusal.value,
+        WHY_REFUSED[nearest.refusal], stepped,
+    )  # fmt: skip
 
 
 def is_hopeless(explanation: Explanation) -> bool:
@@ -308,6 +327,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         for each in explanation.scatter
     )
     unlike_runs = _unlike_runs(explanation)
+    nearest = _nearest(explanation)
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
     if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -348,6 +368,8 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
+                nearest=nearest,
+                more_is_left=explanation.more_is_left,
             )
         ),
         residual_map=residual_map,
@@ -361,6 +383,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         scattering=scattering,
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
+        nearest=nearest,
     )
 
 

@@ -13,6 +13,7 @@ import scipy
 
 from monitor.discovery.machine.evidence.noise_doubt import NoiseDoubt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows
+from monitor.discovery.machine.evidence.refusal import Refusal
 from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
 from monitor.discovery.machine.evidence.wild_readings import without_wild_readings
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
@@ -127,30 +128,41 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         return self._credible.answer(others, candidate, lambda: self._is_credible(others, candidate))
 
     def _is_credible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        return self._refused_as(others, candidate) is None
+
+    def refusal(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> Refusal | None:
+        """The first rule that refuses an effect beside others; None where ``accepts`` does not refuse it."""
+        refused = self._refused_as(others, candidate)
+        if refused is None and not self.predicts(others, candidate):
+            return Refusal.HELD_OUT
+        return refused
+
+    def _refused_as(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> Refusal | None:
+        """The first rule but for the errors on what was left out that refuses an effect; None where none does."""
         limit = self.rate
         # What takes least time is asked first: most candidates fail one of the rules.
         if self._poses is not None:
             by_poses = p_value_by_poses(candidate, self.scene, others, self._poses)
             if by_poses * self._families > limit:
-                return False
+                return Refusal.POSES
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
-            return False
+            return Refusal.RUNS
         named = [
             *self._larger_errors(others, candidate),
             *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
         ]
         in_any_shape = self._flexible.competitors(named) if self.any_shape else ()
         if not self._survives(others, candidate, in_any_shape):
-            return False
+            return Refusal.OTHER_SHAPES
         if is_drift_of_machine(candidate) and not self._survives(others, candidate, self._wander):
-            return False
+            return Refusal.TRACKER
         if not self._is_plausible(others, candidate):
-            return False
+            return Refusal.SIZE
         if self._doubt is not None:
             tries = candidate.variant.tries * candidate.variant.odds * self._families
             if self._doubt.p_value(others, candidate) * tries > limit:
-                return False
-        return True
+                return Refusal.NOISE
+        return None
 
     def predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect lowers the errors on what was left out; true where what was stated beforehand (the length

@@ -23,7 +23,7 @@ from scipy import special
 from monitor.discovery.machine.evidence.held_out import of_numbers, pose_blocks, poses_of
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainVariant, scene_of
-from monitor.discovery.machine.shapes.gears import ENOUGH_POSITIONS, HIGHEST, in_rows
+from monitor.discovery.machine.shapes.gears import ENOUGH_POSITIONS, HIGHEST
 from monitor.discovery.machine.shapes.tables import occupied
 from monitor.discovery.search.candidate import Variant, side_by_side
 from monitor.discovery.search.plausible import nearly_cancelled
@@ -162,7 +162,7 @@ class Pursuit:
         """What the residual says (P,) of the turn of a joint at every pose."""
         padded = np.zeros(self.fit.solution.last.residual.size)
         padded[self.order] = self.residual
-        rows = in_rows(self.fit, padded)
+        rows = self.fit.problem.by_rows(padded.reshape(*self.fit.solution.last.residual.shape, 1))[..., 0]
         return np.asarray(np.bincount(self.pose, weights=np.sum(joint.way * rows, axis=1)), dtype=float)
 
     def cancels(self, candidate: ChainCandidate, new: Array) -> bool:

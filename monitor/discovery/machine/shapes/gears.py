@@ -27,21 +27,11 @@ LOWEST, HIGHEST, STEP = 4.0, 330.0, 0.5
 ENOUGH_POSITIONS, FEWEST_POSITIONS = 100, 24
 # So many orders of one joint are looked at in detail.
 MOST_PEAKS = 3
+# Numbers of waves that are filtered in one piece (8 MB).
+NUMBERS_AT_ONCE = 500_000
 # Periods that the travel has to show before a line is a gear: one, and three where flexure and refraction bend too
 # (of 1.3 periods over the 65 degrees of an elevation axis nobody can say that they repeat).
 FEWEST_PERIODS, FEWEST_BESIDE_BENDS = 1.0, 3.0
-
-
-def in_rows(fit: Fit, padded: Array) -> Array:
-    """Rows (n, d) of numbers that stand run by run (M,)."""
-    problem = fit.problem
-    count, numbers = problem.sigma.shape
-    targets = problem.padded(np.arange(1.0, count * numbers + 1.0).reshape(count, numbers))
-    runs = padded.reshape(len(problem.runs), -1)[:, : targets.shape[1]]
-    rows = np.zeros(count * numbers)
-    filled = targets > 0
-    rows[targets[filled].astype(np.int64) - 1] = runs[filled]
-    return rows.reshape(count, numbers)
 
 
 def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> list[ChainVariant]:
@@ -60,7 +50,8 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     beside = scene.remainders.beside(selected)
     residual = beside.residual
     variance = float(residual @ residual) / max(beside.degrees_of_freedom, 1)
-    rows = in_rows(fit, residual)
+    # Of correlated noise the residual is filtered, and in directions of its own; a wave is not.
+    rows = fit.by_rows(residual.reshape(len(problem.runs), -1, 1))[..., 0]
     limit = -2.0 * np.log(rate / sum(tried.values()))
     fewest = FEWEST_BESIDE_BENDS if problem.needs_whole_periods else FEWEST_PERIODS
     variants = []
@@ -68,10 +59,9 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
         joint = chain.joints[index]
         way = problem.observe(fit.by_error[:, :, index, MOTION, 3 + joint.main]) / problem.sigma
         turn = np.sum(way * rows, axis=1)
-        weight = np.sum(way * way, axis=1)
         # The two columns are all but orthogonal and of the same length over many positions.
         square = _squares(turn, positions[:, index], count)
-        power = 2.0 * square / max(float(weight.sum()), 1e-300) / variance
+        power = 2.0 * square / _lengths(fit, way, positions[:, index], orders[:count]) / variance
         # Too few periods over the travel are a bend, not a gear.
         power = np.where(
             orders[:count] * float(np.ptp(positions[:, index])) < fewest * 2.0 * np.pi, 0.0, power
@@ -95,6 +85,29 @@ def _highest_order(position: Array) -> float:
     if len(indexations) < FEWEST_POSITIONS:
         return 0.0
     return min(HIGHEST, np.pi / float(np.diff(indexations).max()) - STEP)
+
+
+def _lengths(fit: Fit, way: Array, position: Array, orders: Array) -> Array:
+    """The squared lengths (count,) of the cosine and the sine of every order together, which move the rows by ``way``
+    (n, d) of their standard uncertainty for a unit of the turn: the same for all orders in independent noise."""
+    if fit.whitening is None:
+        return np.full(len(orders), max(float(np.sum(way * way)), 1e-300))
+    moved = fit.problem.padded(way[..., None])[..., 0]
+    padded_position = fit.problem.padded(np.broadcast_to(position[:, None, None], (*way.shape, 1)))[..., 0]
+    lengths = np.empty(len(orders))
+    at_once = max(NUMBERS_AT_ONCE // moved.size, 1)
+    for start in range(0, len(orders), at_once):
+        some = slice(start, start + at_once)
+        # Of calibrated quantities, which stand behind the rows, a turn moves nothing.
+        waves = np.zeros((2, len(orders[some]), *fit.solution.last.residual.shape))
+        angle = orders[some, None, None] * padded_position
+        waves[0, :, :, : moved.shape[1]], waves[1, :, :, : moved.shape[1]] = (
+            moved * np.cos(angle),
+            moved * np.sin(angle),
+        )
+        white = fit.whitening(waves)
+        lengths[some] = np.einsum("pkrn,pkrn->k", white, white)
+    return np.maximum(lengths, 1e-300)
 
 
 def _squares(numbers: Array, position: Array, count: int) -> Array:
