@@ -37,6 +37,7 @@ from monitor.discovery.machine.shapes.variants import (
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.suspects.off_alike import off_alike
+from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_all_places
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
@@ -88,6 +89,7 @@ class Explanation:
     not_followed: tuple[str, ...] = ()
     recurring: tuple[BadPoint, ...] = ()
     unchecked: bool = False
+    off_targets: tuple[TargetOff, ...] = ()
 
 
 def variants_of_campaign(
@@ -133,8 +135,17 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
+    # What belongs to the piece would be asked of the axes.
+    off_targets = off_in_all_places(first) if as_given.verdict is Verdict.SOMETHING_IS_MISSING else ()
+    if off_targets:
+        first, search = _without([each.point for each in off_targets], first, search)
     curves, latest = _search_with_curves(first, search)
-    alike = _off_alike(as_given, latest)
+    # Beside large errors of the machine it stands out only once these are in the model.
+    if later := _off_beside(latest, off_targets):
+        off_targets += later
+        first, search = _without([each.point for each in later], first, search)
+        curves, latest = _search_with_curves(first, search)
+    alike = _off_alike(as_given, latest, off_targets)
     if not latest.under.left_out[[point.row for point in alike]].all():
         first, search = _without(alike, first, search)
         curves, latest = _search_with_curves(first, search)
@@ -142,7 +153,7 @@ def explain(
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
     unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
-    single, again = _single_and_recurring(latest, alike)
+    single, again = _single_and_recurring(latest, alike, off_targets)
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict = Verdict.SOMETHING_IS_MISSING
@@ -166,21 +177,39 @@ def explain(
         not_followed=unfollowed,
         recurring=again,
         unchecked=unchecked,
+        off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
 
 
-def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:
-    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before."""
+def _off_alike(
+    as_given: ChainComparison, latest: ChainRound, off_targets: Sequence[TargetOff]
+) -> tuple[BadPoint, ...]:
+    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before;
+    nothing of targets that are off in all places."""
     doubtful = as_given.verdict is Verdict.SOMETHING_IS_MISSING or latest.suspects.bad
-    return off_alike(latest.under) if doubtful else ()
+    of_targets = {row for each in off_targets for row in each.point.rows}
+    return (
+        tuple(point for point in off_alike(latest.under) if point.row not in of_targets) if doubtful else ()
+    )
+
+
+def _off_beside(latest: ChainRound, known: Sequence[TargetOff]) -> tuple[TargetOff, ...]:
+    """What is off in all places beside the effects of a round, or beside readings that it left out, and is not known
+    yet."""
+    if not (latest.refined or latest.suspects.any):
+        return ()
+    targets = {each.target for each in known}
+    return tuple(each for each in off_in_all_places(latest.under) if each.target not in targets)
 
 
 def _single_and_recurring(
-    latest: ChainRound, alike: Sequence[BadPoint]
+    latest: ChainRound, alike: Sequence[BadPoint], off_targets: Sequence[TargetOff]
 ) -> tuple[list[BadPoint], tuple[BadPoint, ...]]:
     """The suspect points that stand for themselves, and those that most runs share, what is off ``alike`` in all of
-    them included."""
+    them included; none of targets that are off in all places."""
+    of_targets = {row for each in off_targets for row in each.point.rows}
     points = sorted(latest.suspects.bad.values(), key=lambda point: point.row)
+    points = [point for point in points if point.row not in of_targets]
     in_all = {point.row for point in alike}
     recur = recurring(latest.under, points) | in_all
     again = [point for point in points if point.row in recur - in_all]

@@ -24,6 +24,7 @@ from monitor.reporting.machine_finding import (
     MissingEffect,
     MistakeFound,
     Move,
+    OffTarget,
     Scattering,
     fits_too_well,
     machine_sentences,
@@ -44,6 +45,7 @@ from monitor.workflow.explain.explain_answer import (
     Remaining,
     ScatteringTarget,
     StepBetween,
+    TargetOffInPlaces,
     UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -297,6 +299,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     )
     comparison = machine_comparison(explanation.comparison, problem)
     suspect_data, recurring_data = _probings(explanation.suspect), _probings(explanation.recurring)
+    off_targets = _off_targets(explanation)
     changes = _changes(explanation)
     scattering = tuple(
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
@@ -342,6 +345,16 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 not_followed=explanation.not_followed,
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
+                off_targets=tuple(
+                    OffTarget(
+                        problem.target_word,
+                        each.target,
+                        each.size_um,
+                        f"x {each.x_um:+.1f}, y {each.y_um:+.1f}, z {each.z_um:+.1f} µm on the piece",
+                        each.places,
+                    )
+                    for each in off_targets
+                ),
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
             )
         ),
@@ -350,6 +363,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         not_fitted=explanation.unfitted,
         not_followed=explanation.not_followed,
         recurring_data=recurring_data,
+        off_targets=off_targets,
         limits_reached=tuple(explanation.limits),
         remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
@@ -373,6 +387,23 @@ def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
             None if point.turn is None else MICRORADIAN.to_display(point.turn),
         )
         for point in points
+    )
+
+
+def _off_targets(explanation: Explanation) -> tuple[TargetOffInPlaces, ...]:
+    """The targets that are off alike in all places."""
+    um = MICROMETRE.to_display
+    return tuple(
+        TargetOffInPlaces(
+            each.target,
+            *map(um, each.off),
+            um(each.size),
+            each.places,
+            each.runs,
+            len(each.point.rows),
+            each.point.p_value,
+        )
+        for each in explanation.off_targets
     )
 
 

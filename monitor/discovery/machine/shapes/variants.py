@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
+from monitor.discovery.machine.shapes.grids_askew import is_bend_of_another, series_of_setups
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
 from monitor.effects.driver import HeatDriver
@@ -265,10 +266,11 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit. A period longer than half of what was travelled is a bend.
+    anyhow have no such limit. A period longer than half of what was travelled is a bend, and so is what on a grid that
+    stands askew goes round along the other axes alone.
     """
     limits = pitch_limits(context)
-    return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
+    return [variant for variant in variants if _is_resolvable(variant.effect, limits, context)]
 
 
 def without_aliases(
@@ -318,13 +320,17 @@ def apparent_frequency(frequency: float, steps: float) -> float:
     return float(abs(frequency - steps * np.round(frequency / steps)))
 
 
-def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
+def _is_resolvable(
+    effect: MachineEffect, limits: Mapping[str, tuple[float, float]], context: Context
+) -> bool:
     """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Cyclic)
     shortest, travel = limits[effect.joint.name]
     # Names of pitches have six digits.
-    return shortest <= effect.shape.pitch <= (1.0 + 1e-5) * longest_pitch(travel)
+    if not shortest <= effect.shape.pitch <= (1.0 + 1e-5) * longest_pitch(travel):
+        return False
+    return not is_bend_of_another(effect.shape.pitch, effect.term.joint, context)
 
 
 def longest_pitch(travel: float) -> float:
@@ -347,16 +353,7 @@ def pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
 
 def _pitch_limits_of(context: Context, index: int) -> Array:
     positions = context.positions[:, index]
-    return np.array([_shortest_of(positions, _series(context)), np.ptp(positions)])
-
-
-def _series(context: Context) -> list[npt.NDArray[np.int64]]:
-    """The rows of each setup of each run: a plate that is laid anew is the same grid elsewhere."""
-    setup = np.zeros(len(context), dtype=np.int64)
-    if context.instruments is not None:
-        setup = context.instruments.setup
-    _, of = np.unique(np.stack([context.run, setup]), axis=1, return_inverse=True)
-    return [np.flatnonzero(of.reshape(-1) == number) for number in range(of.max(initial=-1) + 1)]
+    return np.array([_shortest_of(positions, series_of_setups(context)), np.ptp(positions)])
 
 
 def _shortest_of(positions: Array, series: Sequence[npt.NDArray[np.int64]]) -> float:
