@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -135,20 +136,7 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
-    # What belongs to the piece would be asked of the axes.
-    off_targets = off_in_all_places(first) if as_given.verdict is Verdict.SOMETHING_IS_MISSING else ()
-    if off_targets:
-        first, search = _without([each.point for each in off_targets], first, search)
-    curves, latest = _search_with_curves(first, search)
-    # Beside large errors of the machine it stands out only once these are in the model.
-    if later := _off_beside(latest, off_targets):
-        off_targets += later
-        first, search = _without([each.point for each in later], first, search)
-        curves, latest = _search_with_curves(first, search)
-    alike = _off_alike(as_given, latest, off_targets)
-    if not latest.under.left_out[[point.row for point in alike]].all():
-        first, search = _without(alike, first, search)
-        curves, latest = _search_with_curves(first, search)
+    first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
@@ -179,6 +167,36 @@ def explain(
         unchecked=unchecked,
         off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
+
+
+class _Searched(NamedTuple):
+    """A search, the fit that it began with, the curves of joints and the round in which it ended, without targets that
+    are off in all places of their piece and readings that are off ``alike`` in all runs."""
+
+    first: Fit
+    search: ChainSearch
+    curves: tuple[ChainVariant, ...]
+    latest: ChainRound
+    off_targets: tuple[TargetOff, ...]
+    alike: tuple[BadPoint, ...]
+
+
+def _searched(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:
+    """Search without the targets that are off in all places, which effects would be asked for: with what stands out
+    before any effect is known, and once more with what does beside them."""
+    off_targets = off_in_all_places(first) if as_given.verdict is Verdict.SOMETHING_IS_MISSING else ()
+    if off_targets:
+        first, search = _without([each.point for each in off_targets], first, search)
+    curves, latest = _search_with_curves(first, search)
+    if later := _off_beside(latest, off_targets):
+        off_targets += later
+        first, search = _without([each.point for each in later], first, search)
+        curves, latest = _search_with_curves(first, search)
+    alike = _off_alike(as_given, latest, off_targets)
+    if not latest.under.left_out[[point.row for point in alike]].all():
+        first, search = _without(alike, first, search)
+        curves, latest = _search_with_curves(first, search)
+    return _Searched(first, search, curves, latest, off_targets, alike)
 
 
 def _off_alike(

@@ -392,19 +392,14 @@ def _probings(points: Sequence[BadPoint]) -> tuple[BadProbing, ...]:
 
 def _off_targets(explanation: Explanation) -> tuple[TargetOffInPlaces, ...]:
     """The targets that are off alike in all places."""
-    um = MICROMETRE.to_display
-    return tuple(
-        TargetOffInPlaces(
-            each.target,
-            *map(um, each.off),
-            um(each.size),
-            each.places,
-            each.runs,
-            len(each.point.rows),
-            each.point.p_value,
+    answers = []
+    for each in explanation.off_targets:
+        x, y, z, size = (MICROMETRE.to_display(value) for value in (*each.off, each.size))
+        readings, p_value = len(each.point.rows), each.point.p_value
+        answers.append(
+            TargetOffInPlaces(each.target, x, y, z, size, each.places, each.runs, readings, p_value)
         )
-        for each in explanation.off_targets
-    )
+    return tuple(answers)
 
 
 def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:

@@ -64,7 +64,7 @@ def _grids_of(context: Context, joint: int) -> Array:
     linear = [index for index, each in enumerate(context.chain.joints) if not each.turns and index != joint]
     return np.array(
         [
-            _grid(context.positions[rows, joint], context.positions[np.ix_(rows, linear)])
+            _grid(context.positions[rows, joint], context.positions[rows][:, linear])
             for rows in series_of_setups(context)
         ]
     )

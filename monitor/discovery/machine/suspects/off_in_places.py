@@ -17,6 +17,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.discovery.machine.suspects.off_alike import LEAST_TIMES, UPPER
 from monitor.discovery.machine.suspects.recurring import PART_ALIKE
+from monitor.methods.instruments.part import Part
 from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.instruments.readings.point import Point
 from monitor.records import Array
@@ -89,8 +90,7 @@ def _on_the_piece(fit: Fit) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64
     nothing = np.zeros(0, dtype=np.int64)
     if not isinstance(problem, InstrumentProblem):
         return nothing, nothing
-    parts = [part for part in problem.parts if isinstance(part.reading, Point)]
-    parts = [part for part in parts if part.reading.holds("targets") and not part.reading.holds("frame")]
+    parts = [part for part in problem.parts if _states_targets(part)]
     if len(parts) < 2:
         return nothing, nothing
     rows = np.concatenate([part.at for part in parts])
@@ -114,6 +114,12 @@ def _mean(fit: Fit, rows: npt.NDArray[np.int64]) -> Array:
     """The mean (3,) mm of what rows are off, 0 along what they do not read."""
     mean = np.nan_to_num(fit.vectors[rows].mean(axis=0))[:3]
     return np.pad(mean, (0, 3 - len(mean)))
+
+
+def _states_targets(part: Part) -> bool:
+    """Whether a setup has points of stated targets in a frame that is not known."""
+    reading = part.reading
+    return isinstance(reading, Point) and reading.holds("targets") and not reading.holds("frame")
 
 
 def _usual(squares: Array, numbers: int) -> float:
