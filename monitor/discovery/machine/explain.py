@@ -211,12 +211,12 @@ def _off_alike(
     )
 
 
-def _off_beside(latest: ChainRound, known: Sequence[TargetOff]) -> tuple[TargetOff, ...]:
-    """What is off in all places beside the effects of a round, or beside readings that it left out, and is not known
+def _off_beside(latest: ChainRound, named: Sequence[TargetOff]) -> tuple[TargetOff, ...]:
+    """What is off in all places beside the effects of a round, or beside readings that it left out, and is not named
     yet."""
     if not (latest.refined or latest.suspects.any):
         return ()
-    targets = {each.target for each in known}
+    targets = {each.target for each in named}
     return tuple(each for each in off_in_all_places(latest.under) if each.target not in targets)
 
 

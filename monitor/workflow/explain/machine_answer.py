@@ -345,16 +345,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 not_followed=explanation.not_followed,
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
-                off_targets=tuple(
-                    OffTarget(
-                        problem.target_word,
-                        each.target,
-                        each.size_um,
-                        f"x {each.x_um:+.1f}, y {each.y_um:+.1f}, z {each.z_um:+.1f} µm on the piece",
-                        each.places,
-                    )
-                    for each in off_targets
-                ),
+                off_targets=_said_off(off_targets, problem.target_word),
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
             )
         ),
@@ -400,6 +391,20 @@ def _off_targets(explanation: Explanation) -> tuple[TargetOffInPlaces, ...]:
             TargetOffInPlaces(each.target, x, y, z, size, each.places, each.runs, readings, p_value)
         )
     return tuple(answers)
+
+
+def _said_off(targets: Sequence[TargetOffInPlaces], word: str) -> tuple[OffTarget, ...]:
+    """The targets that are off alike in all places, as sentences say them."""
+    return tuple(
+        OffTarget(
+            word,
+            each.target,
+            each.size_um,
+            f"x {each.x_um:+.1f}, y {each.y_um:+.1f}, z {each.z_um:+.1f} µm on the piece",
+            each.places,
+        )
+        for each in targets
+    )
 
 
 def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:

@@ -76,12 +76,12 @@ def _grid(positions: Array, others: Array) -> Sequence[float]:
     stop = np.zeros(len(positions), dtype=np.int64)
     stop[order] = np.concatenate([[0], np.cumsum(np.diff(positions[order]) > SAME_STOP_MM)])
     stops = stop.max() + 1
-    own, beside = _within(positions[:, None], stop), _within(others, stop)
-    left = (own - beside @ np.linalg.lstsq(beside, own, rcond=None)[0])[:, 0]
+    deviations, beside = _within(positions[:, None], stop), _within(others, stop)
+    unsaid = (deviations - beside @ np.linalg.lstsq(beside, deviations, rcond=None)[0])[:, 0]
     nowhere = (np.nan, np.nan, np.nan)
-    if max(np.ptp(left[stop == each]) for each in range(stops)) > TOLERANCE_MM:
+    if max(np.ptp(unsaid[stop == each]) for each in range(stops)) > TOLERANCE_MM:
         return nowhere
-    width = max(float(np.ptp(own[stop == each])) for each in range(stops))
+    width = max(float(np.ptp(deviations[stop == each])) for each in range(stops))
     if stops == 1:
         return 1.0, 0.0, width
     means = np.array([positions[stop == each].mean() for each in range(stops)])

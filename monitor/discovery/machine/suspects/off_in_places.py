@@ -67,21 +67,21 @@ def off_in_all_places(fit: Fit, *, alpha: float = 0.01) -> tuple[TargetOff, ...]
     read = np.isfinite(problem.sigma[rows]).any(axis=0)
     means = np.array([off[number == each].mean(axis=0) for each in range(len(names))])
     squares = np.sum(means[:, read] ** 2, axis=1)
-    found = []
+    targets = []
     for each in np.argsort(-squares, kind="stable").tolist():
         times = squares[each] / _usual(np.delete(squares, each), int(read.sum()))
         p_value = float(special.chdtrc(int(read.sum()), times)) * len(names)
         if times <= LEAST_TIMES**2 or p_value > alpha:
             break
-        own = number == each
-        groups = (setup[own], run[own])
+        touches = number == each
+        groups = (setup[touches], run[touches])
         places, runs = (len(np.unique(group)) for group in groups)
-        is_alike = all(_are_alike(off[own][:, read], group) for group in groups)
-        if is_alike and places > 1 and _is_elsewhere(fit, rows, rows[own], setup, setup[own]):
-            point = _point(fit, rows[own], means[each], (p_value, float(times)))
-            x, y, z = _mean(fit, rows[own]).tolist()
-            found.append(TargetOff(str(names[each]), (x, y, z), places, runs, point))
-    return tuple(found) if len(found) <= max(1, int(FEW * len(names))) else ()
+        is_alike = all(_are_alike(off[touches][:, read], group) for group in groups)
+        if is_alike and places > 1 and _is_elsewhere(fit, rows, rows[touches], setup, setup[touches]):
+            point = _point(fit, rows[touches], means[each], (p_value, float(times)))
+            x, y, z = _mean(fit, rows[touches]).tolist()
+            targets.append(TargetOff(str(names[each]), (x, y, z), places, runs, point))
+    return tuple(targets) if len(targets) <= max(1, int(FEW * len(names))) else ()
 
 
 def _on_the_piece(fit: Fit) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -104,9 +104,9 @@ def _on_the_piece(fit: Fit) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64
     of_target = np.unique(problem.context.target[rows], return_inverse=True)[1]
     is_read = fit.left_out[rows] | np.isfinite(problem.sigma[rows]).any(axis=1)
     for number in range(of_target.max() + 1):
-        own = of_target == number
-        if not np.ptp(stated[own], axis=0).max() <= SAME_STATED_MM:
-            is_read &= ~own
+        touches = of_target == number
+        if not np.ptp(stated[touches], axis=0).max() <= SAME_STATED_MM:
+            is_read &= ~touches
     return rows[is_read], setup[is_read]
 
 
@@ -140,15 +140,17 @@ def _are_alike(off: Array, group: npt.NDArray[np.int64]) -> bool:
 def _is_elsewhere(
     fit: Fit,
     rows: npt.NDArray[np.int64],
-    own: npt.NDArray[np.int64],
+    of_target: npt.NDArray[np.int64],
     setup: npt.NDArray[np.int64],
-    own_setup: npt.NDArray[np.int64],
+    setup_of_target: npt.NDArray[np.int64],
 ) -> bool:
-    """Whether each axis that moves from target to target stood elsewhere at the ``own`` rows of one target in one place
+    """Whether each axis that moves from target to target stood elsewhere at the rows ``of_target`` in one place
     than in another."""
     positions = fit.problem.context.positions
     travel = np.max([np.ptp(positions[rows[setup == each]], axis=0) for each in np.unique(setup)], axis=0)
-    stood = np.array([positions[own[own_setup == each]].mean(axis=0) for each in np.unique(own_setup)])
+    stood = np.array(
+        [positions[of_target[setup_of_target == each]].mean(axis=0) for each in np.unique(setup_of_target)]
+    )
     moves = travel > APART * max(float(travel.max()), 1e-9)
     return bool((np.ptp(stood, axis=0) > APART * travel)[moves].all())
 
