@@ -12,6 +12,7 @@ from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.shapes.grids_askew import is_bend_of_another, other_bounds
 from monitor.discovery.machine.shapes.teeth import teeth_of
 from monitor.discovery.machine.shapes.variants import (
+    ODDS_OF_A_PITCH_ASKEW,
     cycles_of_unknown_pitch,
     pitch_limits,
     resolvable,
@@ -38,13 +39,12 @@ def test_what_goes_round_whole_times_on_a_plate_askew_is_a_bend_of_another_axis(
     context = context_of(tmp_path / "plate", PLACES[:2])
     assert is_bend_of_another(WHOLE, Y, context)
     assert not is_bend_of_another(NO_WHOLE, Y, context)
-    cycles = cycles_of_unknown_pitch(context)
-    pitches = {cycle.effect.shape.pitch for cycle in cycles if cycle.family == "EYY:cyclic"}
-    kept = {cycle.effect.shape.pitch for cycle in resolvable(cycles, context) if cycle.family == "EYY:cyclic"}
-    assert {pitch for pitch in pitches - kept if pitch < 100.0} == {
-        pitch for pitch in pitches if is_bend_of_another(pitch, Y, context)
+    cycles = resolvable(cycles_of_unknown_pitch(context), context)
+    odds = {each.effect.shape.pitch: each.odds for each in cycles if each.family == "EYY:cyclic"}
+    assert {pitch for pitch, against in odds.items() if against == ODDS_OF_A_PITCH_ASKEW} == {
+        pitch for pitch in odds if is_bend_of_another(pitch, Y, context)
     }
-    assert kept
+    assert {1.0, ODDS_OF_A_PITCH_ASKEW} == set(odds.values())
 
 
 def test_none_is_refined_into_what_is_a_bend(tmp_path: Path) -> None:

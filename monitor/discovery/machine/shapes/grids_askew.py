@@ -52,7 +52,9 @@ def is_bend_of_another(pitch: float, joint: int, context: Context) -> bool:
 
 def other_bounds(pitch: float, pitches: Array, joint: int, context: Context) -> tuple[float, float]:
     """The nearest of some pitches, below and above one, at which a cycle would be the bend of another axis; 0 and
-    infinity where there is none."""
+    infinity where there is none, or where it is that itself."""
+    if is_bend_of_another(pitch, joint, context):
+        return 0.0, float("inf")
     bends = np.array([each for each in pitches.tolist() if is_bend_of_another(each, joint, context)])
     below, above = bends[bends < pitch], bends[bends > pitch]
     return float(below.max(initial=0.0)), float(above.min(initial=np.inf))

@@ -61,6 +61,8 @@ FEWEST_PERIODS = 2.0
 ODDS_OF_A_DRIVER = 400.0
 # A screw that does not turn hardly warms up: what moves the tip alike leads, and that of the still axis is its rival.
 ODDS_OF_A_STILL_SCREW = 3.0
+# A pitch that positions on a grid askew show as a bend of another axis: the bend leads, the cycle is its rival.
+ODDS_OF_A_PITCH_ASKEW = ODDS_OF_A_DRIVER
 
 
 # Odds against a cube: over positions of one sign it bends as a square does, which leads where both do as well.
@@ -266,11 +268,17 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit. A period longer than half of what was travelled is a bend, and so is what on a grid that
-    stands askew goes round along the other axes alone.
+    anyhow have no such limit. A period longer than half of what was travelled is a bend. So is what on a grid that
+    stands askew goes round along the other axes alone: the bend leads, and that is its rival.
     """
     limits = pitch_limits(context)
-    return [variant for variant in variants if _is_resolvable(variant.effect, limits, context)]
+    shown = (variant for variant in variants if _is_resolvable(variant.effect, limits))
+    return [
+        replace(variant, odds=ODDS_OF_A_PITCH_ASKEW)
+        if _is_bend_of_another(variant.effect, context)
+        else variant
+        for variant in shown
+    ]
 
 
 def without_aliases(
@@ -320,17 +328,20 @@ def apparent_frequency(frequency: float, steps: float) -> float:
     return float(abs(frequency - steps * np.round(frequency / steps)))
 
 
-def _is_resolvable(
-    effect: MachineEffect, limits: Mapping[str, tuple[float, float]], context: Context
-) -> bool:
+def _is_bend_of_another(effect: MachineEffect, context: Context) -> bool:
+    """Whether a cycle shows nothing but a bend of another axis."""
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Cyclic)
+    return is_bend_of_another(effect.shape.pitch, effect.term.joint, context)
+
+
+def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
     """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
     assert isinstance(effect, ChainEffect)
     assert isinstance(effect.shape, Cyclic)
     shortest, travel = limits[effect.joint.name]
     # Names of pitches have six digits.
-    if not shortest <= effect.shape.pitch <= (1.0 + 1e-5) * longest_pitch(travel):
-        return False
-    return not is_bend_of_another(effect.shape.pitch, effect.term.joint, context)
+    return shortest <= effect.shape.pitch <= (1.0 + 1e-5) * longest_pitch(travel)
 
 
 def longest_pitch(travel: float) -> float:
