@@ -116,3 +116,17 @@ def test_a_hole_is_named_beside_an_error_of_the_machine(tmp_path: Path) -> None:
     _, problem = problem_of(tmp_path / "plate", 4, (0.0, 60e-3, 0.0), error=bend)
     (off,) = off_in_all_places(fit(problem.for_search()))
     assert off.target == "H7"
+
+
+@pytest.mark.slow
+def test_no_hole_of_sound_plates_is_named(tmp_path: Path, seeds: Callable[[int, int], range]) -> None:
+    """Of 60 plates without a hole that is off none has any, whether the machine bends or not."""
+    for seed in seeds(60, 15):
+        _, problem = problem_of(
+            tmp_path / f"{seed}",
+            100 + seed,
+            (0.0, 0.0, 0.0),
+            runs=1 + seed % 3,
+            error=bend if seed % 2 else None,
+        )
+        assert off_in_all_places(fit(problem.for_search())) == ()
