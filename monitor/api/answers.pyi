@@ -51,6 +51,7 @@ from monitor.workflow.explain.explain_answer import MovedTarget
 from monitor.workflow.explain.explain_answer import NearestEffect
 from monitor.workflow.explain.explain_answer import Remaining
 from monitor.workflow.explain.explain_answer import ScatteringTarget
+from monitor.workflow.explain.explain_answer import TargetOffInPlaces
 from monitor.workflow.explain.explain_answer import UnlikeRun
 from monitor.workflow.explain.version_answer import CurveVersion
 from monitor.workflow.explain.version_answer import MachineVersion
@@ -275,6 +276,8 @@ class TypedExplainAnswer(Answer[ExplainAnswer]):
     def not_followed(self) -> tuple[str, ...]: ...
     @property
     def recurring_data(self) -> tuple[BadProbing, ...]: ...
+    @property
+    def off_targets(self) -> tuple[TargetOffInPlaces, ...]: ...
     @property
     def limits_reached(self) -> tuple[str, ...]: ...
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Protocol
 
 import numpy as np
@@ -94,6 +94,18 @@ class RunUnlike(Protocol):
 
 
 @dataclass(frozen=True)
+class OffTarget:
+    """A target that is off by ``size_um`` in so many ``places`` of its piece, all of them; ``word`` is what a target is
+    called, ``along`` by how much it is off along the directions of the piece."""
+
+    word: str
+    target: str
+    size_um: float
+    along: str
+    places: int
+
+
+@dataclass(frozen=True)
 class MachineFinding:
     """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
     were left out, what scatters, what moved, at which ends of the search (``limits``) more may be there, and whether
@@ -103,7 +115,8 @@ class MachineFinding:
     shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
     ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
     explains the measurements without what was left out, and the tests of all residuals deny it. ``nearest`` comes
-    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model."""
+    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model.
+    ``off_targets`` are off alike in all places of their piece."""
 
     explained: bool
     missing: Sequence[MissingEffect]
@@ -124,6 +137,7 @@ class MachineFinding:
     contradicted: bool = False
     nearest: ComesNearest | None = None
     more_is_left: bool = False
+    off_targets: Sequence[OffTarget] = ()
 
     @property
     def together(self) -> str:
@@ -168,6 +182,11 @@ RECURRING = (
     "side an axis came, or whether the part or plate, or a place stated of it, is off there. Where it is the first or "
     "last position of an axis, a step between it and the next would read the same: measure another position between "
     "the two and beyond it."
+)
+OFF_TARGET = (
+    "{word} {target} is off by {size_um:.1f} µm ({along}) in all {places} places of its piece: it stands elsewhere on "
+    "the piece than stated, whatever the machine does. Its readings were left out; see whether it is damaged or dirty, "
+    "or stated wrongly."
 )
 UNCHECKED = (
     "They lie where no other run read, and are so many that they may be an error which the model lacks."
@@ -257,7 +276,9 @@ def _moved(move: Move) -> str:
 
 def _left_out(finding: MachineFinding) -> list[str]:
     """What is said of readings that were left out."""
-    sentences = []
+    sentences = [
+        OFF_TARGET.format_map(asdict(each) | {"word": each.word.capitalize()}) for each in finding.off_targets
+    ]
     if finding.bad_points:
         sentences.append(
             f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,7 @@ from monitor.discovery.machine.shapes.variants import (
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.suspects.off_alike import off_alike
+from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_all_places
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
@@ -91,6 +93,7 @@ class Explanation:
     not_followed: tuple[str, ...] = ()
     recurring: tuple[BadPoint, ...] = ()
     unchecked: bool = False
+    off_targets: tuple[TargetOff, ...] = ()
     nearest: Nearest | None = None
     beside: Verdict = Verdict.EXPLAINED
 
@@ -143,16 +146,12 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
-    curves, latest = _search_with_curves(first, search)
-    alike = _off_alike(as_given, latest)
-    if not latest.under.left_out[[point.row for point in alike]].all():
-        first, search = _without(alike, first, search)
-        curves, latest = _search_with_curves(first, search)
+    first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
     unfollowed = not_followed(latest.scene, [finding.candidate for finding in latest.refined], rate)
-    single, again = _single_and_recurring(latest, alike)
+    single, again = _single_and_recurring(latest, alike, off_targets)
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict_beside = compare(latest.under, campaign.name, model).verdict
@@ -178,6 +177,7 @@ def explain(
         unchecked=unchecked,
         nearest=_nearest(latest, search, verdict, (*missing, *unfollowed)),
         beside=verdict_beside,
+        off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
 
 
@@ -190,18 +190,65 @@ def _nearest(
     return nearest_effect(latest.scene, search.drivers, search.rate)
 
 
-def _off_alike(as_given: ChainComparison, latest: ChainRound) -> tuple[BadPoint, ...]:
-    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before."""
+class _Searched(NamedTuple):
+    """A search, the fit that it began with, the curves of joints and the round in which it ended, without targets that
+    are off in all places of their piece and readings that are off ``alike`` in all runs."""
+
+    first: Fit
+    search: ChainSearch
+    curves: tuple[ChainVariant, ...]
+    latest: ChainRound
+    off_targets: tuple[TargetOff, ...]
+    alike: tuple[BadPoint, ...]
+
+
+def _searched(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:
+    """Search without the targets that are off in all places, which effects would be asked for: with what stands out
+    before any effect is known, and once more with what does beside them."""
+    off_targets = off_in_all_places(first) if as_given.verdict is Verdict.SOMETHING_IS_MISSING else ()
+    if off_targets:
+        first, search = _without([each.point for each in off_targets], first, search)
+    curves, latest = _search_with_curves(first, search)
+    if later := _off_beside(latest, off_targets):
+        off_targets += later
+        first, search = _without([each.point for each in later], first, search)
+        curves, latest = _search_with_curves(first, search)
+    alike = _off_alike(as_given, latest, off_targets)
+    if not latest.under.left_out[[point.row for point in alike]].all():
+        first, search = _without(alike, first, search)
+        curves, latest = _search_with_curves(first, search)
+    return _Searched(first, search, curves, latest, off_targets, alike)
+
+
+def _off_alike(
+    as_given: ChainComparison, latest: ChainRound, off_targets: Sequence[TargetOff]
+) -> tuple[BadPoint, ...]:
+    """What all runs have off alike, where something is missing or readings were left out, as gross ones are before;
+    nothing of targets that are off in all places."""
     doubtful = as_given.verdict is Verdict.SOMETHING_IS_MISSING or latest.suspects.bad
-    return off_alike(latest.under) if doubtful else ()
+    of_targets = {row for each in off_targets for row in each.point.rows}
+    return (
+        tuple(point for point in off_alike(latest.under) if point.row not in of_targets) if doubtful else ()
+    )
+
+
+def _off_beside(latest: ChainRound, named: Sequence[TargetOff]) -> tuple[TargetOff, ...]:
+    """What is off in all places beside the effects of a round, or beside readings that it left out, and is not named
+    yet."""
+    if not (latest.refined or latest.suspects.any):
+        return ()
+    targets = {each.target for each in named}
+    return tuple(each for each in off_in_all_places(latest.under) if each.target not in targets)
 
 
 def _single_and_recurring(
-    latest: ChainRound, alike: Sequence[BadPoint]
+    latest: ChainRound, alike: Sequence[BadPoint], off_targets: Sequence[TargetOff]
 ) -> tuple[list[BadPoint], tuple[BadPoint, ...]]:
     """The suspect points that stand for themselves, and those that most runs share, what is off ``alike`` in all of
-    them included."""
+    them included; none of targets that are off in all places."""
+    of_targets = {row for each in off_targets for row in each.point.rows}
     points = sorted(latest.suspects.bad.values(), key=lambda point: point.row)
+    points = [point for point in points if point.row not in of_targets]
     in_all = {point.row for point in alike}
     recur = recurring(latest.under, points) | in_all
     again = [point for point in points if point.row in recur - in_all]

@@ -192,6 +192,23 @@ class BadProbing:
 
 
 @dataclass(frozen=True)
+class TargetOffInPlaces:
+    """A target that is off alike in all ``places`` and ``runs``, so many of each, by ``x_um``, ``y_um`` and ``z_um``
+    from where it is stated, in the frame of its piece; its ``readings`` were left out. ``p_value`` is that of so large
+    a vector by chance, among all targets."""
+
+    target: str
+    x_um: float
+    y_um: float
+    z_um: float
+    size_um: float
+    places: int
+    runs: int
+    readings: int
+    p_value: float
+
+
+@dataclass(frozen=True)
 class BadRow:
     """A row that contradicts the rest of its curve; it was left out. ``line`` is its line of the file."""
 
@@ -334,7 +351,8 @@ class MachineExplanation:
     at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
     but could not be fitted, and were skipped. ``not_followed`` are errors that the model has in an unknown shape which
     does not follow them. ``recurring_data`` were left out too, but most runs left them alike at nearly the same place:
-    the model lacks something there. ``remaining`` is what is left with all that is missing in the model, None where
+    the model lacks something there. ``off_targets`` are off alike in all places of their piece, and were left out
+    without a row in either. ``remaining`` is what is left with all that is missing in the model, None where
     nothing is.
     The residual is pictured where something is missing. ``taken_for_machine`` are errors of
     instruments that would be reported as the machine's. ``added_together`` are the first of what is missing and the
@@ -363,6 +381,7 @@ class MachineExplanation:
     not_fitted: tuple[str, ...] = ()
     not_followed: tuple[str, ...] = ()
     recurring_data: tuple[BadProbing, ...] = ()
+    off_targets: tuple[TargetOffInPlaces, ...] = ()
     limits_reached: tuple[str, ...] = ()
     remaining: Remaining | None = None
     taken_for_machine: tuple[InstrumentAlias, ...] = ()

@@ -24,6 +24,7 @@ from monitor.reporting.machine_finding import (
     MissingEffect,
     MistakeFound,
     Move,
+    OffTarget,
     Scattering,
     fits_too_well,
     machine_sentences,
@@ -47,6 +48,7 @@ from monitor.workflow.explain.explain_answer import (
     ScatteringTarget,
     StepBetween,
     SteppedError,
+    TargetOffInPlaces,
     UnlikeRun,
 )
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -321,6 +323,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     suspect_data, recurring_data = (
         _probings(points, problem) for points in (explanation.suspect, explanation.recurring)
     )
+    off_targets = _off_targets(explanation)
     changes = _changes(explanation)
     scattering = tuple(
         ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
@@ -367,6 +370,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 not_followed=explanation.not_followed,
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
+                off_targets=_said_off(off_targets, problem.target_word),
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
                 nearest=nearest,
                 more_is_left=explanation.more_is_left,
@@ -377,6 +381,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         not_fitted=explanation.unfitted,
         not_followed=explanation.not_followed,
         recurring_data=recurring_data,
+        off_targets=off_targets,
         limits_reached=tuple(explanation.limits),
         remaining=_remaining(explanation) if missing else None,
         taken_for_machine=_aliases(explanation),
@@ -414,6 +419,32 @@ def frame_of_point(point: BadPoint, problem: ChainProblem) -> str | None:
         return frame_words(FrameOfReference(FrameKind.OWN_AXIS, point.frame))
     setup = instruments.setups[instruments.setup[point.row]]
     return f"setup {setup.id}" if setup.has_own_frame else None
+
+
+def _off_targets(explanation: Explanation) -> tuple[TargetOffInPlaces, ...]:
+    """The targets that are off alike in all places."""
+    answers = []
+    for each in explanation.off_targets:
+        x, y, z, size = (MICROMETRE.to_display(value) for value in (*each.off, each.size))
+        readings, p_value = len(each.point.rows), each.point.p_value
+        answers.append(
+            TargetOffInPlaces(each.target, x, y, z, size, each.places, each.runs, readings, p_value)
+        )
+    return tuple(answers)
+
+
+def _said_off(targets: Sequence[TargetOffInPlaces], word: str) -> tuple[OffTarget, ...]:
+    """The targets that are off alike in all places, as sentences say them."""
+    return tuple(
+        OffTarget(
+            word,
+            each.target,
+            each.size_um,
+            f"x {each.x_um:+.1f}, y {each.y_um:+.1f}, z {each.z_um:+.1f} µm on the piece",
+            each.places,
+        )
+        for each in targets
+    )
 
 
 def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:

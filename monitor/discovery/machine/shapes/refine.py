@@ -10,6 +10,7 @@ import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.shapes.gears import STEP as ORDER_STEP
+from monitor.discovery.machine.shapes.grids_askew import other_bounds
 from monitor.discovery.machine.shapes.variants import (
     BEND_PERIODS,
     TIME_CONSTANTS_S,
@@ -47,6 +48,8 @@ LIMIT_FACTOR = 2.0**0.25
 MOST_BELOW_GRID, AT_END = 8, 0.02
 # Widths that are tried between the neighbours on the grid.
 WIDTHS_TRIED = 9
+# Among so many pitches near one those are looked for that would be the bend of another axis.
+OTHER_PITCHES = 41
 # Names of pitches have six digits.
 NAMED_TO = 1e-5
 # A warm-up has settled after so few readings that no data show how.
@@ -96,16 +99,20 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
         return None
     if isinstance(effect.shape, Cyclic) and family.endswith(":cyclic"):
         pitch = effect.shape.pitch
-        shortest, travel = pitch_limits(candidate.fit.problem.context)[effect.joint.name]
+        context = candidate.fit.problem.context
+        shortest, travel = pitch_limits(context)[effect.joint.name]
+        width = pitch * frequency_step(travel)
+        near = pitch * np.exp(np.linspace(-width, width, OTHER_PITCHES))
+        low, high = other_bounds(pitch, near, effect.term.joint, context)
         return _Range(
             "pitch",
             "mm",
             pitch,
-            pitch * frequency_step(travel),
+            width,
             1e-5,
             lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
             lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
-            (min(shortest, pitch), _longest_from(pitch, travel)),
+            (max(min(shortest, pitch), low), min(_longest_from(pitch, travel), high)),
         )
     if isinstance(effect.shape, WindUp):
         return _Range(

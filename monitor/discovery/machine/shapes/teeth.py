@@ -23,6 +23,7 @@ from monitor.discovery.machine.shapes.variants import (
     FEWEST_PERIODS,
     SHORTEST_PITCH_MM,
     frequency_step,
+    pitch_limits,
     resolvable,
 )
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Variant
@@ -41,6 +42,8 @@ STEP_OF_TEETH, EDGES = 0.25, 12
 STARTS, FINER = 3, 5
 # An edge beyond this part of the travel is seen by hardly a position.
 WITHIN_TRAVEL = 0.9
+# Pitches are told to so many mm.
+PITCH_DIGIT_MM = 0.01
 # Sawtooths whose scores differ by less are the same at all positions.
 SAME_SCORE = 0.1
 
@@ -106,8 +109,14 @@ class TeethOfError:
     @cached_property
     def _teeth(self) -> Array:
         """The numbers of teeth on the grid."""
-        most = min(MOST_TEETH, self._range[1] / SHORTEST_PITCH_MM)
+        most = min(MOST_TEETH, self._range[1] / self._shortest_pitch)
         return np.arange(FEWEST_TEETH, most, STEP_OF_TEETH)
+
+    @cached_property
+    def _shortest_pitch(self) -> float:
+        """The shortest pitch in mm that the positions show: below twice the step of a grid teeth look like anything."""
+        shortest, _ = pitch_limits(self.scene.fit.problem.context)[self.effect.joint.name]
+        return max(shortest, SHORTEST_PITCH_MM)
 
     @property
     def tries(self) -> int:
@@ -126,10 +135,11 @@ class TeethOfError:
             self._shape(*grid_point): grid_point for grid_point in product(teeth.tolist(), phases.tolist())
         }
         shapes = np.array(list(grid_points)).reshape(-1, 2)
-        falls_twice = shapes.sum(axis=1) < low + WITHIN_TRAVEL * travel
-        shapes = shapes[falls_twice]
+        shown = shapes.sum(axis=1) < low + WITHIN_TRAVEL * travel
+        shown &= shapes[:, 0] > self._shortest_pitch - PITCH_DIGIT_MM
+        shapes = shapes[shown]
         profiles = self._profiles.of(sawtooths(self._reading, shapes[:, 0], shapes[:, 1]))
-        return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[falls_twice], profiles)
+        return _Sawtooths(shapes, np.array(list(grid_points.values())).reshape(-1, 2)[shown], profiles)
 
     @cached_property
     def _on_grid(self) -> Memory[list[_Weighed]]:
@@ -236,4 +246,6 @@ def teeth_of(scene: ChainScene, shape: ChainCandidate) -> TeethOfError | None:
     if not isinstance(effect, ChainEffect) or effect.joint.turns:
         return None
     travel = float(np.ptp(scene.fit.problem.context.places[:, effect.term.joint]))
-    return TeethOfError(scene, effect) if travel > FEWEST_TEETH * SHORTEST_PITCH_MM else None
+    shortest, _ = pitch_limits(scene.fit.problem.context)[effect.joint.name]
+    shown = travel > FEWEST_TEETH * max(shortest, SHORTEST_PITCH_MM)
+    return TeethOfError(scene, effect) if shown else None

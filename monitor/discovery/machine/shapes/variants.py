@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
+from monitor.discovery.machine.shapes.grids_askew import is_bend_of_another, series_of_setups
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
 from monitor.effects.driver import HeatDriver
@@ -60,6 +61,8 @@ FEWEST_PERIODS = 2.0
 ODDS_OF_A_DRIVER = 400.0
 # A screw that does not turn hardly warms up: what moves the tip alike leads, and that of the still axis is its rival.
 ODDS_OF_A_STILL_SCREW = 3.0
+# A pitch that positions on a grid askew show as a bend of another axis: the bend leads, the cycle is its rival.
+ODDS_OF_A_PITCH_ASKEW = ODDS_OF_A_DRIVER
 
 
 # Odds against a cube: over positions of one sign it bends as a square does, which leads where both do as well.
@@ -265,10 +268,17 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit. A period longer than half of what was travelled is a bend.
+    anyhow have no such limit. A period longer than half of what was travelled is a bend. So is what on a grid that
+    stands askew goes round along the other axes alone: the bend leads, and that is its rival.
     """
     limits = pitch_limits(context)
-    return [variant for variant in variants if _is_resolvable(variant.effect, limits)]
+    shown = (variant for variant in variants if _is_resolvable(variant.effect, limits))
+    return [
+        replace(variant, odds=ODDS_OF_A_PITCH_ASKEW)
+        if _is_bend_of_another(variant.effect, context)
+        else variant
+        for variant in shown
+    ]
 
 
 def without_aliases(
@@ -318,6 +328,13 @@ def apparent_frequency(frequency: float, steps: float) -> float:
     return float(abs(frequency - steps * np.round(frequency / steps)))
 
 
+def _is_bend_of_another(effect: MachineEffect, context: Context) -> bool:
+    """Whether a cycle shows nothing but a bend of another axis."""
+    assert isinstance(effect, ChainEffect)
+    assert isinstance(effect.shape, Cyclic)
+    return is_bend_of_another(effect.shape.pitch, effect.term.joint, context)
+
+
 def _is_resolvable(effect: MachineEffect, limits: Mapping[str, tuple[float, float]]) -> bool:
     """Whether the positions of its axis separate a cycle from longer ones and from a bend."""
     assert isinstance(effect, ChainEffect)
@@ -347,16 +364,7 @@ def pitch_limits(context: Context) -> dict[str, tuple[float, float]]:
 
 def _pitch_limits_of(context: Context, index: int) -> Array:
     positions = context.positions[:, index]
-    return np.array([_shortest_of(positions, _series(context)), np.ptp(positions)])
-
-
-def _series(context: Context) -> list[npt.NDArray[np.int64]]:
-    """The rows of each setup of each run: a plate that is laid anew is the same grid elsewhere."""
-    setup = np.zeros(len(context), dtype=np.int64)
-    if context.instruments is not None:
-        setup = context.instruments.setup
-    _, of = np.unique(np.stack([context.run, setup]), axis=1, return_inverse=True)
-    return [np.flatnonzero(of.reshape(-1) == number) for number in range(of.max(initial=-1) + 1)]
+    return np.array([_shortest_of(positions, series_of_setups(context)), np.ptp(positions)])
 
 
 def _shortest_of(positions: Array, series: Sequence[npt.NDArray[np.int64]]) -> float:
