@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistake
-from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.discovery.machine.suspects.steps import Step
 from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
 from monitor.machine import Chain
@@ -24,16 +23,14 @@ from monitor.reporting.machine_finding import (
     MissingEffect,
     MistakeFound,
     Move,
-    OffTarget,
     Scattering,
     fits_too_well,
     machine_sentences,
 )
 from monitor.reporting.nearest_words import WHY_REFUSED
-from monitor.units import DEGREE, MICROMETRE, MICRORADIAN, MILLIMETRE, Unit
+from monitor.units import DEGREE, MICROMETRE, MILLIMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
-    BadProbing,
     ChangedParameter,
     ChangedTarget,
     CurvePoint,
@@ -45,12 +42,10 @@ from monitor.workflow.explain.explain_answer import (
     MovedTarget,
     NearestEffect,
     Remaining,
-    ScatteringTarget,
     StepBetween,
     SteppedError,
-    TargetOffInPlaces,
-    UnlikeRun,
 )
+from monitor.workflow.explain.off_answer import left_out, said_off, scattering_targets, targets_off, unlike
 from monitor.workflow.explain.residuals_against import pictures_of
 from monitor.workflow.explain.shared_answer import (
     coefficients,
@@ -321,15 +316,11 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     )
     comparison = machine_comparison(explanation.comparison, problem)
     suspect_data, recurring_data = (
-        _probings(points, problem) for points in (explanation.suspect, explanation.recurring)
+        left_out(points, problem) for points in (explanation.suspect, explanation.recurring)
     )
-    off_targets = _off_targets(explanation)
+    off_targets = targets_off(explanation)
     changes = _changes(explanation)
-    scattering = tuple(
-        ScatteringTarget(each.target, each.times, um(each.deviation), each.touches, each.p_value)
-        for each in explanation.scatter
-    )
-    unlike_runs = _unlike_runs(explanation)
+    scattering, unlike_runs = scattering_targets(explanation), unlike(explanation)
     nearest = _nearest(explanation)
     residual_map = residual_against = None
     # Where nothing is missing there is nothing to picture.
@@ -370,7 +361,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 not_followed=explanation.not_followed,
                 recurring=len({(reading.run, reading.sequence) for reading in recurring_data}),
                 unchecked=explanation.unchecked,
-                off_targets=_said_off(off_targets, problem.target_word),
+                off_targets=said_off(off_targets, problem.target_word),
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
                 nearest=nearest,
                 more_is_left=explanation.more_is_left,
@@ -389,76 +380,6 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
         nearest=nearest,
-    )
-
-
-def _probings(points: Sequence[BadPoint], problem: ChainProblem) -> tuple[BadProbing, ...]:
-    """Readings that were left out."""
-    um = MICROMETRE.to_display
-    return tuple(
-        BadProbing(
-            point.run,
-            point.sequence,
-            point.target,
-            point.axis,
-            um(point.size),
-            point.p_value,
-            None if point.turn is None else MICRORADIAN.to_display(point.turn),
-            frame_of_point(point, problem),
-        )
-        for point in points
-    )
-
-
-def frame_of_point(point: BadPoint, problem: ChainProblem) -> str | None:
-    """Whose frame x, y or z of a bad point is of, in words, where that is not the machine's."""
-    instruments = problem.context.instruments
-    if point.axis not in COORDINATES or instruments is None:
-        return None
-    if point.frame is not None:
-        return frame_words(FrameOfReference(FrameKind.OWN_AXIS, point.frame))
-    setup = instruments.setups[instruments.setup[point.row]]
-    return f"setup {setup.id}" if setup.has_own_frame else None
-
-
-def _off_targets(explanation: Explanation) -> tuple[TargetOffInPlaces, ...]:
-    """The targets that are off alike in all places."""
-    answers = []
-    for each in explanation.off_targets:
-        x, y, z, size = (MICROMETRE.to_display(value) for value in (*each.off, each.size))
-        readings, p_value = len(each.point.rows), each.point.p_value
-        answers.append(
-            TargetOffInPlaces(each.target, x, y, z, size, each.places, each.runs, readings, p_value)
-        )
-    return tuple(answers)
-
-
-def _said_off(targets: Sequence[TargetOffInPlaces], word: str) -> tuple[OffTarget, ...]:
-    """The targets that are off alike in all places, as sentences say them."""
-    return tuple(
-        OffTarget(
-            word,
-            each.target,
-            each.size_um,
-            f"x {each.x_um:+.1f}, y {each.y_um:+.1f}, z {each.z_um:+.1f} µm on the piece",
-            each.places,
-        )
-        for each in targets
-    )
-
-
-def _unlike_runs(explanation: Explanation) -> tuple[UnlikeRun, ...]:
-    """The runs that leave more than the others."""
-    return tuple(
-        UnlikeRun(
-            each.run,
-            each.times,
-            MICROMETRE.to_display(each.deviation),
-            each.neighbours,
-            each.p_value,
-            each.as_if,
-        )
-        for each in explanation.apart
     )
 
 
