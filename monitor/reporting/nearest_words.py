@@ -69,7 +69,7 @@ WHY_REFUSED = {
     "poses": "with every pose counted once it may be chance",
     "runs": "its size differs from run to run, as if it acted in some of them alone",
     "other_shapes": "another error in some other shape would do the same",
-    "tracker": "a tracker that wanders would do the same",
+    "wander": "a tracker that wanders would do the same",
     "size": "it would have to be larger than such an error is, or nearly cancelled by what is free in every run",
     "held_out": "readings that were left out are not predicted better with it",
     "flips": "what is left, with signs drawn at random, looks as much like an effect too often",

@@ -74,6 +74,7 @@ def test_a_bar_with_another_sign_is_told_beside_a_play(right):
     assert mistake.rms_undone < 3.5e-4 < 2.0 * mistake.rms_undone < mistake.rms_as_recorded
 
 
+@pytest.mark.slow
 def test_a_play_is_neither(right):
     first = fit(_problem_of(right))
     assert find_turned_passes(right, _problem_of, first) == ()

@@ -124,6 +124,7 @@ def test_a_history_says_which_of_its_campaigns_hold_runs_of_others(db: Database)
     assert "copied_readings" not in stored[0]
 
 
+@pytest.mark.slow
 def test_of_many_copies_in_a_history_the_first_are_named(table: Campaign) -> None:
     with Database(":memory:") as db:
         for number in range(MOST_NAMED + 3):
@@ -196,6 +197,7 @@ def test_a_certificate_of_copies_is_refused_with_what_to_do(db: Database, tmp_pa
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
+@pytest.mark.slow
 def test_an_explanation_says_it_too(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     from monitor.workflow.explain import explain as module
 

@@ -84,6 +84,7 @@ def test_the_days_since_an_event_are_a_part_of_one_and_those_after_it(db: Databa
     assert abs(row.slope_per_year) < 3.0 * row.u_slope
 
 
+@pytest.mark.slow
 def test_days_of_a_campaign_that_warms_up_are_divided_alike(db: Database) -> None:
     days = _days(8, 5, 1)
     keep(db, "MILL", days, "all", warm=tuple(range(1, 8 * RUNS, RUNS)))
@@ -97,6 +98,7 @@ def test_days_of_a_campaign_that_warms_up_are_divided_alike(db: Database) -> Non
     assert page.mean.latest == pytest.approx(row.latest, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_an_event_behind_the_runs_that_count_divides_nothing(db: Database) -> None:
     # The last run of all warms up: nothing that counts followed the event before it.
     keep(db, "MILL", _days(4, 4, 0), "all", warm=(4 * RUNS,))

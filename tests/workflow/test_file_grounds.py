@@ -53,7 +53,9 @@ def test_nominal_values_in_place_of_readings_are_a_ground(tmp_path: Path) -> Non
         accepted_grounds([], {NOMINAL: "none"})
 
 
-@pytest.mark.parametrize(("rows", "first", "unit"), [(1, 50, LATE), (-3, 20, EARLY)])
+@pytest.mark.parametrize(
+    ("rows", "first", "unit"), [(1, 50, LATE), pytest.param(-3, 20, EARLY, marks=pytest.mark.slow)]
+)
 def test_columns_that_are_late_are_a_ground(tmp_path: Path, rows: int, first: int, unit: str) -> None:
     right = _table(tmp_path / "table", np.random.default_rng(7))
     assert _of_file(right) == []

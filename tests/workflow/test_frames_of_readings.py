@@ -14,7 +14,8 @@ from monitor.discovery.machine.suspects.anomalies import BadPoint
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
-from monitor.workflow.explain.machine_answer import frame_of_point, residual_frames
+from monitor.workflow.explain.machine_answer import residual_frames
+from monitor.workflow.explain.off_answer import frame_of_point
 from tests.methods.test_mount_terms import night
 from tests.simulator.seen_gantry import seen_gantry
 

@@ -62,6 +62,7 @@ def test_whole_poses_are_predicted_in_one_frame(tmp_path: Path) -> None:
     assert answer.rms_um == pytest.approx(answer.fitted_rms_um, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_free_shape_stays_that_of_the_fitted_rows(tmp_path: Path) -> None:
     """Its hats were spread over the rows of both files: where the other one goes further, the bump was another one."""
     frame = Rotation.from_euler("z", 0.5)

@@ -155,7 +155,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         if not self._survives(others, candidate, in_any_shape):
             return Refusal.OTHER_SHAPES
         if is_drift_of_machine(candidate) and not self._survives(others, candidate, self._wander):
-            return Refusal.TRACKER
+            return Refusal.WANDER
         if not self._is_plausible(others, candidate):
             return Refusal.SIZE
         if self._doubt is not None:

@@ -12,7 +12,7 @@ class Refusal(StrEnum):
     POSES = "poses"
     RUNS = "runs"
     OTHER_SHAPES = "other_shapes"
-    TRACKER = "tracker"
+    WANDER = "wander"
     SIZE = "size"
     HELD_OUT = "held_out"
     FLIPS = "flips"
