@@ -105,8 +105,6 @@ def explanation_of(
         mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes:
         mistakes = find_late_rows(campaign, maker, first)
-    if not mistakes:
-        mistakes = find_turned_passes(campaign, maker, first)
     if not mistakes and is_gross(campaign, first):
         mistakes = find_late_rows_without_fit(campaign, maker)
     if not mistakes:
@@ -116,6 +114,9 @@ def explanation_of(
     if not any(mistake.enough for mistake in mistakes):
         # What comes nearest of single setups is nothing beside what explains all.
         mistakes = _of_all_setups(campaign, maker, first) or mistakes
+    if not any(mistake.enough for mistake in mistakes):
+        # Beside a circle a sign, or exchanged columns, do the same as the opposite order, and are likelier.
+        mistakes = find_turned_passes(campaign, maker, first) or mistakes
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING

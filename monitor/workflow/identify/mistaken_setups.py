@@ -40,11 +40,9 @@ def mistaken_setups(
     def maker(changed: Campaign) -> ChainProblem:
         return campaign_method(changed).problem_of(changed, stored)
 
-    mistakes = (
-        find_late_rows(campaign, maker, fit)
-        or find_turned_passes(campaign, maker, fit)
-        or find_setup_mistakes(campaign, maker, fit)
-    )
+    mistakes = find_late_rows(campaign, maker, fit) or find_setup_mistakes(campaign, maker, fit)
+    if not any(mistake.enough for mistake in mistakes):
+        mistakes = find_turned_passes(campaign, maker, fit) or mistakes
     um = MICROMETRE.to_display
     return tuple(
         LikelyMistake(each.what, um(each.rms_as_recorded), um(each.rms_undone), each.enough)
