@@ -91,6 +91,20 @@ def _of_all_setups(campaign: Campaign, maker: Maker, first: Fit) -> tuple[Mistak
     return find_reading_mistakes(campaign, maker, first) if is_far(first) else ()
 
 
+def _enough(
+    campaign: Campaign, maker: Maker, first: Fit, mistakes: tuple[Mistake, ...]
+) -> tuple[Mistake, ...]:
+    """The mistakes that explain all, asked for where those of single setups do not; these where none does."""
+    if any(mistake.enough for mistake in mistakes):
+        return mistakes
+    # What comes nearest of single setups is nothing beside what explains all.
+    mistakes = _of_all_setups(campaign, maker, first) or mistakes
+    if any(mistake.enough for mistake in mistakes):
+        return mistakes
+    # On a circle a sign, or exchanged columns, do the same as the opposite order, and are likelier.
+    return find_turned_passes(campaign, maker, first) or mistakes
+
+
 def explanation_of(
     campaign: Campaign, model: StoredModel, robust: RobustFit, rate: float = RATE
 ) -> Explanation:
@@ -111,12 +125,7 @@ def explanation_of(
         mistakes = find_run_mistakes(campaign, maker, first)
     if not mistakes:
         mistakes = find_setup_mistakes(campaign, maker, first)
-    if not any(mistake.enough for mistake in mistakes):
-        # What comes nearest of single setups is nothing beside what explains all.
-        mistakes = _of_all_setups(campaign, maker, first) or mistakes
-    if not any(mistake.enough for mistake in mistakes):
-        # Beside a circle a sign, or exchanged columns, do the same as the opposite order, and are likelier.
-        mistakes = find_turned_passes(campaign, maker, first) or mistakes
+    mistakes = _enough(campaign, maker, first, mistakes)
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
