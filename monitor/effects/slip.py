@@ -1,4 +1,4 @@
-"""What moved within a run, ``moved(run 7, sequence 23)``: from where on, and how its points go with it."""
+"""What moved or stepped within a run, ``moved(run 7, sequence 23)``: from where on, and how its points go with it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
-#: Behind the name of what moved; the moment may lack, so that its lack can be told.
-MOVED = r"moved(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
+_MOMENT = r"(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
+#: Behind the name of what moved or stepped; the moment may lack, so that its lack can be told.
+MOVED, STEPPED = (word + _MOMENT for word in ("moved", "stepped"))
 
 
-def moment_of(groups: Mapping[str, str], of: str) -> tuple[int, int]:
-    """Return run and sequence from which on ``of`` had moved. Raises EffectError where they are not said."""
+def moment_of(groups: Mapping[str, str], text: str) -> tuple[int, int]:
+    """Return run and sequence from which on something had moved, as ``text`` names it. Raises EffectError where they
+    are not said."""
     if "run" not in groups:
-        text = f"{of}:moved"
         raise EffectError(
             f"'{text}' must say when: write {text}(run 7, sequence 23); `explain` finds the moment"
         )

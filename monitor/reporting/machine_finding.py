@@ -9,7 +9,13 @@ from typing import Protocol
 import numpy as np
 
 from monitor.reporting.messages import joined_by_and
-from monitor.reporting.nearest_words import ComesNearest, more_is_left, nearest_sentence
+from monitor.reporting.nearest_words import (
+    ComesNearest,
+    LooksStepped,
+    more_is_left,
+    nearest_sentence,
+    step_sentence,
+)
 from monitor.units import MICROMETRE
 
 
@@ -115,7 +121,8 @@ class MachineFinding:
     shape which does not follow them. ``recurring``: so many readings that were left out are alike in most runs;
     ``unchecked``: so many bad points lie where no other run read that they may be none; ``contradicted``: the model
     explains the measurements without what was left out, and the tests of all residuals deny it. ``nearest`` comes
-    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model.
+    nearest where none is named; ``more_is_left`` than noise leaves with all that is missing in the model. ``stepped``
+    is an error that stepped within a run.
     ``off_targets`` are off alike in all places of their piece."""
 
     explained: bool
@@ -136,6 +143,7 @@ class MachineFinding:
     unchecked: bool = False
     contradicted: bool = False
     nearest: ComesNearest | None = None
+    stepped: LooksStepped | None = None
     more_is_left: bool = False
     off_targets: Sequence[OffTarget] = ()
 
@@ -258,7 +266,7 @@ def machine_sentences(finding: MachineFinding) -> str:
             f"{', '.join(finding.unfitted)}."
         )
     if finding.more_is_left:
-        sentences.append(more_is_left(len(finding.missing)))
+        sentences.append(more_is_left(len(finding.missing) + (finding.stepped is not None)))
     if finding.not_followed:
         sentences.append(NOT_FOLLOWED.format(errors=joined_by_and(finding.not_followed)))
     return (GROSS if finding.hopeless else "") + " ".join(sentences)
@@ -329,6 +337,8 @@ def _none_named(finding: MachineFinding) -> str:
     """What is said where no effect is named."""
     if finding.explained:
         return f"Nothing {'else ' if finding.moves else ''}is missing that this plan can see."
+    if finding.stepped is not None:
+        return step_sentence(finding.stepped, alone=True)
     if finding.nearest is not None:
         return nearest_sentence(finding.nearest)
     if finding.not_followed:
@@ -362,6 +372,8 @@ def _missing_sentences(finding: MachineFinding) -> list[str]:
         sentences.append(
             f"These data cannot tell {joined_by_and(doubtful)} from more of the shape of {error}."
         )
+    if finding.stepped is not None:
+        sentences.append(step_sentence(finding.stepped, alone=False))
     return sentences
 
 

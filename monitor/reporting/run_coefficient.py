@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 
 #: The ends of the names: ``@each_run.run2`` of what has a coefficient a run, ``@run_time(2)`` of a drift in one run,
-#: ``:moved(run 2, sequence 30)`` of what moved in one; parts of a shape or a change (``.cos``, ``.x``) follow.
+#: ``:moved(run 2, sequence 30)`` and ``@stepped(run 2, sequence 30)`` of what moved or stepped in one; parts of a shape
+#: or a change (``.cos``, ``.x``) follow.
 _OF_RUN = re.compile(
     r"each_run(?:\..+)?\.run(?P<each>\d+)$"
     r"|@run_time\((?P<drift>\d+)\)(?:\..+)?$"
-    r"|:moved\(run (?P<moved>\d+), sequence \d+\)(?:@.+)?(?:\..+)?$"
+    r"|(?::moved|@stepped)\(run (?P<moved>\d+), sequence \d+\)(?:@.+)?(?:\..+)?$"
 )
 
 

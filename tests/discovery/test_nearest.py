@@ -55,14 +55,14 @@ def test_every_rule_has_its_words() -> None:
 def test_a_collimation_that_steps_within_the_night_is_said_to(tmp_path: Path) -> None:
     found = night(tmp_path, 40e-6 * (np.arange(STARS) >= STEPS_AT - 1))
     assert found.missing == ()
-    assert found.nearest is not None
-    assert found.nearest.stepped is not None
-    step = found.nearest.stepped
+    step = found.stepped
+    assert step is not None
     assert step.errors[0] == "ECEL:const"
-    assert (step.run, step.sequence) == (1, STEPS_AT)
-    assert step.rms_after < 0.5 * found.nearest.rms_before
+    assert (step.moment.run, step.moment.sequence) == (1, STEPS_AT)
+    assert step.rms_after < 0.5 * step.rms_before
     answer = machine_explanation(found).answer
-    assert f"as if ECEL:const stepped within run 1, from sequence {STEPS_AT} on" in answer
+    assert f"as if ECEL:const stepped within run 1, from sequence {STEPS_AT} on, by " in answer
+    assert f"or add ECEL:const@stepped(run 1, sequence {STEPS_AT}) to the model" in answer
     assert "explains more" not in answer
 
 
@@ -71,9 +71,9 @@ def test_a_collimation_that_walks_is_no_step(tmp_path: Path) -> None:
     """What comes nearest to a walk is named with what it would leave, and the noise that it may be."""
     found = night(tmp_path, 4e-6 * np.cumsum(np.random.default_rng(8).standard_normal(STARS)))
     assert found.missing == ()
+    assert found.stepped is None
     nearest = machine_explanation(found).nearest
     assert nearest is not None
-    assert nearest.stepped is None
     assert nearest.refusal == "noise"
     assert nearest.rms_after_um < nearest.rms_before_um
     answer = machine_explanation(found).answer

@@ -31,6 +31,8 @@ DAY = datetime(2026, 3, 2, 8)
         ("EBB:harmonic2@run_time(12).cos", 12),
         ("ball:4:moved(run 2, sequence 30).x", 2),
         ("artefact:moved(run 3, sequence 7)", 3),
+        ("EC0AZ@stepped(run 2, sequence 129)", 2),
+        ("EBB:harmonic2@stepped(run 12, sequence 1).cos", 12),
         ("EXX:reversal@run_time", None),
     ],
 )

@@ -28,6 +28,7 @@ EFFECTS = (
     "EXX:reversal@run_time",
     "EXX:reversal@run_time(2)",
     "EYY:poly1@run_time(3)",
+    "EXX:reversal@stepped(run 2, sequence 80)",
     "EXX:reversal@warmup45min",
     pytest.param("EZZ:poly1@warmup", marks=pytest.mark.slow),
     "EXX:reversal@settling10min",

@@ -21,7 +21,7 @@ from monitor.discovery.machine.joints.curve_findings import with_curves
 from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.mistakes.cures import Mistake
-from monitor.discovery.machine.nearest import Nearest, nearest_effect
+from monitor.discovery.machine.nearest import Nearest, nearest_effect, outdone_by
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.separation.aliases import taken_for_machine
@@ -36,6 +36,7 @@ from monitor.discovery.machine.shapes.variants import (
     without_aliases,
     without_part_periods,
 )
+from monitor.discovery.machine.step_within_run import step_within_run
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.suspects.off_alike import off_alike
@@ -43,12 +44,14 @@ from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_a
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
+from monitor.discovery.machine.suspects.stepped_within import SteppedWithin
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
 from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.effects.shapes import Const
+from monitor.exceptions import DataError
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, Verdict
@@ -72,7 +75,7 @@ class Explanation:
     ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
     there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
     ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
-    of ``missing`` in the model.
+    of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
     """
 
     comparison: ChainComparison
@@ -95,12 +98,13 @@ class Explanation:
     unchecked: bool = False
     off_targets: tuple[TargetOff, ...] = ()
     nearest: Nearest | None = None
+    stepped: SteppedWithin | None = None
     beside: Verdict = Verdict.EXPLAINED
 
     @property
     def more_is_left(self) -> bool:
-        """Whether more is left with what is missing in the model than noise leaves."""
-        return bool(self.missing) and self.beside is Verdict.SOMETHING_IS_MISSING
+        """Whether more is left with what is missing in the model, and a step, than noise leaves."""
+        return bool(self.missing or self.stepped) and self.beside is Verdict.SOMETHING_IS_MISSING
 
 
 def variants_of_campaign(
@@ -147,6 +151,8 @@ def explain(
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
     first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
+    without_step = latest
+    first, search, latest, stepped = _beside_step(first, search, latest, curves)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
@@ -155,7 +161,7 @@ def explain(
     unchecked = as_given.verdict is Verdict.SOMETHING_IS_MISSING and are_unchecked(latest.under, single)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
     verdict_beside = compare(latest.under, campaign.name, model).verdict
-    is_found = bool(missing or unfollowed or again or unchecked)
+    is_found = bool(missing or unfollowed or again or unchecked or stepped)
     verdict = Verdict.SOMETHING_IS_MISSING if is_found else verdict_beside
     return Explanation(
         comparison=replace(as_given, verdict=verdict),
@@ -175,19 +181,44 @@ def explain(
         not_followed=unfollowed,
         recurring=again,
         unchecked=unchecked,
-        nearest=_nearest(latest, search, verdict, (*missing, *unfollowed)),
+        nearest=_nearest(without_step, search, verdict, (*missing, *unfollowed), stepped),
+        stepped=stepped,
         beside=verdict_beside,
         off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
 
 
 def _nearest(
-    latest: ChainRound, search: ChainSearch, verdict: Verdict, named: Sequence[object]
+    latest: ChainRound,
+    search: ChainSearch,
+    verdict: Verdict,
+    named: Sequence[object],
+    stepped: SteppedWithin | None,
 ) -> Nearest | None:
-    """The effect that comes nearest where something is missing and nothing is ``named``."""
+    """The effect that comes nearest where something is missing and nothing is ``named``; that which a step within a run
+    took the place of comes first."""
     if named or verdict is not Verdict.SOMETHING_IS_MISSING:
         return None
+    if stepped is not None and latest.refined:
+        return outdone_by(stepped, latest.scene, [finding.candidate for finding in latest.refined])
     return nearest_effect(latest.scene, search.drivers, search.rate)
+
+
+def _beside_step(
+    first: Fit, search: ChainSearch, latest: ChainRound, curves: Sequence[ChainVariant]
+) -> tuple[Fit, ChainSearch, ChainRound, SteppedWithin | None]:
+    """A search once more beside the step within a run that it shows, if any, with its first fit and its last round;
+    nothing is asked beside curves of joints."""
+    stepped = None if curves else step_within_run(latest, search.rate)
+    if stepped is None:
+        return first, search, latest, None
+    problem = with_effects(search.problem, [stepped.effect])
+    try:
+        beside = fit(problem, search.gross.left_out(problem), first)
+    except (DataError, np.linalg.LinAlgError):
+        return first, search, latest, None
+    search = replace(search, problem=problem)
+    return beside, search, search.under(beside), stepped
 
 
 class _Searched(NamedTuple):

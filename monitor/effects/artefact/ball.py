@@ -32,7 +32,7 @@ class BallMoved(BuiltIn):
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(groups["ball"], *moment_of(groups, f"ball:{groups['ball']}"))
+        return cls(groups["ball"], *moment_of(groups, f"ball:{groups['ball']}:moved"))
 
     @property
     def text(self) -> str:

@@ -29,7 +29,7 @@ class ArtefactMoved(BuiltIn):
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(*moment_of(groups, "artefact"))
+        return cls(*moment_of(groups, "artefact:moved"))
 
     @property
     def text(self) -> str:

@@ -37,7 +37,7 @@ class Moved(BuiltIn, ABC):
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        return cls(*moment_of(groups, cls.head))
+        return cls(*moment_of(groups, f"{cls.head}:moved"))
 
     @property
     def text(self) -> str:

@@ -14,6 +14,7 @@ from monitor.effects.drivers.lagged import LaggedTemperature
 from monitor.effects.drivers.run_time import RunTime
 from monitor.effects.drivers.sequence import Sequence
 from monitor.effects.drivers.settling import Settling
+from monitor.effects.drivers.stepped import Stepped
 from monitor.effects.drivers.warmup import WarmUp
 from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.exceptions import EffectError, did_you_mean
@@ -29,6 +30,7 @@ __all__ = [
     "Sequence",
     "Settling",
     "SettlingDriver",
+    "Stepped",
     "WarmUp",
     "parse_driver",
 ]
@@ -43,11 +45,13 @@ def parse_driver(text: str) -> Driver:
     if driver is not None:
         return driver
     if column_unit(text) is None:
-        hint = did_you_mean(text, ("warmup", "settling", "run_time", "sequence", "gravity", "each_run"))
+        hint = did_you_mean(
+            text, ("warmup", "settling", "run_time", "sequence", "gravity", "each_run", "stepped")
+        )
         raise EffectError(
             f"there is no driver '@{text}'; {hint}there are @warmup (or @warmup45min), @settling, @run_time, "
-            "@sequence, @gravity, @each_run, @lagged_ with a recorded temperature, and every recorded channel, whose "
-            "name ends in a unit "
+            "@sequence, @gravity, @each_run, @stepped(run 7, sequence 23), @lagged_ with a recorded temperature, and "
+            "every recorded channel, whose name ends in a unit "
             f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)}){plug_in_patterns('monitor.drivers')}"
         )
     return Channel(text)

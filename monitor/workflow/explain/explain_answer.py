@@ -319,26 +319,32 @@ class Remaining:
 
 @dataclass(frozen=True)
 class SteppedError:
-    """An error that looks as if it stepped within a run, from a reading on, and what that would leave: the likeliest of
-    ``errors`` that these data do not tell apart."""
+    """An error that looks as if it stepped within a run, from a reading on: the likeliest of ``errors`` that these data
+    do not tell apart, by how much, and what that would leave of the RMS. ``effect`` is the step as it is added to a
+    model; effects that would have been named ``instead_of`` it say far less."""
 
+    effect: str
     errors: tuple[str, ...]
     run: int
     sequence: int
+    size: float
+    u: float
+    unit: str
+    rms_before_um: float
     rms_after_um: float
+    instead_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class NearestEffect:
     """The effect that comes nearest where none is named: what it would leave, and the rule that refuses it, by a word
-    (``refusal``) and as the clause of a sentence (``why``). ``stepped`` says more than any effect, but is none."""
+    (``refusal``) and as the clause of a sentence (``why``)."""
 
     effect: str
     rms_before_um: float
     rms_after_um: float
     refusal: str
     why: str
-    stepped: SteppedError | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -362,7 +368,8 @@ class MachineExplanation:
     ``rate`` is the false
     discovery rate of the scan, None of those that older versions stored: a larger ``q_value`` was asked for at a level
     of its own. ``runs_left_out`` are those that were broken off, say. ``nearest`` is the effect that comes nearest
-    where something is missing and none is named, None where none stands out at all.
+    where something is missing and none is named, None where none stands out at all. ``stepped`` is an error that
+    stepped once within a run, alone or beside what is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -393,6 +400,7 @@ class MachineExplanation:
     rate: float | None = field(default=None, metadata=OMITTED)
     runs_left_out: tuple[RunLeftOut, ...] | None = field(default=None, metadata=OMITTED)
     nearest: NearestEffect | None = field(default=None, metadata=OMITTED)
+    stepped: SteppedError | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)

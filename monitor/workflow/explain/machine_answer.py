@@ -226,8 +226,10 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     return (*moved, *(_step(step, units, problem.context.chain) for step in explanation.steps))
 
 
-def _remaining(explanation: Explanation) -> Remaining:
-    """What the model with all findings leaves."""
+def _remaining(explanation: Explanation) -> Remaining | None:
+    """What the model with all findings leaves; None where there are none."""
+    if not explanation.missing and explanation.stepped is None:
+        return None
     final = explanation.final
     um = MICROMETRE.to_display
     resting = np.isin(final.problem.context.target, list(final.problem.resting))[:, None]
@@ -254,13 +256,22 @@ def _nearest(explanation: Explanation) -> NearestEffect | None:
     nearest, um = explanation.nearest, MICROMETRE.to_display
     if nearest is None:
         return None
-    step = nearest.stepped
-    stepped = None
-    if step is not None:
-        stepped = SteppedError(step.errors, step.run, step.sequence, um(step.rms_after))
     return NearestEffect(
         nearest.effect, um(nearest.rms_before), um(nearest.rms_after), nearest.refusal.value,
-        WHY_REFUSED[nearest.refusal], stepped,
+        WHY_REFUSED[nearest.refusal],
+    )  # fmt: skip
+
+
+def _stepped(explanation: Explanation) -> SteppedError | None:
+    """The error that stepped within a run."""
+    step, um = explanation.stepped, MICROMETRE.to_display
+    if step is None:
+        return None
+    unit, moment, named = step.effect.unit, step.moment, {effect.effect for effect in explanation.missing}
+    return SteppedError(
+        step.effect.text, step.errors, moment.run, moment.sequence, unit.to_display(step.size),
+        unit.to_display(step.u), unit.name, um(step.rms_before), um(step.rms_after),
+        tuple(effect for effect in step.instead_of if effect not in named),
     )  # fmt: skip
 
 
@@ -318,14 +329,12 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
     suspect_data, recurring_data = (
         left_out(points, problem) for points in (explanation.suspect, explanation.recurring)
     )
-    off_targets = targets_off(explanation)
-    changes = _changes(explanation)
+    off_targets, changes = targets_off(explanation), _changes(explanation)
     scattering, unlike_runs = scattering_targets(explanation), unlike(explanation)
-    nearest = _nearest(explanation)
-    residual_map = residual_against = None
+    nearest, stepped = _nearest(explanation), _stepped(explanation)
     # Where nothing is missing there is nothing to picture.
-    if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
-        residual_map, residual_against = pictures_of(explanation, missing[0].effect if missing else None)
+    pictures = None if is_explained else pictures_of(explanation, missing[0].effect if missing else None)
+    residual_map, residual_against = pictures or (None, None)
     return MachineExplanation(
         comparison=comparison,
         missing=missing,
@@ -364,6 +373,7 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
                 off_targets=said_off(off_targets, problem.target_word),
                 contradicted=is_explained and explanation.together is Verdict.SOMETHING_IS_MISSING,
                 nearest=nearest,
+                stepped=stepped,
                 more_is_left=explanation.more_is_left,
             )
         ),
@@ -374,12 +384,13 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         recurring_data=recurring_data,
         off_targets=off_targets,
         limits_reached=tuple(explanation.limits),
-        remaining=_remaining(explanation) if missing else None,
+        remaining=_remaining(explanation),
         taken_for_machine=_aliases(explanation),
         scattering=scattering,
         unlike_runs=unlike_runs,
         added_together=_added_together([effect.effect for effect in missing]),
         nearest=nearest,
+        stepped=stepped,
     )
 
 

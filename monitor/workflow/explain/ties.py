@@ -140,7 +140,7 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
 def _driver(text: str) -> str:
     name = text.rpartition("@")[2] if "@" in text else ""
     # A run that drifts unlike the others (@run_time(3)) does not come again: more runs show whether another does.
-    name = re.sub(r"^(run_time\(\d+\)|load_each_run)$", "each_run", name)
+    name = re.sub(r"^(run_time\(\d+\)|stepped\(.*\)|load_each_run)$", "each_run", name)
     # A time constant that was searched (@warmup45min) is no other driver.
     return re.sub(r"^(warmup|settling|lagged)[\d.]+min", r"\1", name)
 

@@ -17,3 +17,4 @@ class Refusal(StrEnum):
     HELD_OUT = "held_out"
     FLIPS = "flips"
     UNSETTLED = "unsettled"
+    STEPPED = "stepped"
