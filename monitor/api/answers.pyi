@@ -51,6 +51,7 @@ from monitor.workflow.explain.explain_answer import MovedTarget
 from monitor.workflow.explain.explain_answer import NearestEffect
 from monitor.workflow.explain.explain_answer import Remaining
 from monitor.workflow.explain.explain_answer import ScatteringTarget
+from monitor.workflow.explain.explain_answer import SteppedError
 from monitor.workflow.explain.explain_answer import TargetOffInPlaces
 from monitor.workflow.explain.explain_answer import UnlikeRun
 from monitor.workflow.explain.version_answer import CurveVersion
@@ -302,6 +303,8 @@ class TypedExplainAnswer(Answer[ExplainAnswer]):
     def runs_left_out(self) -> tuple[RunLeftOut, ...] | None: ...
     @property
     def nearest(self) -> NearestEffect | None: ...
+    @property
+    def stepped(self) -> SteppedError | None: ...
     @property
     def unit(self) -> str: ...
     @property

@@ -138,6 +138,10 @@ def _next_step(explanation: MachineExplanation | CurveExplanation, campaign: str
         _add(what, together, f"{model} --as NAME{campaign}")
         if len(every) > len(together):
             _add(f"all {len(every)}", every, f"{model} --as NAME{campaign}")
+    if isinstance(explanation, MachineExplanation) and explanation.stepped is not None:
+        comparison = explanation.comparison
+        of_campaign = f"{comparison.model} --as NAME --campaign {comparison.campaign}"
+        _add("the step", (explanation.stepped.effect,), of_campaign)
 
 
 def _add(what: str, effects: Sequence[str], to: str) -> None:

@@ -9,9 +9,8 @@ import numpy as np
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
-_MOMENT = r"(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
-#: Behind the name of what moved or stepped; the moment may lack, so that its lack can be told.
-MOVED, STEPPED = (word + _MOMENT for word in ("moved", "stepped"))
+#: Behind the name of what moved; the moment may lack, so that its lack can be told.
+MOVED = r"moved(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
 
 
 def moment_of(groups: Mapping[str, str], text: str) -> tuple[int, int]:

@@ -26,8 +26,9 @@ tool_direction = [1.0, 0.0, 0.0]
 STARS, STEPS_AT = 100, 51
 
 
-def night(folder: Path, collimation: np.ndarray) -> Explanation:
-    """What is said of a night in which the collimation is off by so many rad (n,)."""
+def night(folder: Path, collimation: np.ndarray, azimuth: np.ndarray | None = None) -> Explanation:
+    """What is said of a night in which the collimation and the zero of the azimuth are off by so many rad (n,)."""
+    zero = np.zeros_like(collimation) if azimuth is None else azimuth
     rng = np.random.default_rng(3)
     mount = SimulatedChain(
         (SimulatedAxis("AZ", "rotary", Z, sign=-1), SimulatedAxis("EL", "rotary", Y, sign=-1))
@@ -38,7 +39,8 @@ def night(folder: Path, collimation: np.ndarray) -> Explanation:
             "AZ": round(float(rng.uniform(0, 360)), 5),
             "EL": round(float(np.rad2deg(np.arcsin(rng.uniform(0.26, 0.98)))), 5),
         }
-        star = mount.pose(at)[:3, :3] @ np.array([1.0, off, 0.0]) + 5e-6 * rng.standard_normal(3)
+        at_sky = {**at, "AZ": at["AZ"] + float(np.rad2deg(zero[number]))}
+        star = mount.pose(at_sky)[:3, :3] @ np.array([1.0, off, 0.0]) + 5e-6 * rng.standard_normal(3)
         star = star / np.linalg.norm(star)
         time = {"time_s": 60.0 * number, "setup": "sky"}
         rows.append({**time, **at, "direction_x": star[0], "direction_y": star[1], "direction_z": star[2]})
@@ -67,6 +69,24 @@ def test_a_collimation_that_steps_within_the_night_is_said_to(tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_a_zero_that_is_lost_is_a_step_and_the_drift_that_takes_it_up_no_finding(tmp_path: Path) -> None:
+    found = night(tmp_path, np.zeros(STARS), 60e-6 * (np.arange(STARS) >= STEPS_AT - 1))
+    assert found.missing == ()
+    step = found.stepped
+    assert step is not None
+    assert step.effect.text == f"EC0AZ@stepped(run 1, sequence {STEPS_AT})"
+    assert abs(step.size) == pytest.approx(60e-6, abs=4.0 * step.u)
+    assert step.instead_of == ("EC0AZ@run_time",)
+    assert step.effect.text in [effect.text for effect in found.final.problem.added]
+    said = machine_explanation(found)
+    assert said.nearest is not None
+    assert (said.nearest.effect, said.nearest.refusal) == ("EC0AZ@run_time", "stepped")
+    assert said.stepped is not None
+    assert said.stepped.unit == "µrad"
+    assert "EC0AZ@run_time would explain far less" in said.answer
+
+
+@pytest.mark.slow
 def test_a_collimation_that_walks_is_no_step(tmp_path: Path) -> None:
     """What comes nearest to a walk is named with what it would leave, and the noise that it may be."""
     found = night(tmp_path, 4e-6 * np.cumsum(np.random.default_rng(8).standard_normal(STARS)))
@@ -86,6 +106,7 @@ def test_more_left_than_noise_is_said_beside_what_was_found(tmp_path: Path) -> N
     drift = np.linspace(0.0, 300e-6, STARS)
     found = night(tmp_path, drift + 2e-5 * np.random.default_rng(5).standard_normal(STARS))
     assert [effect.effect for effect in found.missing] == ["ECEL:const@run_time"]
+    assert found.stepped is None
     said = machine_explanation(found)
     assert said.remaining is not None
     assert said.remaining.beyond_noise

@@ -154,6 +154,17 @@ def test_run_time_of_one_run_is_zero_in_the_others() -> None:
     assert effect.driver.phrase == ", drifting evenly in run 2 alone"
 
 
+def test_a_step_is_one_from_its_reading_to_the_end_of_its_run() -> None:
+    context = context_of(small_campaign(), parse_topology(HU40))
+    effect = parse_effect("EC0B@stepped(run 2, sequence 2)", context.chain)
+    assert columns(effect.text, context)[:, 0].tolist() == [0.0] * 4 + [1.0] * 2 + [0.0] * 6
+    assert effect.parameters(context) == ("EC0B@stepped(run 2, sequence 2)",)
+    with pytest.raises(EffectError, match=r"'@stepped\(run 9, sequence 2\)': this campaign has no run 9"):
+        columns("EC0B@stepped(run 9, sequence 2)", context)
+    with pytest.raises(EffectError, match=r"'@stepped' must say when: write @stepped\(run 7, sequence 23\)"):
+        parse_effect("EC0B@stepped", context.chain)
+
+
 def test_run_time_of_a_run_with_one_probing_is_zero() -> None:
     context = context_of(small_campaign(1), parse_topology(HU40))
     assert columns("EXX:const@run_time", context).ravel().tolist() == [0.0] * 4

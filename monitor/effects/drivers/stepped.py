@@ -12,7 +12,7 @@ from monitor.effects.context import Context
 from monitor.effects.description import OF_RUNS, OWN_DOCUMENT, Explanation
 from monitor.effects.driver import DescribedDriver
 from monitor.effects.joint_error import JointError
-from monitor.effects.slip import STEPPED, moment_of
+from monitor.effects.slip import moment_of
 from monitor.exceptions import EffectError
 from monitor.records import Array
 
@@ -23,7 +23,8 @@ class Stepped(DescribedDriver):
 
     run: int
     sequence: int
-    pattern: ClassVar[str] = STEPPED
+    # The moment may lack, so that its lack can be told; the text of a driver is kept as it is written.
+    pattern: ClassVar[str] = r"stepped(?:\(run (?P<run>\d+), sequence (?P<sequence>\d+)\))?"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
