@@ -36,7 +36,7 @@ from monitor.discovery.machine.shapes.variants import (
     without_aliases,
     without_part_periods,
 )
-from monitor.discovery.machine.step_within_run import step_within_run
+from monitor.discovery.machine.step_within_run import searched_beside_step
 from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.suspects.off_alike import off_alike
@@ -51,7 +51,6 @@ from monitor.discovery.machine.suspects.varying import varying_effects
 from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.effects.shapes import Const
-from monitor.exceptions import DataError
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, Verdict
@@ -151,8 +150,9 @@ def explain(
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
     first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
-    without_step = latest
-    first, search, latest, stepped = _beside_step(first, search, latest, curves)
+    without_step, stepped = latest, None
+    if not curves:
+        first, search, latest, stepped = searched_beside_step(first, search, latest)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
@@ -202,23 +202,6 @@ def _nearest(
     if stepped is not None and latest.refined:
         return outdone_by(stepped, latest.scene, [finding.candidate for finding in latest.refined])
     return nearest_effect(latest.scene, search.drivers, search.rate)
-
-
-def _beside_step(
-    first: Fit, search: ChainSearch, latest: ChainRound, curves: Sequence[ChainVariant]
-) -> tuple[Fit, ChainSearch, ChainRound, SteppedWithin | None]:
-    """A search once more beside the step within a run that it shows, if any, with its first fit and its last round;
-    nothing is asked beside curves of joints."""
-    stepped = None if curves else step_within_run(latest, search.rate)
-    if stepped is None:
-        return first, search, latest, None
-    problem = with_effects(search.problem, [stepped.effect])
-    try:
-        beside = fit(problem, search.gross.left_out(problem), first)
-    except (DataError, np.linalg.LinAlgError):
-        return first, search, latest, None
-    search = replace(search, problem=problem)
-    return beside, search, search.under(beside), stepped
 
 
 class _Searched(NamedTuple):

@@ -5,16 +5,63 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from monitor.discovery.machine.compare import compare
 from monitor.discovery.machine.evidence.poses import poses_of_rows
+from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import name_of
 from monitor.discovery.machine.nearest import in_independent_noise, leading
-from monitor.discovery.machine.rounds import ChainRound
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.rounds import ChainRound, ChainSearch
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
 from monitor.discovery.machine.suspects.stepped_within import SteppedWithin, stepped_within
+from monitor.discovery.machine.suspects.suspects import with_effects
 from monitor.effects.driver import HeatDriver
+from monitor.exceptions import DataError
 from monitor.records import Verdict
+
+
+class BesideStep(NamedTuple):
+    """A search with the step within a run in its problem, if there is one, the fit that it begins with, and its last
+    round."""
+
+    first: Fit
+    search: ChainSearch
+    latest: ChainRound
+    stepped: SteppedWithin | None
+
+
+def searched_beside_step(first: Fit, search: ChainSearch, latest: ChainRound) -> BesideStep:
+    """Search once more beside the step within a run that a search shows; that search where it shows none.
+
+    Where neighbours share noise that walks, a drift beside the step may be what is left of both: it has to be one that
+    was named without the step.
+    """
+    as_it_was = BesideStep(first, search, latest, None)
+    stepped = step_within_run(latest, search.rate)
+    if stepped is None:
+        return as_it_was
+    problem = with_effects(search.problem, [stepped.effect])
+    try:
+        beside = fit(problem, search.gross.left_out(problem), first)
+    except (DataError, np.linalg.LinAlgError):
+        return as_it_was
+    search = replace(search, problem=problem)
+    again = search.under(beside)
+    named = [finding.candidate for finding in again.refined]
+    if any(_is_drift(each.effect) and each.family not in latest.families for each in named):
+        variants = [
+            each for each in search.variants if not _is_drift(each.effect) or each.family in latest.families
+        ]
+        again = replace(search, variants=variants).under(beside)
+    return BesideStep(beside, search, again, stepped)
+
+
+def _is_drift(effect: MachineEffect) -> bool:
+    """Whether an effect follows the time or a temperature."""
+    return isinstance(effect.driver, HeatDriver)
 
 
 def step_within_run(latest: ChainRound, rate: float) -> SteppedWithin | None:
@@ -49,7 +96,7 @@ def _in_place_of(
     named: Sequence[ChainCandidate],
 ) -> Iterator[tuple[list[ChainCandidate], list[ChainCandidate]]]:
     """What may stay beside a step, and what it would take the place of: the drifts, or all that was named."""
-    drifts = [each for each in named if isinstance(each.effect.driver, HeatDriver)]
+    drifts = [each for each in named if _is_drift(each.effect)]
     rest = [each for each in named if all(each is not drift for drift in drifts)]
     if drifts:
         yield rest, drifts
