@@ -120,8 +120,7 @@ def stepped_within(
         worth = price - sum(basis.size for basis in more) * np.log(beside.degrees_of_freedom)
         if _deviance(walking, [*bases, *more]) - least - worth < UNDECIDED:
             return None
-    gradual, forms = _gradual(fit, first)
-    if min(_deviance(noisy, [*bases, basis]) for basis in gradual) + 2.0 * np.log(forms) < least:
+    if min(_deviance(noisy, [*bases, gradual]) for gradual in _gradual(fit, first)) < least:
         return None
     likely = sorted(zip(costs, steps, strict=True), key=lambda each: each[0])
     effects = tuple(step.effect for cost, step in likely if cost < least + UNDECIDED)
@@ -233,9 +232,8 @@ class _Search:
         return _Step(drift, run, int(moments[index]), score)
 
 
-def _gradual(fit: Fit, step: _Step) -> tuple[list[ChainBasis], int]:
-    """The error of a step that goes over within some readings, evenly or settling, about its moment, and in how many
-    forms at each moment."""
+def _gradual(fit: Fit, step: _Step) -> list[ChainBasis]:
+    """The error of a step that goes over within some readings, evenly or settling, about its moment."""
     context = fit.problem.context
     of_run = context.run == step.run
     moments = np.unique(context.sequence[of_run])
@@ -243,7 +241,7 @@ def _gradual(fit: Fit, step: _Step) -> tuple[list[ChainBasis], int]:
     at = int(np.searchsorted(moments, step.sequence))
     constant = _steady(step.drift).basis(context)
     bases = []
-    forms, width = 0, READINGS_EACH_SIDE
+    width = READINGS_EACH_SIDE
     while width < 2 * len(moments):
         for begin in range(max(at - width, 0), at + 1, max(width // READINGS_EACH_SIDE, 1)):
             since = np.maximum(number - begin + 1, 0) / width
@@ -252,8 +250,7 @@ def _gradual(fit: Fit, step: _Step) -> tuple[list[ChainBasis], int]:
                 for part in (np.minimum(since, 1.0), -np.expm1(-2.0 * since))
             ]
         width *= 2
-        forms += 2
-    return bases, forms
+    return bases
 
 
 def _deviance(fit: Fit, bases: Sequence[Basis]) -> float:
