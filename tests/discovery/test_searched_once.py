@@ -76,7 +76,7 @@ MUCH = Correlation(0.6, 0.5)
 
 @pytest.mark.parametrize("besides", [False, True], ids=["the same", "with a drift of noise"])
 def test_steady_effects_stand_under_other_noise_and_drifts_that_are_noise_fall(searched, besides):
-    fitted, variants, scene, result = searched
+    fitted, variants, _, result = searched
     chain = fitted.problem.context.chain
     drift = variants_of(parse_effect("EXX:poly2@run_time", chain))
     with_drifts = scene_of(fitted, [*variants, *drift])

@@ -14,13 +14,16 @@ from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
 from monitor.discovery.machine.shapes.flexible import error_of
 from monitor.discovery.machine.shapes.free_parts import is_free, of_parts, parts_anew
 from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.shapes.scale_steps import steps_of
 from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.teeth import teeth_of
 from monitor.discovery.machine.suspects.station_moves import station_moves
 from monitor.discovery.search.scan import ScanResult, by_error_taken_away, except_for, findings_of, scan
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
+from monitor.effects.shapes import Sawtooth, Step
 
-# Parts of free shapes chosen anew that have not settled after so many turns are searched.
+# Parts and edges chosen anew that have not settled after so many turns are searched.
 MOST_TURNS = 4
 
 
@@ -47,27 +50,32 @@ def found_in_other_noise(
     scene: ChainScene, first: ChainScan, earlier: Found, drivers: Sequence[str], rate: float
 ) -> Found | None:
     """What was found under an ``earlier`` noise without what is noise under this one, of which ``first`` is what the
-    first scan found: steady effects stand by the places that were measured, whatever the noise. None where a scan that
-    begins with them adds to them, where they drift and the first scan does not name them, or something new stands out.
+    first scan found: steady effects stand by the places that were measured, whatever the noise.
+
+    None where a scan that begins with them adds to them, where the first scan does not name a drift or the error of
+    what has edges, or where something new stands out.
     """
     texts = {candidate.effect.text for candidate in scene.candidates}
     lacking = [each.variant for each in earlier.scene.candidates if each.effect.text not in texts]
     scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, lacking).candidates))
     begin = _in_scene(scene, earlier.result.candidates)
-    standing = begin
+    standing, result = begin, None
     for _ in range(MOST_TURNS):
-        shaped = _in_parts_anew(scene, standing)
+        shaped = _shaped_anew(scene, standing)
+        if result is not None and _are_same(shaped, standing):
+            break
         result = _without_other_shapes(scene, _scanned(scene, shaped, drivers, rate))
         if not result.candidates or not all(_is_among(each, shaped) for each in result.candidates):
             return None
-        if _are_same(result.candidates, standing):
-            break
         standing = [each for each in shaped if _is_among(each, result.candidates)]
     else:
         return None
     errors = {error_of(each) for each in standing}
     fallen = [each for each in begin if error_of(each) not in errors]
     if any(is_steady(each) and not is_free(each) for each in fallen):
+        return None
+    named = {error_of(each) for each in first.candidates}
+    if not named >= {error_of(each) for each in standing if _has_edges(each)}:
         return None
     if _names_of_drifts(standing) != _names_of_drifts(first.candidates) or _stands_out(scene, standing, rate):
         return None
@@ -92,21 +100,52 @@ def _names_of_drifts(candidates: Sequence[ChainCandidate]) -> set[str]:
     return {candidate.family for candidate in candidates if not is_steady(candidate)}
 
 
-def _in_parts_anew(scene: ChainScene, selected: Sequence[ChainCandidate]) -> list[ChainCandidate]:
-    """The selected effects with the parts of free shapes chosen anew, each beside the others as they were; without
-    those of which no part is worth its price."""
+def _shaped_anew(scene: ChainScene, selected: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+    """The selected effects with the parts of free shapes and the places of edges chosen anew, each beside the others as
+    they were; without those of which none is worth its price."""
     parts = iter(parts_anew(scene, selected))
-    shaped = []
+    shaped: list[ChainCandidate] = []
     for index, effect in enumerate(selected):
-        chosen = next(parts) if is_free(effect) else []
-        if not chosen:
-            shaped += [] if is_free(effect) else [effect]
-            continue
-        symbol = error_of(effect)
-        shapes = [each for each in scene.candidates if error_of(each) == symbol and not is_free(each)]
-        anew = of_parts(scene, symbol, chosen, shapes, except_for(selected, index))
-        shaped.append(effect if anew.effect.text == effect.effect.text else anew)
+        mine = [each for each in selected if error_of(each) == error_of(effect)]
+        if is_free(effect):
+            if chosen := next(parts):
+                shaped += _anew([effect], [_free(scene, effect, chosen, except_for(selected, index))])
+        elif not any(map(_has_edges, mine)):
+            shaped.append(effect)
+        elif effect is mine[0]:
+            others = [each for each in selected if not _is_among(each, mine)]
+            of_error = teeth_of if any(map(_has_teeth, mine)) else steps_of
+            edges = of_error(scene, effect)
+            shaped += [] if edges is None else _anew(mine, edges.beside(others))
     return shaped
+
+
+def _free(
+    scene: ChainScene, shape: ChainCandidate, parts: Sequence[int], others: Sequence[ChainCandidate]
+) -> ChainCandidate:
+    """The error of a free shape in other parts."""
+    symbol = error_of(shape)
+    shapes = [each for each in scene.candidates if error_of(each) == symbol and not is_free(each)]
+    return of_parts(scene, symbol, parts, shapes, others)
+
+
+def _anew(before: Sequence[ChainCandidate], chosen: Sequence[ChainCandidate]) -> Sequence[ChainCandidate]:
+    """What was chosen anew, as the candidates before where these are the same effects."""
+    same = {each.effect.text for each in before} == {each.effect.text for each in chosen}
+    return before if same else chosen
+
+
+def _has_teeth(candidate: ChainCandidate) -> bool:
+    effect = candidate.effect
+    return isinstance(effect, ChainEffect) and isinstance(effect.shape, Sawtooth)
+
+
+def _has_edges(candidate: ChainCandidate) -> bool:
+    """Whether the place of an edge was searched."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect) and isinstance(effect.shape, Sawtooth | Step) and is_steady(candidate)
+    )
 
 
 def _stands_out(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> bool:
