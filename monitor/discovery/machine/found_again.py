@@ -38,7 +38,7 @@ def still_found(scene: ChainScene, near: Found, drivers: Sequence[str], rate: fl
     """What a scan that begins with the findings in a ``near`` scene of the same candidates finds, where it is these and
     nothing else, and parts of free shapes would be chosen as there; else None."""
     begin = _in_scene(scene, near.result.candidates)
-    result = _scanned(scene, begin, drivers, rate)
+    result = _scanned(scene, begin, ChainAcceptance(scene, drivers, rate))
     if not _are_same(result.candidates, begin):
         return None
     if parts_anew(scene, begin) != parts_anew(near.scene, near.result.candidates):
@@ -59,35 +59,61 @@ def found_in_other_noise(
     lacking = [each.variant for each in earlier.scene.candidates if each.effect.text not in texts]
     scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, lacking).candidates))
     begin = _in_scene(scene, earlier.result.candidates)
-    standing, result = begin, None
-    for _ in range(MOST_TURNS):
-        shaped = _shaped_anew(scene, standing)
-        if result is not None and _are_same(shaped, standing):
-            break
-        result = _without_other_shapes(scene, _scanned(scene, shaped, drivers, rate))
-        if not result.candidates or not all(_is_among(each, shaped) for each in result.candidates):
-            return None
-        standing = [each for each in shaped if _is_among(each, result.candidates)]
-    else:
+    result = _settled(scene, begin, first, ChainAcceptance(scene, drivers, rate))
+    if result is None:
         return None
-    errors = {error_of(each) for each in standing}
-    fallen = [each for each in begin if error_of(each) not in errors]
-    if any(is_steady(each) and not is_free(each) for each in fallen):
-        return None
-    named = {error_of(each) for each in first.candidates}
-    if not named >= {error_of(each) for each in standing if _has_edges(each)}:
-        return None
-    if _names_of_drifts(standing) != _names_of_drifts(first.candidates) or _stands_out(scene, standing, rate):
+    standing = result.candidates
+    is_sound = _only_noise_fell(begin, standing) and _is_named_by(first, standing)
+    if not is_sound or _stands_out(scene, standing, rate):
         return None
     return Found(scene, by_error_taken_away(scene, result))
 
 
-def _without_other_shapes(scene: ChainScene, result: ChainScan) -> ChainScan:
-    """A result without other shapes of errors that have a free one: what they add its parts would say at less than
-    their price."""
-    free = {error_of(each) for each in result.candidates if is_free(each)}
-    kept = [each for each in result.candidates if is_free(each) or error_of(each) not in free]
-    return result if len(kept) == len(result.findings) else ScanResult(findings_of(scene, kept))
+def _settled(
+    scene: ChainScene, begin: Sequence[ChainCandidate], first: ChainScan, rules: ChainAcceptance
+) -> ChainScan | None:
+    """What stands of the effects to ``begin`` with, in parts and edges chosen anew, once these stay; None where a scan
+    adds to them, or nothing stands."""
+    standing, result = list(begin), None
+    for _ in range(MOST_TURNS):
+        shaped = _shaped_anew(scene, standing)
+        if result is not None and _are_same(shaped, standing):
+            return result
+        result = _without_other_shapes(scene, shaped, _scanned(scene, shaped, rules), first)
+        standing = [each for each in shaped if _is_among(each, result.candidates)]
+        if not standing or len(standing) < len(result.findings):
+            return None
+    return None
+
+
+def _only_noise_fell(begin: Sequence[ChainCandidate], standing: Sequence[ChainCandidate]) -> bool:
+    """Whether all errors that do not stand any more are what noise of neighbours may do: drifts, and free shapes."""
+    errors = {error_of(each) for each in standing}
+    fallen = [each for each in begin if error_of(each) not in errors]
+    return all(is_free(each) or not is_steady(each) for each in fallen)
+
+
+def _is_named_by(first: ChainScan, standing: Sequence[ChainCandidate]) -> bool:
+    """Whether a first scan names the same drifts, and all errors of which edges stand."""
+    errors = {error_of(each) for each in first.candidates}
+    with_edges = {error_of(each) for each in standing if _has_edges(each)}
+    return with_edges <= errors and _names_of_drifts(standing) == _names_of_drifts(first.candidates)
+
+
+def _without_other_shapes(
+    scene: ChainScene, begin: Sequence[ChainCandidate], result: ChainScan, first: ChainScan
+) -> ChainScan:
+    """A result without what it adds to the errors that it began with: parts of a free shape would say that at less than
+    their price, and other shapes count that the first scan of all names, too."""
+    of_begin = {error_of(each) for each in begin}
+    free = {error_of(each) for each in begin if is_free(each)}
+    named = {each.family for each in first.candidates if error_of(each) not in free}
+    standing = [
+        each
+        for each in result.candidates
+        if _is_among(each, begin) or error_of(each) not in of_begin or each.family in named
+    ]
+    return result if len(standing) == len(result.findings) else ScanResult(findings_of(scene, standing))
 
 
 def is_steady(candidate: ChainCandidate) -> bool:
@@ -103,13 +129,13 @@ def _names_of_drifts(candidates: Sequence[ChainCandidate]) -> set[str]:
 def _shaped_anew(scene: ChainScene, selected: Sequence[ChainCandidate]) -> list[ChainCandidate]:
     """The selected effects with the parts of free shapes and the places of edges chosen anew, each beside the others as
     they were; without those of which none is worth its price."""
-    parts = iter(parts_anew(scene, selected))
+    parts_of_each = iter(parts_anew(scene, selected))
     shaped: list[ChainCandidate] = []
     for index, effect in enumerate(selected):
         mine = [each for each in selected if error_of(each) == error_of(effect)]
         if is_free(effect):
-            if chosen := next(parts):
-                shaped += _anew([effect], [_free(scene, effect, chosen, except_for(selected, index))])
+            if parts := next(parts_of_each):
+                shaped += _anew([effect], [_free(scene, effect, parts, except_for(selected, index))])
         elif not any(map(_has_edges, mine)):
             shaped.append(effect)
         elif effect is mine[0]:
@@ -129,10 +155,10 @@ def _free(
     return of_parts(scene, symbol, parts, shapes, others)
 
 
-def _anew(before: Sequence[ChainCandidate], chosen: Sequence[ChainCandidate]) -> Sequence[ChainCandidate]:
-    """What was chosen anew, as the candidates before where these are the same effects."""
-    same = {each.effect.text for each in before} == {each.effect.text for each in chosen}
-    return before if same else chosen
+def _anew(before: Sequence[ChainCandidate], after: Sequence[ChainCandidate]) -> Sequence[ChainCandidate]:
+    """The effects ``after`` a new choice, as the candidates ``before`` where they are the same."""
+    same = {each.effect.text for each in before} == {each.effect.text for each in after}
+    return before if same else after
 
 
 def _has_teeth(candidate: ChainCandidate) -> bool:
@@ -169,10 +195,8 @@ def _in_scene(scene: ChainScene, selected: Sequence[ChainCandidate]) -> list[Cha
     return [candidates[each.effect.text] for each in selected]
 
 
-def _scanned(
-    scene: ChainScene, begin: Sequence[ChainCandidate], drivers: Sequence[str], rate: float
-) -> ChainScan:
-    return standing_out(scene, scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate, begin=begin))
+def _scanned(scene: ChainScene, begin: Sequence[ChainCandidate], rules: ChainAcceptance) -> ChainScan:
+    return standing_out(scene, scan(scene, rules, rate=rules.rate, begin=begin))
 
 
 def _are_same(some: Sequence[ChainCandidate], others: Sequence[ChainCandidate]) -> bool:
