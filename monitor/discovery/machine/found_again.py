@@ -94,10 +94,13 @@ def _only_noise_fell(begin: Sequence[ChainCandidate], standing: Sequence[ChainCa
 
 
 def _is_named_by(first: ChainScan, standing: Sequence[ChainCandidate]) -> bool:
-    """Whether a first scan names the same drifts, and all errors of which edges stand."""
+    """Whether a first scan names the same drifts, and all errors of which edges stand; in place of a free shape or of
+    edges it may name drifts of that error."""
     errors = {error_of(each) for each in first.candidates}
     with_edges = {error_of(each) for each in standing if _has_edges(each)}
-    return with_edges <= errors and _names_of_drifts(standing) == _names_of_drifts(first.candidates)
+    searched = with_edges | {error_of(each) for each in standing if is_free(each)}
+    named = [each for each in first.candidates if error_of(each) not in searched]
+    return with_edges <= errors and _names_of_drifts(standing) == _names_of_drifts(named)
 
 
 def _without_other_shapes(
