@@ -21,7 +21,7 @@ from monitor.discovery.machine.suspects.station_moves import station_moves
 from monitor.discovery.search.scan import ScanResult, by_error_taken_away, except_for, findings_of, scan
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import Always
-from monitor.effects.shapes import Sawtooth, Step
+from monitor.effects.shapes import Nodes, Sawtooth, Step
 
 # Parts and edges chosen anew that have not settled after so many turns are searched.
 MOST_TURNS = 4
@@ -56,7 +56,9 @@ def found_in_other_noise(
     what has edges, or where something new stands out.
     """
     texts = {candidate.effect.text for candidate in scene.candidates}
-    lacking = [each.variant for each in earlier.scene.candidates if each.effect.text not in texts]
+    # Shapes that were searched for under that noise are asked for where they stand, and chosen anew.
+    catalogued = [each for each in earlier.scene.candidates if not _is_searched(each)]
+    lacking = [each.variant for each in catalogued if each.effect.text not in texts]
     scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, lacking).candidates))
     begin = _in_scene(scene, earlier.result.candidates)
     result = _settled(scene, begin, first, ChainAcceptance(scene, drivers, rate))
@@ -66,6 +68,8 @@ def found_in_other_noise(
     is_sound = _only_noise_fell(begin, standing) and _is_named_by(first, standing)
     if not is_sound or _stands_out(scene, standing, rate):
         return None
+    new = [each for each in standing if not _is_among(each, scene.candidates)]
+    scene = replace(scene, candidates=(*scene.candidates, *new))
     return Found(scene, by_error_taken_away(scene, result))
 
 
@@ -94,11 +98,11 @@ def _only_noise_fell(begin: Sequence[ChainCandidate], standing: Sequence[ChainCa
 
 
 def _is_named_by(first: ChainScan, standing: Sequence[ChainCandidate]) -> bool:
-    """Whether a first scan names the same drifts, and all errors of which edges stand; in place of a free shape or of
-    edges it may name drifts of that error."""
+    """Whether a first scan names the same drifts, and all errors of which edges stand; it may name drifts of an error
+    that stands in a free shape, a table or edges."""
     errors = {error_of(each) for each in first.candidates}
     with_edges = {error_of(each) for each in standing if _has_edges(each)}
-    searched = with_edges | {error_of(each) for each in standing if is_free(each)}
+    searched = {error_of(each) for each in standing if _is_searched(each)}
     named = [each for each in first.candidates if error_of(each) not in searched]
     return with_edges <= errors and _names_of_drifts(standing) == _names_of_drifts(named)
 
@@ -106,10 +110,11 @@ def _is_named_by(first: ChainScan, standing: Sequence[ChainCandidate]) -> bool:
 def _without_other_shapes(
     scene: ChainScene, begin: Sequence[ChainCandidate], result: ChainScan, first: ChainScan
 ) -> ChainScan:
-    """A result without what it adds to the errors that it began with: parts of a free shape would say that at less than
-    their price, and other shapes count that the first scan of all names, too."""
-    of_begin = {error_of(each) for each in begin}
-    free = {error_of(each) for each in begin if is_free(each)}
+    """A result without what it adds to those errors that stand as it began with them: parts of a free shape would say
+    that at less than their price, and other shapes count that the first scan of all names, too."""
+    still = [each for each in begin if _is_among(each, result.candidates)]
+    of_begin = {error_of(each) for each in still}
+    free = {error_of(each) for each in still if is_free(each)}
     named = {each.family for each in first.candidates if error_of(each) not in free}
     standing = [
         each
@@ -162,6 +167,13 @@ def _anew(before: Sequence[ChainCandidate], after: Sequence[ChainCandidate]) -> 
     """The effects ``after`` a new choice, as the candidates ``before`` where they are the same."""
     same = {each.effect.text for each in before} == {each.effect.text for each in after}
     return before if same else after
+
+
+def _is_searched(candidate: ChainCandidate) -> bool:
+    """Whether a search made the shape of an effect out of parts, nodes or edges."""
+    effect = candidate.effect
+    is_table = isinstance(effect, ChainEffect) and isinstance(effect.shape, Nodes)
+    return is_table or is_free(candidate) or _has_edges(candidate)
 
 
 def _has_teeth(candidate: ChainCandidate) -> bool:

@@ -258,19 +258,23 @@ class _Rounds:
         """What a whole search found under the same conditions but for noise that hardly differs; None where there was
         none."""
         for earlier in self._earlier_rounds():
-            if earlier.whole and is_next(earlier.correlation, self.correlation):
+            same = earlier.suspects.conditions == self.suspects.conditions
+            if same and earlier.whole and is_next(earlier.correlation, self.correlation):
                 return earlier
         return None
 
     def _earlier_rounds(self) -> list[ChainRound]:
-        """The rounds under the same conditions but for the noise of which all that was found could be fitted."""
-        conditions = self.suspects.conditions, self.sides, (*self.unfitted,)
-        return [
+        """The rounds under the same conditions but for the noise and single readings that are left out, of which all
+        that was found could be fitted; those that left out the same readings last."""
+        _, *others = self.suspects.conditions
+        alike = [
             earlier
             for earlier in self.before.rounds.values()
-            if conditions == (earlier.suspects.conditions, earlier.sides, earlier.unfitted)
+            if [*earlier.suspects.conditions[1:], earlier.sides, earlier.unfitted]
+            == [*others, self.sides, (*self.unfitted,)]
             and self._is_able(earlier)
         ]
+        return sorted(alike, key=lambda earlier: earlier.suspects.conditions == self.suspects.conditions)
 
     def _is_able(self, earlier: ChainRound) -> bool:
         """Whether all that was found in a round could be fitted."""
