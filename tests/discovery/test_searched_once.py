@@ -1,4 +1,5 @@
-"""What is not searched twice: what stands under conditions that hardly differ, and edges that cannot be worth it."""
+"""What is not searched twice: what stands under conditions that hardly differ or under other noise, and edges that
+cannot be worth it."""
 
 from __future__ import annotations
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from monitor.discovery import explain, fit
+from monitor.discovery.machine.found_again import Found, found_in_other_noise, still_found
 from monitor.discovery.machine.noise.correlation import Correlation, is_next
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.search import search_chain, still_found
+from monitor.discovery.machine.search import first_found, search_chain
 from monitor.discovery.machine.shapes import edges
 from monitor.discovery.machine.shapes.free_parts import most_together, priced
 from monitor.discovery.machine.shapes.variants import variants_of
@@ -39,7 +41,7 @@ def searched(virtual_campaigns):
 def test_what_a_scan_neither_adds_to_nor_takes_from_is_found_again(searched, noise):
     fitted, variants, scene, result = searched
     under = scene_of(fitted.with_correlation(noise), variants)
-    again = still_found(under, (scene, result), (), 0.01)
+    again = still_found(under, Found(scene, result), (), 0.01)
     assert again is not None
     names = [each.effect.text for each in again.candidates]
     assert sorted(names) == sorted(each.effect.text for each in result.candidates)
@@ -55,7 +57,64 @@ def test_what_a_scan_adds_to_or_takes_from_is_searched_anew(searched, change):
         candidate = next(each for each in scene.candidates if each.effect.text == "EZZ:poly3")
         evidence = result.findings[0].evidence._replace(candidate=candidate)
         findings = (*result.findings, replace(result.findings[0], evidence=evidence))
-    assert still_found(scene, (scene, replace(result, findings=findings)), (), 0.01) is None
+    assert still_found(scene, Found(scene, replace(result, findings=findings)), (), 0.01) is None
+
+
+def named_as(result, *texts):
+    """A result of which the findings, the same evidence for all, are those of other candidates of its scene."""
+    scene, found = result
+    candidates = [next(each for each in scene.candidates if each.effect.text == text) for text in texts]
+    like = found.findings[0]
+    findings = tuple(
+        replace(like, evidence=like.evidence._replace(candidate=candidate)) for candidate in candidates
+    )
+    return Found(scene, replace(found, findings=findings))
+
+
+MUCH = Correlation(0.6, 0.5)
+
+
+@pytest.mark.parametrize("besides", [False, True], ids=["the same", "with a drift of noise"])
+def test_steady_effects_stand_under_other_noise_and_drifts_that_are_noise_fall(searched, besides):
+    fitted, variants, _, result = searched
+    chain = fitted.problem.context.chain
+    drift = variants_of(parse_effect("EXX:poly2@run_time", chain))
+    with_drifts = scene_of(fitted, [*variants, *drift])
+    names = sorted(each.effect.text for each in result.candidates)
+    drifting = [each.effect.text for each in with_drifts.candidates if "@" in each.effect.text][:1]
+    earlier = named_as((with_drifts, result), *names, *(drifting if besides else []))
+    under = scene_of(fitted.with_correlation(MUCH), [*variants, *drift])
+    again = found_in_other_noise(under, first_found(under, (), 0.01), earlier, (), 0.01)
+    assert again is not None
+    assert sorted(each.effect.text for each in again.result.candidates) == names
+    _, anew = search_chain(under, (), 0.01)
+    assert [each.effect.text for each in again.result.candidates] == [
+        each.effect.text for each in anew.candidates
+    ]
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [("EYX:poly2",), ("EYX:poly2", "EXC:harmonic2", "EZZ:poly3"), ("EZZ:poly3",)],
+    ids=["one less", "a steady one more", "another one"],
+)
+def test_what_a_scan_adds_or_a_steady_effect_that_falls_is_searched_anew_under_other_noise(searched, texts):
+    fitted, variants, scene, result = searched
+    under = scene_of(fitted.with_correlation(MUCH), variants)
+    first = first_found(under, (), 0.01)
+    assert found_in_other_noise(under, first, named_as((scene, result), *texts), (), 0.01) is None
+
+
+def test_a_drift_that_a_scan_under_other_noise_does_not_name_is_searched_anew(searched):
+    fitted, variants, scene, result = searched
+    under = scene_of(fitted.with_correlation(MUCH), variants)
+    first = first_found(under, (), 0.01)
+    assert found_in_other_noise(under, first, Found(scene, result), (), 0.01) is not None
+    chain = fitted.problem.context.chain
+    drifting = scene_of(under.fit, variants_of(parse_effect("EXX:poly2@run_time", chain))).candidates[0]
+    evidence = first.findings[0].evidence._replace(candidate=drifting)
+    drifts = replace(first, findings=(*first.findings, replace(first.findings[0], evidence=evidence)))
+    assert found_in_other_noise(under, drifts, Found(scene, result), (), 0.01) is None
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 
 from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
+from monitor.discovery.machine.found_again import Found, found_in_other_noise, still_found
 from monitor.discovery.machine.joints.robot_search import (
     MOST_EFFECTS as MOST_BESIDE_CURVES,
     search_beside_curves,
@@ -19,7 +20,7 @@ from monitor.discovery.machine.joints.robot_search import (
 from monitor.discovery.machine.missing import told_apart
 from monitor.discovery.machine.noise.correlation import Correlation, caution, is_next
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, MachineEffect, scene_of
-from monitor.discovery.machine.search import first_found, search_chain, still_found
+from monitor.discovery.machine.search import first_found, search_chain
 from monitor.discovery.machine.shapes.free_parts import price_of_parts
 from monitor.discovery.machine.shapes.refine import Refined
 from monitor.discovery.machine.shapes.tables import ChainScan
@@ -79,6 +80,12 @@ class ChainRound:
     def effects(self) -> list[MachineEffect]:
         """The effects that were found."""
         return [finding.candidate.effect for finding in self.refined]
+
+    @property
+    def correlation(self) -> Correlation | None:
+        """The noise of neighbours under which it was searched."""
+        noise = self.scene.fit.whitening
+        return None if noise is None else noise.correlation
 
     @property
     def families(self) -> frozenset[str]:
@@ -209,7 +216,7 @@ class _Rounds:
         if conditions not in self.before.rounds:
             searched = self._round(self._near())
             if self._with_new_sides(searched.scene, [finding.candidate for finding in searched.refined]):
-                searched = self._round(searched if self._is_able(searched) else None)
+                searched = self._round(searched if searched.whole and self._is_able(searched) else None)
             # What effects beside each other leave was of this search: a scene without it is a fifth as large.
             searched = replace(searched, scene=replace(searched.scene))
             self.before.rounds |= dict.fromkeys((conditions, self._conditions), searched)
@@ -250,25 +257,35 @@ class _Rounds:
     def _near(self) -> ChainRound | None:
         """What a whole search found under the same conditions but for noise that hardly differs; None where there was
         none."""
-        conditions = self.suspects.conditions, self.sides, (*self.unfitted,)
-        for earlier in self.before.rounds.values():
-            noise = earlier.scene.fit.whitening
-            same = conditions == (earlier.suspects.conditions, earlier.sides, earlier.unfitted)
-            near = noise is not None and is_next(noise.correlation, self.correlation)
-            if same and near and self._is_able(earlier):
+        for earlier in self._earlier_rounds():
+            same = earlier.suspects.conditions == self.suspects.conditions
+            if same and earlier.whole and is_next(earlier.correlation, self.correlation):
                 return earlier
         return None
 
+    def _earlier_rounds(self) -> list[ChainRound]:
+        """The rounds under the same conditions but for the noise and single readings that are left out, of which all
+        that was found could be fitted; those that left out the same readings last."""
+        _, *others = self.suspects.conditions
+        alike = [
+            earlier
+            for earlier in self.before.rounds.values()
+            if [*earlier.suspects.conditions[1:], earlier.sides, earlier.unfitted]
+            == [*others, self.sides, (*self.unfitted,)]
+            and self._is_able(earlier)
+        ]
+        return sorted(alike, key=lambda earlier: earlier.suspects.conditions == self.suspects.conditions)
+
     def _is_able(self, earlier: ChainRound) -> bool:
-        """Whether all was searched in a round, and what it found could be fitted."""
-        return earlier.whole and not earlier.unable and not self.beside_curves
+        """Whether all that was found in a round could be fitted."""
+        return not earlier.unable and not self.beside_curves
 
     def _round(self, near: ChainRound | None) -> ChainRound:
         """Search effects under the present conditions; what was found under ``near`` ones is what is found, where a
         scan that begins with it neither adds to it nor takes from it."""
         suspects, out = self.suspects, self.suspects.left_out(self.search.problem)
         again = None if near is None else self._again(self._noisy(), near)
-        scene, result = again or self._scan()
+        (scene, result), whole = self._scan() if again is None else (again, False)
         result, refined = told_apart(scene, result)
         effects = [finding.candidate.effect for finding in refined]
         under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
@@ -282,7 +299,7 @@ class _Rounds:
             unable,
             (*self.unfitted,),
             sides=self.sides,
-            whole=again is None,
+            whole=whole,
         )
 
     def judged(self, current: ChainRound) -> ChainRound | None:
@@ -313,24 +330,30 @@ class _Rounds:
         """The fit under the present conditions."""
         return self._current(self.sides).with_correlation(self.correlation)
 
-    def _scan(self) -> tuple[ChainScene, ChainScan]:
-        """Search effects: beside the curves of joints, or those of the whole catalogue."""
+    def _scan(self) -> tuple[Found, bool]:
+        """Search effects, beside the curves of joints or those of the whole catalogue; return what was found, and
+        whether all was searched, nothing taken from an earlier round."""
         drivers, rate = self.search.drivers, self.search.rate
         if self.beside_curves:
-            return search_beside_curves(self._noisy(), self._able, rate)
+            return Found(*search_beside_curves(self._noisy(), self._able, rate)), True
         scene = scene_of(self._noisy(), self._able)
         first = first_found(scene, drivers, rate)
         # Sides that the first scan shows are not to be asked for after a whole search.
         if self._with_new_sides(scene, first.candidates):
-            return search_chain(scene_of(self._noisy(), self._able), drivers, rate)
-        return search_chain(scene, drivers, rate, first)
+            return search_chain(scene_of(self._noisy(), self._able), drivers, rate), True
+        if earlier := self._earlier_rounds():
+            latest = Found(earlier[-1].scene, earlier[-1].result)
+            again = found_in_other_noise(scene, first, latest, drivers, rate)
+            if again is not None:
+                return again, False
+        return search_chain(scene, drivers, rate, first), True
 
-    def _again(self, under: Fit, near: ChainRound) -> tuple[ChainScene, ChainScan] | None:
+    def _again(self, under: Fit, near: ChainRound) -> Found | None:
         """The findings of a near round under a fit with a scene of all that was searched there; None where they are not
         what a scan that begins with them finds."""
         scene = scene_of(under, [each.variant for each in near.scene.candidates])
-        result = still_found(scene, (near.scene, near.result), self.search.drivers, self.search.rate)
-        return None if result is None else (scene, result)
+        result = still_found(scene, Found(near.scene, near.result), self.search.drivers, self.search.rate)
+        return None if result is None else Found(scene, result)
 
     @property
     def _able(self) -> list[ChainVariant]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
+from monitor.discovery.machine.found_again import Found
 from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
@@ -16,7 +17,6 @@ from monitor.discovery.machine.shapes.axes_of_plate import axes_of_plate
 from monitor.discovery.machine.shapes.beside_steps import with_those_beside_steps
 from monitor.discovery.machine.shapes.drift_instead import drift_instead
 from monitor.discovery.machine.shapes.drifts_of_runs import drifts_of_runs
-from monitor.discovery.machine.shapes.free_parts import parts_anew
 from monitor.discovery.machine.shapes.gears import gear_variants
 from monitor.discovery.machine.shapes.long_waves import without_longest
 from monitor.discovery.machine.shapes.one_instead import one_instead
@@ -40,7 +40,7 @@ MOST_GEARS, MOST_DRIFTS, MOST_MOVES = 12, 60, 4
 
 def search_chain(
     scene: ChainScene, drivers: Sequence[str], rate: float, first: ChainScan | None = None
-) -> tuple[ChainScene, ChainScan]:
+) -> Found:
     """Scan a scene, and where a free shape of the model does not follow its error, once more beside all that this error
     could do; return the scene with the candidates that were added. ``first`` is what `first_found` says, if that is
     known."""
@@ -49,25 +49,7 @@ def search_chain(
         beside = beside_free_shapes(scene)
         searched, result = under_the_model(scene, *_searched(beside, drivers, rate))
     searched, result = drive_first(searched, standing_out(searched, result))
-    return searched, by_error_taken_away(searched, result)
-
-
-def still_found(
-    scene: ChainScene, near: tuple[ChainScene, ChainScan], drivers: Sequence[str], rate: float
-) -> ChainScan | None:
-    """What a scan that begins with the findings in a ``near`` scene of the same candidates finds, where it is these and
-    nothing else, and parts of free shapes would be chosen as there; else None."""
-    candidates = {each.effect.text: each for each in scene.candidates}
-    # Searched values that an earlier scan chose between those of the candidates are none of these.
-    apart = [each.variant for each in near[1].candidates if each.effect.text not in candidates]
-    candidates |= {each.effect.text: each for each in scene_of(scene.fit, apart).candidates}
-    begin = [candidates[each.effect.text] for each in near[1].candidates]
-    result = standing_out(scene, scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate, begin=begin))
-    if {id(each) for each in result.candidates} != {id(each) for each in begin}:
-        return None
-    if parts_anew(scene, begin) != parts_anew(near[0], near[1].candidates):
-        return None
-    return by_error_taken_away(scene, result)
+    return Found(searched, by_error_taken_away(searched, result))
 
 
 def first_found(scene: ChainScene, drivers: Sequence[str], rate: float) -> ChainScan:
