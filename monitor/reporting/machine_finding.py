@@ -210,6 +210,11 @@ ONE_RUN = (
     "one run cannot show what varies from run to run, what stepped between runs, or how well a reading repeats; "
     "measure the same plan again"
 )
+# What is said where plays fit only if short moves from ball to ball turn nothing over.
+SMALL_MOVES = (
+    "where the probe went between the balls is not recorded: these readings say that moves of less than 0.1 mm from "
+    "one stated place to the next turn no play over, which explain takes so here, and identify, compare and map do not"
+)
 
 
 def fits_too_well(times: float) -> str:

@@ -43,9 +43,11 @@ from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_a
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
+from monitor.discovery.machine.suspects.small_moves import follows_moves, without_small_moves
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.effects.shapes import Const
@@ -72,7 +74,8 @@ class Explanation:
     ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
     there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
     ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
-    of ``missing`` in the model.
+    of ``missing`` in the model. ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between
+    stated places, not from 0.01 mm on as elsewhere.
     """
 
     comparison: ChainComparison
@@ -96,6 +99,7 @@ class Explanation:
     off_targets: tuple[TargetOff, ...] = ()
     nearest: Nearest | None = None
     beside: Verdict = Verdict.EXPLAINED
+    small_moves_turn_nothing: bool = False
 
     @property
     def more_is_left(self) -> bool:
@@ -146,7 +150,7 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
-    first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
+    first, search, curves, latest, off_targets, alike = _by_moves_that_turn(as_given, first, search)
     suspects = latest.suspects
     missing = _missing(first, search, curves, latest, surroundings)
     missing += _varying(first, search, latest, surroundings, len(missing))
@@ -177,6 +181,7 @@ def explain(
         unchecked=unchecked,
         nearest=_nearest(latest, search, verdict, (*missing, *unfollowed)),
         beside=verdict_beside,
+        small_moves_turn_nothing=search.problem is not foreseen,
         off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
 
@@ -200,6 +205,29 @@ class _Searched(NamedTuple):
     latest: ChainRound
     off_targets: tuple[TargetOff, ...]
     alike: tuple[BadPoint, ...]
+
+
+def _by_moves_that_turn(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:
+    """Search with the moves that turn plays over: those of 0.01 mm on between stated places or, where that leaves less
+    likely readings, of 0.1 mm on."""
+    searched = _searched(as_given, first, search)
+    larger, latest = without_small_moves(search.problem), searched.latest
+    context = search.problem.context
+    is_asked = any(follows_moves(effect, context) for effect in (*search.problem.added, *latest.effects))
+    if larger is None or not (is_asked or _leaves_something(as_given, latest)):
+        return searched
+    out = search.gross.left_out(larger) if search.gross.any else None
+    other = _searched(as_given, fit(larger, out), replace(search, problem=larger))
+    if [each.target for each in other.off_targets] != [each.target for each in searched.off_targets]:
+        return searched
+    cost = searched.search.cost(first, searched.latest) - other.search.cost(first, other.latest)
+    return other if cost > UNDECIDED else searched
+
+
+def _leaves_something(as_given: ChainComparison, latest: ChainRound) -> bool:
+    """Whether more is left than noise leaves, found effects in the model."""
+    verdict = compare(latest.under, as_given.campaign, as_given.model).verdict
+    return verdict is Verdict.SOMETHING_IS_MISSING
 
 
 def _searched(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:

@@ -18,6 +18,7 @@ from monitor.records import FrameKind, FrameOfReference, Verdict
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
+    SMALL_MOVES,
     WHOLE_PIECE,
     MachineFinding,
     MissingEffect,
@@ -302,8 +303,10 @@ def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: s
 def _undecided(explanation: Explanation) -> tuple[str, ...]:
     """What the campaign cannot decide, in sentences."""
     scale = explanation.final.scale
-    alone = (ONE_RUN,) if len(explanation.final.problem.runs) == 1 else ()
-    return (*alone, fits_too_well(1.0 / scale)) if 0.0 < scale < TOO_WELL else alone
+    said = (ONE_RUN,) if len(explanation.final.problem.runs) == 1 else ()
+    if explanation.small_moves_turn_nothing:
+        said = (*said, SMALL_MOVES)
+    return (*said, fits_too_well(1.0 / scale)) if 0.0 < scale < TOO_WELL else said
 
 
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
