@@ -14,6 +14,7 @@ from monitor.discovery.machine.scene import (
     MachineEffect,
     scene_of,
 )
+from monitor.discovery.machine.separation.in_place_of_products import in_place_of_products
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
@@ -70,6 +71,7 @@ class RivalSearch:
         axes = axes_as_likely(self.scene, self.selected[index], others, least)
         rivals += [(axis, False) for axis in axes if axis.family not in named]
         rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
+        rivals += self._without_products(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
         return sorted(rivals, key=lambda pair: not pair[1])
 
     def _of_other_axes(
@@ -86,6 +88,20 @@ class RivalSearch:
             for evidence in weigh_beside(self.scene, shapes, others)
             if error_of(evidence.candidate) not in named
             and evidence.likelihood - price_of_choices(evidence.candidate) >= least
+        ]
+
+    def _without_products(
+        self, index: int, least: float, named: set[str], remainder: Array
+    ) -> list[tuple[ChainCandidate, bool]]:
+        """What errors that are not ``named`` yet do in place of products of a free shape at an index, as likely as
+        ``least`` with all parts paid for; ``remainder`` (M,) is what that does beside others."""
+        candidate, others = self.selected[index], except_for(self.selected, index)
+        basis = self.scene.remainders.beside(others).basis
+        least -= price_of_choices(candidate)
+        return [
+            (rival, coincides(basis, rival, remainder[:, None]))
+            for rival in in_place_of_products(self.scene, candidate, others, least)
+            if error_of(rival) not in named
         ]
 
     def _pool(self, index: int) -> list[ChainCandidate]:
