@@ -43,7 +43,11 @@ from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_a
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
-from monitor.discovery.machine.suspects.small_moves import follows_moves, without_small_moves
+from monitor.discovery.machine.suspects.small_moves import (
+    follows_moves,
+    may_turn_nothing,
+    without_small_moves,
+)
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
@@ -212,12 +216,19 @@ def _by_moves_that_turn(as_given: ChainComparison, first: Fit, search: ChainSear
     likely readings, of 0.1 mm on."""
     searched = _searched(as_given, first, search)
     larger, latest = without_small_moves(search.problem), searched.latest
-    context = search.problem.context
-    is_asked = any(follows_moves(effect, context) for effect in (*search.problem.added, *latest.effects))
-    if larger is None or not (is_asked or _leaves_something(as_given, latest)):
+    if larger is None:
         return searched
-    out = search.gross.left_out(larger) if search.gross.any else None
-    other = _searched(as_given, fit(larger, out), replace(search, problem=larger))
+    context, found = search.problem.context, [each.candidate for each in latest.refined]
+    begin = fit(larger, search.gross.left_out(larger) if search.gross.any else None)
+    if not _leaves_something(as_given, latest):
+        if not any(follows_moves(each.effect, context) for each in found):
+            return searched
+        noise = latest.scene.fit.whitening
+        under = begin.with_correlation(None if noise is None else noise.correlation)
+        plain = not latest.sides and latest.suspects.same_as(search.gross)
+        if plain and not may_turn_nothing(latest.scene, found, under):
+            return searched
+    other = _searched(as_given, begin, replace(search, problem=larger))
     if [each.target for each in other.off_targets] != [each.target for each in searched.off_targets]:
         return searched
     cost = searched.search.cost(first, searched.latest) - other.search.cost(first, other.latest)

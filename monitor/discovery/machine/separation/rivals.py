@@ -15,6 +15,7 @@ from monitor.discovery.machine.scene import (
     scene_of,
 )
 from monitor.discovery.machine.separation.in_place_of_products import in_place_of_products
+from monitor.discovery.machine.separation.late import is_at_once
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
@@ -63,6 +64,11 @@ class RivalSearch:
             of_instrument = isinstance(evidence.candidate.effect, InstrumentEffect)
             if evidence.likelihood >= least - GRID_LOSS or of_instrument:
                 best = self._at_best_value(index, evidence)
+                if is_at_once(self.selected[index].effect, evidence.candidate.effect) and not isinstance(
+                    best.candidate.effect.driver, SettlingDriver
+                ):
+                    # At its best it does not lag at all, and is no other; a lag may be as likely all the same.
+                    best = evidence
                 same = coincides(basis, best.candidate, remainder[:, None])
                 # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
                 if best.likelihood >= least or (of_instrument and same):

@@ -8,10 +8,23 @@ these. So where what follows moves is found, or more is left than noise leaves, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.free_parts import (
+    is_free,
+    of_parts_alone,
+    parts_worth_keeping,
+    priced,
+    whole_basis,
+)
+from monitor.discovery.search.rivals import UNDECIDED
+from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, Context, Effect
 from monitor.effects.shape import DescribedShape
 from monitor.effects.shapes.free import Follows, Free
@@ -26,6 +39,22 @@ def without_small_moves(problem: ChainProblem) -> ChainProblem | None:
         return None
     other = replace(context, stops_are_stated=False)
     return None if np.array_equal(other.travel, context.travel) else replace(problem, context=other)
+
+
+def may_turn_nothing(scene: ChainScene, selected: Sequence[ChainCandidate], under: Fit) -> bool:
+    """Return whether selected effects of which some follow moves, the free shapes among them with the parts that are
+    worth keeping there, say no less beyond doubt ``under`` a fit in which small moves turn nothing over.
+
+    Both are of the same readings and unknowns, of which moves are no part, in the same noise.
+    """
+    there = scene_of(under, [candidate.variant for candidate in selected])
+    kept = list(there.candidates)
+    for index, candidate in enumerate(there.candidates):
+        if is_free(candidate) and follows_moves(candidate.effect, under.problem.context):
+            symbol = error_of(candidate)
+            parts = parts_worth_keeping(there, whole_basis(there, symbol, candidate), except_for(kept, index))
+            kept[index] = of_parts_alone(there, symbol, parts) if parts else candidate
+    return priced(there, kept) > priced(scene, selected) - UNDECIDED
 
 
 def follows_moves(effect: Effect, context: Context) -> bool:
