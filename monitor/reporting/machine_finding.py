@@ -221,14 +221,14 @@ SMALL_MOVES = (
 def size_if_late(effect: str, unit: str, sizes: Sequence[tuple[float, float, float]]) -> str:
     """The sentence about an effect that is told as following its temperature at once and may follow it late; ``sizes``
     are the time constant in minutes, the size and its standard uncertainty, the shortest first."""
-    words = []
+    phrases = []
     for minutes, size, u in (sizes[0], sizes[-1]):
         rounded = round_result(size, u)
-        words.append(
+        phrases.append(
             f"{written(rounded.estimate)} ± {written(rounded.uncertainty)} {unit} with a time constant of "
             f"{minutes:.0f} min"
         )
-    late = words[0] if len(sizes) == 1 else f"{words[0]}, up to {words[1]}"
+    late = phrases[0] if len(sizes) == 1 else f"{phrases[0]}, up to {phrases[1]}"
     return (
         f"the size of {effect} is that of what follows at once; these data do not rule out that it follows late: then "
         f"it is {late}"

@@ -218,15 +218,17 @@ def _by_moves_that_turn(as_given: ChainComparison, first: Fit, search: ChainSear
     larger, latest = without_small_moves(search.problem), searched.latest
     if larger is None:
         return searched
-    context, found = search.problem.context, [each.candidate for each in latest.refined]
+    context, selected = search.problem.context, [each.candidate for each in latest.refined]
     begin = fit(larger, search.gross.left_out(larger) if search.gross.any else None)
-    if not _leaves_something(as_given, latest):
-        if not any(follows_moves(each.effect, context) for each in found):
+    # A play of the model is where the search begins; one that it found is tried in its place.
+    in_model = any(follows_moves(effect, context) for effect in search.problem.added)
+    if not (in_model and begin.rms < first.rms) and not _leaves_something(as_given, latest):
+        if not any(follows_moves(each.effect, context) for each in selected):
             return searched
         noise = latest.scene.fit.whitening
         under = begin.with_correlation(None if noise is None else noise.correlation)
         plain = not latest.sides and latest.suspects.same_as(search.gross)
-        if plain and not may_turn_nothing(latest.scene, found, under):
+        if plain and not may_turn_nothing(latest.scene, selected, under):
             return searched
     other = _searched(as_given, begin, replace(search, problem=larger))
     if [each.target for each in other.off_targets] != [each.target for each in searched.off_targets]:

@@ -46,8 +46,8 @@ def in_place_of_products(
     if not axes:
         return
     follows = effect.shape.following(context, joint)
-    own = np.array(effect.shape.parts)[follows != Follows.OTHERS] - 1
-    rest = [of_parts_alone(scene, effect.term.symbol, own.tolist())] if len(own) else []
+    of_position = np.array(effect.shape.parts)[follows != Follows.OTHERS] - 1
+    rest = [of_parts_alone(scene, effect.term.symbol, of_position.tolist())] if len(of_position) else []
     of_rest = _likelihood(scene, rest, others)
     taken = {error_of(each) for each in (candidate, *others)}
     for symbol, shapes in _errors_of(scene, {joint, *axes}).items():

@@ -47,14 +47,16 @@ def may_turn_nothing(scene: ChainScene, selected: Sequence[ChainCandidate], unde
 
     Both are of the same readings and unknowns, of which moves are no part, in the same noise.
     """
-    there = scene_of(under, [candidate.variant for candidate in selected])
-    kept = list(there.candidates)
-    for index, candidate in enumerate(there.candidates):
+    other_scene = scene_of(under, [candidate.variant for candidate in selected])
+    candidates = list(other_scene.candidates)
+    for index, candidate in enumerate(other_scene.candidates):
         if is_free(candidate) and follows_moves(candidate.effect, under.problem.context):
             symbol = error_of(candidate)
-            parts = parts_worth_keeping(there, whole_basis(there, symbol, candidate), except_for(kept, index))
-            kept[index] = of_parts_alone(there, symbol, parts) if parts else candidate
-    return priced(there, kept) > priced(scene, selected) - UNDECIDED
+            parts = parts_worth_keeping(
+                other_scene, whole_basis(other_scene, symbol, candidate), except_for(candidates, index)
+            )
+            candidates[index] = of_parts_alone(other_scene, symbol, parts) if parts else candidate
+    return priced(other_scene, candidates) > priced(scene, selected) - UNDECIDED
 
 
 def follows_moves(effect: Effect, context: Context) -> bool:
