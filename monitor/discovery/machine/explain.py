@@ -215,26 +215,33 @@ def _by_moves_that_turn(as_given: ChainComparison, first: Fit, search: ChainSear
     """Search with the moves that turn plays over: those of 0.01 mm on between stated places or, where that leaves less
     likely readings, of 0.1 mm on."""
     searched = _searched(as_given, first, search)
-    larger, latest = without_small_moves(search.problem), searched.latest
+    larger = without_small_moves(search.problem)
     if larger is None:
         return searched
-    context, selected = search.problem.context, [each.candidate for each in latest.refined]
     begin = fit(larger, search.gross.left_out(larger) if search.gross.any else None)
-    # A play of the model is where the search begins; one that it found is tried in its place.
-    in_model = any(follows_moves(effect, context) for effect in search.problem.added)
-    if not (in_model and begin.rms < first.rms) and not _leaves_something(as_given, latest):
-        if not any(follows_moves(each.effect, context) for each in selected):
-            return searched
-        noise = latest.scene.fit.whitening
-        under = begin.with_correlation(None if noise is None else noise.correlation)
-        plain = not latest.sides and latest.suspects.same_as(search.gross)
-        if plain and not may_turn_nothing(latest.scene, selected, under):
-            return searched
+    in_model = any(follows_moves(effect, larger.context) for effect in larger.added)
+    better_begun = in_model and begin.rms < first.rms
+    is_asked = better_begun or _leaves_something(as_given, searched.latest)
+    if not is_asked and not _may_turn_nothing(search, searched.latest, begin):
+        return searched
     other = _searched(as_given, begin, replace(search, problem=larger))
     if [each.target for each in other.off_targets] != [each.target for each in searched.off_targets]:
         return searched
     cost = searched.search.cost(first, searched.latest) - other.search.cost(first, other.latest)
     return other if cost > UNDECIDED else searched
+
+
+def _may_turn_nothing(search: ChainSearch, latest: ChainRound, begin: Fit) -> bool:
+    """Whether plays that were found may do as well with the moves of a fit to ``begin`` with; not asked cheaply where
+    readings or targets were judged, or sides are unknown."""
+    selected = [finding.candidate for finding in latest.refined]
+    if not any(follows_moves(each.effect, begin.problem.context) for each in selected):
+        return False
+    if latest.sides or not latest.suspects.same_as(search.gross):
+        return True
+    noise = latest.scene.fit.whitening
+    under = begin.with_correlation(None if noise is None else noise.correlation)
+    return may_turn_nothing(latest.scene, selected, under)
 
 
 def _leaves_something(as_given: ChainComparison, latest: ChainRound) -> bool:
