@@ -16,6 +16,7 @@ from monitor.reporting.nearest_words import (
     nearest_sentence,
     step_sentence,
 )
+from monitor.reporting.numbers import round_result, written
 from monitor.units import MICROMETRE
 
 
@@ -218,6 +219,28 @@ ONE_RUN = (
     "one run cannot show what varies from run to run, what stepped between runs, or how well a reading repeats; "
     "measure the same plan again"
 )
+# What is said where plays fit only if short moves from ball to ball turn nothing over.
+SMALL_MOVES = (
+    "where the probe went between the balls is not recorded: these readings say that moves of less than 0.1 mm from "
+    "one stated place to the next turn no play over, which explain takes so here, and identify, compare and map do not"
+)
+
+
+def size_if_late(effect: str, unit: str, sizes: Sequence[tuple[float, float, float]]) -> str:
+    """The sentence about an effect that is told as following its temperature at once and may follow it late; ``sizes``
+    are the time constant in minutes, the size and its standard uncertainty, the shortest first."""
+    phrases = []
+    for minutes, size, u in (sizes[0], sizes[-1]):
+        rounded = round_result(size, u)
+        phrases.append(
+            f"{written(rounded.estimate)} ± {written(rounded.uncertainty)} {unit} with a time constant of "
+            f"{minutes:.0f} min"
+        )
+    late = phrases[0] if len(sizes) == 1 else f"{phrases[0]}, up to {phrases[1]}"
+    return (
+        f"the size of {effect} is that of what follows at once; these data do not rule out that it follows late: then "
+        f"it is {late}"
+    )
 
 
 def fits_too_well(times: float) -> str:

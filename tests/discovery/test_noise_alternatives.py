@@ -151,7 +151,7 @@ def test_what_few_runs_are_explained_by_costs_its_likelihood_and_every_choice(wa
         assert rank == (1 if text else 0) + (0 if row is None else 3)
         price = (rank + 2 * (correlation is not None)) * np.log(count)
         price += sum(2.0 * np.log(4 * each.variant.tries * each.variant.odds) for each in chosen)
-        assert search._cost(first, latest) == pytest.approx(deviance + price, abs=0.01)
+        assert search.cost(first, latest) == pytest.approx(deviance + price, abs=0.01)
 
 
 def test_likelihoods_are_the_same_whatever_was_asked_before(walked):
@@ -244,7 +244,7 @@ def test_more_effects_have_to_be_likelier_by_the_odds_of_the_rate(
     monkeypatch.setattr(
         ChainSearch, "_settled", lambda search, first, beside, noise, before: (rounds[noise], True)
     )
-    monkeypatch.setattr(ChainSearch, "_cost", lambda search, first, latest: latest.cost)
+    monkeypatch.setattr(ChainSearch, "cost", lambda search, first, latest: latest.cost)
     for each in rounds.values():
         each.suspects = SimpleNamespace(bad=())
     search = ChainSearch(SimpleNamespace(runs=np.arange(2)), (), (), 0.01, None)

@@ -44,10 +44,16 @@ from monitor.discovery.machine.suspects.off_in_places import TargetOff, off_in_a
 from monitor.discovery.machine.suspects.recurring import are_unchecked, recurring
 from monitor.discovery.machine.suspects.runs_apart import RunApart, runs_apart
 from monitor.discovery.machine.suspects.scatter import Scatter
+from monitor.discovery.machine.suspects.small_moves import (
+    follows_moves,
+    may_turn_nothing,
+    without_small_moves,
+)
 from monitor.discovery.machine.suspects.stepped_within import SteppedWithin
 from monitor.discovery.machine.suspects.steps import Step, find_steps
 from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
 from monitor.discovery.machine.suspects.varying import varying_effects
+from monitor.discovery.search.rivals import UNDECIDED
 from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.effects.shapes import Const
@@ -63,18 +69,23 @@ MOST_CURVES = 4
 class Explanation:
     """The answer. ``comparison`` is the model as given, ``missing`` what it lacks, most convincing first.
 
-    ``suspect`` points were left out, ``moves`` and ``steps`` are changes reported as such; ``blind`` effects leave
-    nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
-    recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
-    looks wrong, ``mistakes`` says how, and nothing else is reported.
-    ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
-    leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
-    less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
-    under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
-    ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
-    there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
-    ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
-    of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
+        ``suspect`` points were left out, ``moves`` and ``steps`` are changes reported as such; ``blind`` effects leave
+        nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
+        recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
+        looks wrong, ``mistakes`` says how, and nothing else is reported.
+        ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
+        leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
+        less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
+        under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
+        ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
+        there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
+        ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
+    <<<<<<< HEAD
+        of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
+    =======
+        of ``missing`` in the model. ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between
+        stated places, not from 0.01 mm on as elsewhere.
+    >>>>>>> lp
     """
 
     comparison: ChainComparison
@@ -99,6 +110,7 @@ class Explanation:
     nearest: Nearest | None = None
     stepped: SteppedWithin | None = None
     beside: Verdict = Verdict.EXPLAINED
+    small_moves_turn_nothing: bool = False
 
     @property
     def more_is_left(self) -> bool:
@@ -149,7 +161,8 @@ def explain(
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
     search = ChainSearch(foreseen, variants, surroundings.drivers, rate, certain)
     as_given = compare(first, campaign.name, model)
-    first, search, curves, latest, off_targets, alike = _searched(as_given, first, search)
+    first, search, curves, latest, off_targets, alike = _by_moves_that_turn(as_given, first, search)
+    small_moves_turn_nothing = search.problem is not foreseen
     without_step, stepped = latest, None
     if not curves:
         first, search, latest, stepped = searched_beside_step(first, search, latest)
@@ -184,6 +197,7 @@ def explain(
         nearest=_nearest(without_step, search, verdict, (*missing, *unfollowed), stepped),
         stepped=stepped,
         beside=verdict_beside,
+        small_moves_turn_nothing=small_moves_turn_nothing,
         off_targets=tuple(each.measured_under(latest.under) for each in off_targets),
     )
 
@@ -214,6 +228,45 @@ class _Searched(NamedTuple):
     latest: ChainRound
     off_targets: tuple[TargetOff, ...]
     alike: tuple[BadPoint, ...]
+
+
+def _by_moves_that_turn(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:
+    """Search with the moves that turn plays over: those of 0.01 mm on between stated places or, where that leaves less
+    likely readings, of 0.1 mm on."""
+    searched = _searched(as_given, first, search)
+    larger = without_small_moves(search.problem)
+    if larger is None:
+        return searched
+    begin = fit(larger, search.gross.left_out(larger) if search.gross.any else None)
+    in_model = any(follows_moves(effect, larger.context) for effect in larger.added)
+    better_begun = in_model and begin.rms < first.rms
+    is_asked = better_begun or _leaves_something(as_given, searched.latest)
+    if not is_asked and not _may_turn_nothing(search, searched.latest, begin):
+        return searched
+    other = _searched(as_given, begin, replace(search, problem=larger))
+    if [each.target for each in other.off_targets] != [each.target for each in searched.off_targets]:
+        return searched
+    cost = searched.search.cost(first, searched.latest) - other.search.cost(first, other.latest)
+    return other if cost > UNDECIDED else searched
+
+
+def _may_turn_nothing(search: ChainSearch, latest: ChainRound, begin: Fit) -> bool:
+    """Whether plays that were found may do as well with the moves of a fit to ``begin`` with; not asked cheaply where
+    readings or targets were judged, or sides are unknown."""
+    selected = [finding.candidate for finding in latest.refined]
+    if not any(follows_moves(each.effect, begin.problem.context) for each in selected):
+        return False
+    if latest.sides or not latest.suspects.same_as(search.gross):
+        return True
+    noise = latest.scene.fit.whitening
+    under = begin.with_correlation(None if noise is None else noise.correlation)
+    return may_turn_nothing(latest.scene, selected, under)
+
+
+def _leaves_something(as_given: ChainComparison, latest: ChainRound) -> bool:
+    """Whether more is left than noise leaves, found effects in the model."""
+    verdict = compare(latest.under, as_given.campaign, as_given.model).verdict
+    return verdict is Verdict.SOMETHING_IS_MISSING
 
 
 def _searched(as_given: ChainComparison, first: Fit, search: ChainSearch) -> _Searched:

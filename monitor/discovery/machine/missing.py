@@ -12,6 +12,7 @@ import numpy.typing as npt
 from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
+from monitor.discovery.machine.separation.late import SizeIfLate, sizes_if_late
 from monitor.discovery.machine.separation.rivals import RivalSearch
 from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.discovery.machine.shapes.curves import Curve, follows
@@ -62,7 +63,8 @@ class ChainMissing(Missing):
     only what changes within runs shows it. ``largest`` is the coefficient of a table, the largest, that ``amplitude``
     is the absolute value of. ``error_peak`` is what the error does at most with all its effects together, in the first
     of several. ``steps`` says between which readings each step of an error lies, ``held`` where a plate that grows is
-    held, by axis. ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre.
+    held, by axis. ``if_late`` are its sizes if it follows its temperature late, where these data do not rule that out.
+    ``turns`` says that rows of angles alone show it: its peaks are on a lever of one metre.
     """
 
     held_out_days_before: float | None
@@ -82,6 +84,7 @@ class ChainMissing(Missing):
     steps: tuple[Between, ...] = ()
     held: tuple[HeldPlace, ...] = ()
     turns: bool = False
+    if_late: tuple[SizeIfLate, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -325,6 +328,7 @@ def _missing(
         largest=size.largest,
         steps=steps_between(scene, candidate, except_for(selection.candidates, index)),
         held=held_place(scene, candidate, except_for(selection.candidates, index)),
+        if_late=sizes_if_late(scene, selection.candidates, index, least_likelihood(finding.evidence)),
     )
 
 

@@ -122,7 +122,7 @@ class ChainSearch:
             if other.families > latest.families:
                 margin = -margin
             disagree = other.families != latest.families
-            if disagree and self._cost(first, other) < self._cost(first, latest) + margin:
+            if disagree and self.cost(first, other) < self.cost(first, latest) + margin:
                 latest, settled = other, other_settled
         reached = {
             Limit.EFFECTS: len(latest.refined)
@@ -143,7 +143,7 @@ class ChainSearch:
             latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
         return latest, settled
 
-    def _cost(self, first: Fit, latest: ChainRound) -> float:
+    def cost(self, first: Fit, latest: ChainRound) -> float:
         """Minus twice the logarithm of the likelihood of what was found in what the unknowns of ``first`` leave, with
         Schwarz's price of what it has free beyond that, and that of each choice among all families, values and parts.
 

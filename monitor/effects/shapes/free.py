@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar, Self
@@ -99,6 +99,20 @@ def parts_of_axis(context: Context, joint: int) -> tuple[int, ...]:
     products = simple * sum(len(_of_other(context, index)) for index in others)
     count = flexible_basis(context, joint).shape[1]
     return (*range(1, before + 1), *range(before + products + 1, count + 1))
+
+
+def axes_of_products(context: Context, joint: int, parts: Sequence[int]) -> frozenset[int]:
+    """The other axes whose positions parts, numbered from 1, of a joint's basis are multiplied with."""
+    simple = 3 if context.chain.joints[joint].turns else 2
+    others = [
+        index for index in range(context.places.shape[1]) if index != joint for _ in _of_other(context, index)
+    ]
+    first = parts_of_position(context.chain.joints[joint].turns) + 1 + simple + len(BUILD_UP)
+    return frozenset(
+        others[(part - 1 - first) % len(others)]
+        for part in parts
+        if first < part <= first + simple * len(others)
+    )
 
 
 def flexible_basis(context: Context, joint: int) -> Array:

@@ -18,6 +18,7 @@ from monitor.records import FrameKind, FrameOfReference, Verdict
 from monitor.reporting.frames import frame_words
 from monitor.reporting.machine_finding import (
     ONE_RUN,
+    SMALL_MOVES,
     WHOLE_PIECE,
     MachineFinding,
     MissingEffect,
@@ -26,9 +27,10 @@ from monitor.reporting.machine_finding import (
     Scattering,
     fits_too_well,
     machine_sentences,
+    size_if_late,
 )
 from monitor.reporting.nearest_words import WHY_REFUSED
-from monitor.units import DEGREE, MICROMETRE, MILLIMETRE, Unit
+from monitor.units import DEGREE, MICROMETRE, MILLIMETRE, MINUTE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
     ChangedParameter,
@@ -313,8 +315,21 @@ def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: s
 def _undecided(explanation: Explanation) -> tuple[str, ...]:
     """What the campaign cannot decide, in sentences."""
     scale = explanation.final.scale
-    alone = (ONE_RUN,) if len(explanation.final.problem.runs) == 1 else ()
-    return (*alone, fits_too_well(1.0 / scale)) if 0.0 < scale < TOO_WELL else alone
+    said = (ONE_RUN,) if len(explanation.final.problem.runs) == 1 else ()
+    if explanation.small_moves_turn_nothing:
+        said = (*said, SMALL_MOVES)
+    said = (*said, *(_if_late(effect) for effect in explanation.missing if effect.if_late))
+    return (*said, fits_too_well(1.0 / scale)) if 0.0 < scale < TOO_WELL else said
+
+
+def _if_late(effect: ChainMissing) -> str:
+    """How large an effect is if it follows its temperature late."""
+    unit = effect.unit or effect.units[0]
+    sizes = [
+        (MINUTE.to_display(each.time_constant_s), unit.to_display(each.amplitude), unit.to_display(each.u))
+        for each in effect.if_late
+    ]
+    return size_if_late(effect.effect, unit.name, sizes)
 
 
 def machine_explanation(explanation: Explanation) -> MachineExplanation:

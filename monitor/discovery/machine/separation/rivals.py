@@ -14,6 +14,8 @@ from monitor.discovery.machine.scene import (
     MachineEffect,
     scene_of,
 )
+from monitor.discovery.machine.separation.in_place_of_products import in_place_of_products
+from monitor.discovery.machine.separation.late import is_at_once
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
@@ -62,6 +64,11 @@ class RivalSearch:
             of_instrument = isinstance(evidence.candidate.effect, InstrumentEffect)
             if evidence.likelihood >= least - GRID_LOSS or of_instrument:
                 best = self._at_best_value(index, evidence)
+                if is_at_once(self.selected[index].effect, evidence.candidate.effect) and not isinstance(
+                    best.candidate.effect.driver, SettlingDriver
+                ):
+                    # At its best it does not lag at all, and is no other; a lag may be as likely all the same.
+                    best = evidence
                 same = coincides(basis, best.candidate, remainder[:, None])
                 # All three numbers of a nest may drift, one is enough: what it costs more rules nothing out.
                 if best.likelihood >= least or (of_instrument and same):
@@ -70,6 +77,7 @@ class RivalSearch:
         axes = axes_as_likely(self.scene, self.selected[index], others, least)
         rivals += [(axis, False) for axis in axes if axis.family not in named]
         rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
+        rivals += self._without_products(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
         return sorted(rivals, key=lambda pair: not pair[1])
 
     def _of_other_axes(
@@ -86,6 +94,20 @@ class RivalSearch:
             for evidence in weigh_beside(self.scene, shapes, others)
             if error_of(evidence.candidate) not in named
             and evidence.likelihood - price_of_choices(evidence.candidate) >= least
+        ]
+
+    def _without_products(
+        self, index: int, least: float, named: set[str], remainder: Array
+    ) -> list[tuple[ChainCandidate, bool]]:
+        """What errors that are not ``named`` yet do in place of products of a free shape at an index, as likely as
+        ``least`` with all parts paid for; ``remainder`` (M,) is what that does beside others."""
+        candidate, others = self.selected[index], except_for(self.selected, index)
+        basis = self.scene.remainders.beside(others).basis
+        least -= price_of_choices(candidate)
+        return [
+            (rival, coincides(basis, rival, remainder[:, None]))
+            for rival in in_place_of_products(self.scene, candidate, others, least)
+            if error_of(rival) not in named
         ]
 
     def _pool(self, index: int) -> list[ChainCandidate]:
