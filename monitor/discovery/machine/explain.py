@@ -69,23 +69,20 @@ MOST_CURVES = 4
 class Explanation:
     """The answer. ``comparison`` is the model as given, ``missing`` what it lacks, most convincing first.
 
-        ``suspect`` points were left out, ``moves`` and ``steps`` are changes reported as such; ``blind`` effects leave
-        nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
-        recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
-        looks wrong, ``mistakes`` says how, and nothing else is reported.
-        ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
-        leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
-        less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
-        under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
-        ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
-        there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
-        ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
-    <<<<<<< HEAD
-        of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
-    =======
-        of ``missing`` in the model. ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between
-        stated places, not from 0.01 mm on as elsewhere.
-    >>>>>>> lp
+    ``suspect`` points were left out, ``moves`` and ``steps`` are changes reported as such; ``blind`` effects leave
+    nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
+    recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
+    looks wrong, ``mistakes`` says how, and nothing else is reported.
+    ``limits`` says at which ends of the search more may be there. ``taken_for_machine`` are errors of instruments that
+    leave nothing to see because base parameters do the same. Readings of targets that ``scatter`` counted by so much
+    less. Runs ``apart`` leave more than the others. ``together`` is the verdict of the tests of all residuals together,
+    under the model as given. ``not_followed`` are errors that the model has in a free shape which does not follow them.
+    ``recurring`` readings were left out like suspect ones, but most runs left them alike: the model lacks something
+    there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
+    ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
+    of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
+    of ``missing`` in the model. ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between
+    stated places, not from 0.01 mm on as elsewhere.
     """
 
     comparison: ChainComparison
