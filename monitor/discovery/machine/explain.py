@@ -81,8 +81,8 @@ class Explanation:
     there. The suspect ones are ``unchecked`` where so many lie where no other run read that it may lack as much.
     ``nearest`` is the effect that comes nearest where none is named. ``beside`` is the verdict on what is left with all
     of ``missing`` in the model. ``stepped`` is a step of an error within a run, in the model beside ``missing``.
-    of ``missing`` in the model. ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between
-    stated places, not from 0.01 mm on as elsewhere.
+    ``small_moves_turn_nothing``: the plays of all this turn over from 0.1 mm on between stated places, not from 0.01 mm
+    on as elsewhere.
     """
 
     comparison: ChainComparison
