@@ -59,7 +59,9 @@ def _campaign(folder: Path, tool: float, seed: int, known: str = "") -> Campaign
         )
         named = dict(zip(("point_x_mm", "point_y_mm", "point_z_mm"), seen, strict=True))
         rows.append({"setup": "tracker", **at, **named})
-    return read_campaign(chain.write(folder, SETUP.format(z=tool) + known, rows))
+    campaign = read_campaign(chain.write(folder, SETUP.format(z=tool) + known, rows))
+    assert isinstance(campaign, Campaign)
+    return campaign
 
 
 def _fitted(campaign: Campaign, *added: str) -> tuple[np.ndarray, np.ndarray, float]:

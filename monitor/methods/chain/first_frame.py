@@ -171,10 +171,9 @@ def _nearest_to_stated(equations: Array, wanted: Array, stated: Array) -> Array:
     is_open[: len(values)] = values <= OPEN * values[0]
     if not is_open.any():
         return free
+    open_ways = directions[is_open]
     to_stated = stated.reshape(-1) - free[12:]
-    return (
-        free + directions[is_open].T @ np.linalg.lstsq(directions[is_open, 12:].T, to_stated, rcond=OPEN)[0]
-    )
+    return np.asarray(free + open_ways.T @ np.linalg.lstsq(open_ways[:, 12:].T, to_stated, rcond=OPEN)[0])
 
 
 def all_axes_meet(origin: Array, size: float) -> bool:
