@@ -70,7 +70,11 @@ class RivalSearch:
         axes = axes_as_likely(self.scene, self.selected[index], others, least)
         rivals += [(axis, False) for axis in axes if axis.family not in named]
         rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
-        return sorted(rivals, key=lambda pair: not pair[1])
+        # The pool may have an effect twice: as a part of a bend, say, and as the shape of another error.
+        by_text: dict[str, tuple[ChainCandidate, bool]] = {}
+        for rival, same in sorted(rivals, key=lambda pair: not pair[1]):
+            by_text.setdefault(rival.effect.text, (rival, same))
+        return list(by_text.values())
 
     def _of_other_axes(
         self, index: int, least: float, named: set[str], remainder: Array
