@@ -15,6 +15,7 @@ from monitor.discovery.machine.scene import (
     scene_of,
 )
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
+from monitor.discovery.machine.shapes.alias_orders import aliases_of_order
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
@@ -109,6 +110,7 @@ class RivalSearch:
         variants += _of_other_errors(candidate.effect)
         variants += same_drift(candidate.effect, context.chain)
         variants += aliases_of(candidate.effect, context)
+        variants += aliases_of_order(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))
