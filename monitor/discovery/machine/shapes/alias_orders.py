@@ -22,6 +22,8 @@ from monitor.records import Array
 ALIKE = 0.7
 # A number of waves that positions do not see is told to so many of its order.
 FINE_STEP = 0.025
+# Orders so near to a whole number are that: of teeth that go round.
+WHOLE = 0.1
 # So many orders are named besides the one found, the most alike first, and of these the lowest.
 MOST_ORDERS = 4
 # Orders that are closer are one.
@@ -40,7 +42,8 @@ def aliases_of_order(effect: MachineEffect, context: Context) -> list[ChainVaria
     for wave, part in _unseen(context.positions[:, effect.term.joint]):
         for order in (abs(wave - order_found), wave + order_found):
             if LOWEST <= order <= HIGHEST and abs(order - order_found) > SAME_ORDER:
-                alike.setdefault(round(order, 3), part)
+                whole = abs(order - round(order)) < WHOLE
+                alike.setdefault(float(round(order)) if whole else round(order, 3), part)
     most_alike = sorted(alike, key=lambda order: (-round(alike[order], 2), order))[:MOST_ORDERS]
     return [_of_order(effect, order) for order in most_alike]
 
