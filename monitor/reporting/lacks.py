@@ -170,8 +170,8 @@ _UNDECIDED = {
     ),
     Undecided.DAYS_MAY_DO: (
         "not decided: more than independent days that scatter alike explain, but days that follow each other, a side "
-        "whose days scatter more, or campaigns that differ by more than their days may do as much; more days on each "
-        "side or further campaigns decide it"
+        "whose days scatter more, or campaigns that differ by more than their days may do as much; further days and "
+        "campaigns without an event between them show how much the machine moves by itself, and decide it"
     ),
     Undecided.FEW_DAYS: (
         "not decided: too few days on a side to tell a step of one of many parameters from days that differ; measure "
@@ -179,7 +179,8 @@ _UNDECIDED = {
     ),
     Undecided.DRIFT_MAY_DO: (
         "not decided: a drift that goes on through the event, or a machine that moves as much between campaigns "
-        "without one, may do as much; further campaigns on each side decide it"
+        "without one, may do as much; further campaigns without an event between them show how much it moves by "
+        "itself, and decide it"
     ),
     Undecided.INSTRUMENTS_MAY_DO: (
         "not decided: other instruments measured after it than before, or the same with other certificates, and may be "

@@ -3,6 +3,7 @@ poses, of those that go with where the axes stand."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 #: Drivers that nobody records, as they follow from the times of the readings: their names in words, and which runs give
@@ -26,6 +27,9 @@ OF_TIMES = {
         "more runs on other days: what differs from run to run shows over many of them only",
     ),
 }
+
+#: The highest order of what errs with the turn of a table; a higher one belongs to a gear.
+HIGHEST_OF_TABLES = 3
 
 #: What names of effects have that weight makes.
 OF_WEIGHT = ("gravity", "compliance", "link_weights")
@@ -80,12 +84,29 @@ def runs_that_tell(drivers: Sequence[str], *, within_runs: bool) -> str:
 
 
 def poses_that_tell(axes: Sequence[str], effects: Sequence[str]) -> str:
-    """Return which poses of ``axes`` tell ``effects`` apart; of what weight bends another load does, too."""
+    """Return which poses of ``axes`` tell ``effects`` apart; of what weight bends another load does, too, and of orders
+    of a gear its ratio."""
     bends = any(word in effect for effect in effects for word in OF_WEIGHT)
     if bends and not axes:
         return "some poses under another load"
     poses = f"more poses over the whole range of {' and '.join(axes) or 'all axes'}"
-    return f"{poses}, and some under another load" if bends else f"{poses}, between the present ones"
+    if bends:
+        return f"{poses}, and some under another load"
+    between = f"{poses}, between the present ones"
+    return (
+        f"{between}, or state the ratio of its gear or worm (gear_ratio)" if _of_a_gear(effects) else between
+    )
+
+
+def _of_a_gear(effects: Sequence[str]) -> bool:
+    """Whether ``effects`` are one error at several orders, none of which an axis has without a gear."""
+    waves = [effect.partition(":harmonic") for effect in effects]
+    orders = {order for _, _, order in waves}
+    return (
+        len({error for error, _, _ in waves}) == 1
+        and len(orders) > 1
+        and all(re.fullmatch(r"[\d.]+", order) and float(order) > HIGHEST_OF_TABLES for order in orders)
+    )
 
 
 def positions_that_tell(axes: Sequence[str], step_mm: float) -> str:

@@ -105,6 +105,11 @@ def test_the_schema_of_a_sentence_is_a_text() -> None:
             "ball 3 scatters 6.1 times as much as the others (6.1 µm): it may be loose or dirty",
         ),
         (BadPoint(3, 17, "B", "Z", -41.26), "run 3, touch 17, ball B: Z is off by -41.3 µm"),
+        (
+            BadPoint(1, 49, "ball-3", "x", -3.61, "reading", "target"),
+            "run 1, reading 49, target ball-3: x is off by -3.6 µm",
+        ),
+        (BadPoint(1, 49, "", "x", -3.61, "reading", "target"), "run 1, reading 49: x is off by -3.6 µm"),
         (NewThisWeek(()), "nothing this week"),
         (
             NewThisWeek(("a", "b", "c"), 2, (ModelLacks("EXX:reversal"),)),

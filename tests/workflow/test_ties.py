@@ -134,6 +134,13 @@ def test_what_moved_once_is_told_by_no_pose() -> None:
     assert "targets that rest beside the machine" in what_breaks(ties[0])
 
 
+def test_orders_of_one_gear_are_told_apart_by_its_ratio() -> None:
+    """Positions on a grid see several orders as one; errors of other directions no ratio tells apart."""
+    assert poses_that_tell(("C",), ("ECC:harmonic12", "ECC:harmonic72")).endswith("(gear_ratio)")
+    assert poses_that_tell(("C",), ("ECC:harmonic2", "ECC:harmonic3")).endswith("present ones")
+    assert poses_that_tell(("C",), ("ECC:harmonic12", "EAC:harmonic12")).endswith("present ones")
+
+
 @pytest.mark.parametrize(
     ("effects", "words"),
     [

@@ -241,7 +241,7 @@ def _since(health: MachineHealth) -> str:
     if health.state in ALARMS:
         return f"{_beyond_since(health, health.since)}: every run since then lies beyond the tolerance."
     if health.state is State.MODEL_FAILS:
-        return f"Since {day(health.since)} at the latest, the first run that was compared."
+        return f"Since {day(health.since)} at the latest, the first of the compared runs that show it."
     if health.due is not None or health.state is State.DRIFTS:
         return f"Since {day(health.since)} at the latest, the first of the runs that show it."
     span = next(

@@ -76,29 +76,36 @@ class RunsNamed(Sentence):
 
 @dataclass(frozen=True)
 class BadPoint(Sentence):
-    """A touch that is off along an axis by ``off_um``."""
+    """A touch of a ball that is off along an axis by ``off_um``, or what the method calls a row (``row_word``) and a
+    target (``target_word``)."""
 
     run: int
     touch: int
     ball: str
     axis: str
     off_um: float
+    row_word: str = "touch"
+    target_word: str = "ball"
 
     def __str__(self) -> str:
-        return f"run {self.run}, touch {self.touch}, ball {self.ball}: {self.axis} is off by {self.off_um:.1f} µm"
+        where = f"run {self.run}, {self.row_word} {self.touch}"
+        target = f", {self.target_word} {self.ball}" if self.ball else ""
+        return f"{where}{target}: {self.axis} is off by {self.off_um:.1f} µm"
 
 
 @dataclass(frozen=True)
 class ScatteringBall(Sentence):
-    """A ball whose readings scatter ``times`` as much as those of the others, ``deviation_um``."""
+    """A ball, or what the method calls a target (``target_word``), whose readings scatter ``times`` as much as those of
+    the others, ``deviation_um``."""
 
     ball: str
     times: float
     deviation_um: float
+    target_word: str = "ball"
 
     def __str__(self) -> str:
         return (
-            f"ball {self.ball} scatters {self.times:.1f} times as much as the others "
+            f"{self.target_word} {self.ball} scatters {self.times:.1f} times as much as the others "
             f"({self.deviation_um:.1f} µm): it may be loose or dirty"
         )
 

@@ -10,6 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from monitor.documents import Said
+from monitor.methods import method_named
 from monitor.reporting.frames import referred
 from monitor.reporting.health.news import BallMoved, EventNoted, ParameterChanged
 from monitor.reporting.health.records import (
@@ -210,16 +211,25 @@ def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:
 
 
 def _suspect(
-    explanation: MachineExplanation, measured: Collection[tuple[str, int]]
+    explanation: MachineExplanation, measured: Collection[tuple[str, int]], row_word: str
 ) -> Iterator[ScatteringBall | BadPoint]:
-    """Balls that scatter, and bad points, in the ``measured`` runs (campaign, run)."""
+    """Targets that scatter, and bad points, in the ``measured`` runs (campaign, run); a row of the method is called
+    ``row_word``."""
     campaign = explanation.comparison.campaign
     if any(name == campaign for name, _ in measured):
         for each in explanation.scattering:
-            yield ScatteringBall(each.target, each.times, each.deviation_um)
+            yield ScatteringBall(each.target, each.times, each.deviation_um, explanation.target_word)
     for point in explanation.suspect_data:
         if (campaign, point.run) in measured:
-            yield BadPoint(point.run, point.sequence, point.target, point.axis, point.size_um)
+            yield BadPoint(
+                point.run,
+                point.sequence,
+                point.target,
+                point.axis,
+                point.size_um,
+                row_word,
+                explanation.target_word,
+            )
 
 
 def data_quality(
@@ -236,7 +246,10 @@ def data_quality(
     counts = {name: probing_counts(db, name) for name in campaigns}
     noticed = [note for name in campaigns for note in campaign_notes(db, name)]
     measured = {(run.campaign, run.run) for run in runs}
-    suspect = () if explanation is None else tuple(_suspect(explanation, measured))
+    suspect: tuple[ScatteringBall | BadPoint, ...] = ()
+    if explanation is not None:
+        rows = {run.campaign: method_named(run.method).nouns.row for run in runs}
+        suspect = tuple(_suspect(explanation, measured, rows.get(explanation.comparison.campaign, "reading")))
     return DataQuality(
         runs=len(runs),
         probings=sum(counts[campaign].get(run, 0) for campaign, run in measured),

@@ -50,6 +50,7 @@ from monitor.workflow.health.facts import (
     moment_of,
     parameter_health,
 )
+from monitor.workflow.health.failing import failing_since
 from monitor.workflow.health.map import probability_beyond, stated_map
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.refusals import refused_of
@@ -216,7 +217,8 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
         changed=new_this_week(noted, explanation, quality, drifting),
-        since=since_when(state, parameters, noted, measured.span.first, due), probability_out=judged.any,
+        since=since_when(state, parameters, noted, failing_since(db, past.runs, measured, explanation), due),
+        probability_out=judged.any,
         next_check=check,
         run=_named(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_of(stated),

@@ -104,6 +104,15 @@ def stored_results(db: Database, week: MeasuredWeek) -> Results:
     )
 
 
+def stored_explanation(db: Database, campaign: str, week: MeasuredWeek) -> MachineExplanation | None:
+    """The stored comparison of a whole ``campaign`` with the model of a ``week``; None where there is none."""
+    subject = _Subject(campaign=campaign, model=week.model.name, model_version=week.model.version)
+    return _restored(
+        partial(from_document, MachineExplanation),
+        _stored(db, "explanation", None, week.last.method, **subject),
+    )
+
+
 def _rests_on_a_selection(answer: UncertaintyAnswer) -> bool:
     """Whether the scatter is that of runs that a user selected, and not of the campaign's own."""
     source = answer.input_covariance_source

@@ -194,12 +194,12 @@ def since_when(
     state: State,
     parameters: Sequence[ParameterHealth],
     noted: Sequence[Change],
-    compared: datetime,
+    failing: datetime,
     due: str | None = None,
 ) -> datetime | None:
     """Since when the machine is in this state: beyond a tolerance, another one than before, or not explained by the
-    model, which then is so from the first run ``compared`` with it; drifting, or ``due`` by the drift of a parameter,
-    from the first run that shows it."""
+    model, ``failing`` from the first of the compared runs that show it; drifting, or ``due`` by the drift of a
+    parameter, from the first run that shows it."""
     if due is not None:
         drift = {each.name: each.drift for each in parameters}.get(due)
         return None if drift is None else drift.since
@@ -208,7 +208,7 @@ def since_when(
         # Of the volumetric error there is no value run by run: no day is better than a wrong one.
         return min(beyond, default=None)
     if state is State.MODEL_FAILS:
-        return compared
+        return failing
     if state is State.DRIFTS:
         surest = drifting_without_limit(parameters)[0].drift
         return None if surest is None else surest.since

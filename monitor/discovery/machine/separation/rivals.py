@@ -17,6 +17,7 @@ from monitor.discovery.machine.scene import (
 from monitor.discovery.machine.separation.in_place_of_products import in_place_of_products
 from monitor.discovery.machine.separation.late import is_at_once
 from monitor.discovery.machine.separation.other_axes import free_of_other_axes
+from monitor.discovery.machine.shapes.alias_orders import aliases_of_order
 from monitor.discovery.machine.shapes.alias_pitches import aliases_of
 from monitor.discovery.machine.shapes.axes_of_plate import axes_as_likely
 from monitor.discovery.machine.shapes.drifts_of_runs import FEWEST_RUNS, in_one_run
@@ -78,7 +79,11 @@ class RivalSearch:
         rivals += [(axis, False) for axis in axes if axis.family not in named]
         rivals += self._of_other_axes(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
         rivals += self._without_products(index, least, {error_of(rival) for rival, _ in rivals}, remainder)
-        return sorted(rivals, key=lambda pair: not pair[1])
+        # The pool may have an effect twice: as a part of a bend, say, and as the shape of another error.
+        by_text: dict[str, tuple[ChainCandidate, bool]] = {}
+        for rival, same in sorted(rivals, key=lambda pair: not pair[1]):
+            by_text.setdefault(rival.effect.text, (rival, same))
+        return list(by_text.values())
 
     def _of_other_axes(
         self, index: int, least: float, named: set[str], remainder: Array
@@ -127,6 +132,7 @@ class RivalSearch:
         variants += _of_other_errors(candidate.effect)
         variants += same_drift(candidate.effect, context.chain)
         variants += aliases_of(candidate.effect, context)
+        variants += aliases_of_order(candidate.effect, context)
         runs = self.scene.fit.problem.runs
         if len(runs) >= FEWEST_RUNS:
             variants += in_one_run(candidate.effect, map(int, runs), len(runs))

@@ -2,8 +2,9 @@
 
 The turn of a joint that a gear causes shows in each row as one number, the part of the residual along the way that
 the joint moves the tool. So the whole range of orders is looked at for the price of one, and only what stands out
-becomes a candidate of the scan, where it pays for the search. The rows of few indexations repeat at several orders:
-there only those are looked at that have more than two indexations a period.
+becomes a candidate of the scan, where it pays for the search. The rows of few indexations may repeat at several orders:
+those that have more than two indexations a period pay for themselves alone, those above for the whole range, and these
+are looked at only where the positions scatter enough about their grid to tell them from the lower ones.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ from monitor.records import Array
 LOWEST, HIGHEST, STEP = 4.0, 330.0, 0.5
 # So many different positions fix any of these orders; fewer, of which there have to be some, only the low ones.
 ENOUGH_POSITIONS, FEWEST_POSITIONS = 100, 24
+# Waves of two orders whose sums over the positions agree to this part leave 2 % of each other's square: they are one.
+SAME_WAVE = 0.99
+# The window of the positions is looked at so finely, and beyond this finer about its maxima.
+WINDOW_STEP, WORTH_A_LOOK = 0.25, 0.9
 # So many orders of one joint are looked at in detail.
 MOST_PEAKS = 3
 # Numbers of waves that are filtered in one piece (8 MB).
@@ -39,12 +44,9 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     fit, problem = scene.fit, scene.fit.problem
     chain, positions = problem.context.chain, problem.context.positions
     orders = np.arange(LOWEST, HIGHEST + STEP / 2.0, STEP)
-    highest = {
-        index: _highest_order(positions[:, index])
-        for index, joint in enumerate(chain.joints)
-        if joint.kind == "rotary"
-    }
-    tried = {index: int(np.sum(orders <= order)) for index, order in highest.items() if order >= LOWEST}
+    turning = [index for index, joint in enumerate(chain.joints) if joint.kind == "rotary"]
+    ranges = {index: _ranges(positions[:, index], orders) for index in turning}
+    tried = {index: counts for index, counts in ranges.items() if counts}
     if not tried:
         return []
     beside = scene.remainders.beside(selected)
@@ -52,10 +54,13 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     variance = float(residual @ residual) / max(beside.degrees_of_freedom, 1)
     # Of correlated noise the residual is filtered, and in directions of its own; a wave is not.
     rows = fit.by_rows(residual.reshape(len(problem.runs), -1, 1))[..., 0]
-    limit = -2.0 * np.log(rate / sum(tried.values()))
+    in_all = [sum(counts[min(part, len(counts) - 1)] for counts in tried.values()) for part in range(2)]
     fewest = FEWEST_BESIDE_BENDS if problem.needs_whole_periods else FEWEST_PERIODS
     variants = []
-    for index, count in tried.items():
+    for index, counts in tried.items():
+        count = counts[-1]
+        in_first = np.arange(count) < counts[0]
+        limit = -2.0 * np.log(rate / np.where(in_first, *in_all))
         joint = chain.joints[index]
         way = problem.observe(fit.by_error[:, :, index, MOTION, 3 + joint.main]) / problem.sigma
         turn = np.sum(way * rows, axis=1)
@@ -70,21 +75,51 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
         term = f"E{COMPONENTS[3 + joint.main]}{joint.name}"
         for peak in peaks[np.argsort(-power[peaks])][:MOST_PEAKS]:
             text = f"{term}:harmonic{orders[peak]:.6g}"
-            variants.append(Variant(f"{term}:harmonic", parse_effect(text, chain), count))
+            variants.append(
+                Variant(f"{term}:harmonic", parse_effect(text, chain), counts[0] if in_first[peak] else count)
+            )
     return variants
 
 
-def _highest_order(position: Array) -> float:
-    """The highest order that positions (n,) in rad fix, 0 where these are too few: below that of two indexations a
-    period every order is seen as itself."""
-    if len(np.unique(np.round(position, 6))) >= ENOUGH_POSITIONS:
-        return HIGHEST
-    indexations = np.sort(position)[
-        np.flatnonzero(np.diff(np.sort(position), prepend=-np.inf) > ONE_TARGET_RAD)
-    ]
+def _ranges(position: Array, orders: Array) -> tuple[int, ...]:
+    """How many of the ``orders`` positions (n,) in rad fix by their number, and how many by how they scatter, where
+    that is more; empty where these are too few."""
+    every = np.unique(np.round(position, 6))
+    indexations = every[np.diff(every, prepend=-np.inf) > ONE_TARGET_RAD]
+    if len(every) >= ENOUGH_POSITIONS:
+        return (len(orders),)
     if len(indexations) < FEWEST_POSITIONS:
-        return 0.0
-    return min(HIGHEST, np.pi / float(np.diff(indexations).max()) - STEP)
+        return ()
+    # Below the order of two indexations a period every one is seen as itself.
+    by_gaps = np.pi / float(np.diff(indexations).max()) - STEP
+    by_window = first_repeat(position) / 2.0 - STEP
+    counts = sorted({int(np.sum(orders <= highest)) for highest in (by_gaps, max(by_gaps, by_window))})
+    return tuple(count for count in counts if count)
+
+
+def first_repeat(position: Array) -> float:
+    """The lowest number of waves a turn that is as good as none at positions (n,) in rad, beyond those that are too
+    slow for the travel; infinite where there is none up to twice the highest order."""
+    waves = np.arange(0.0, 2.0 * HIGHEST, WINDOW_STEP)
+    window = window_of(position, waves)
+    beyond = int(np.argmax(window < WORTH_A_LOOK))
+    for wave in waves[beyond:][window[beyond:] > WORTH_A_LOOK]:
+        near = wave + np.linspace(-WINDOW_STEP, WINDOW_STEP, 11)
+        if window_of(position, near).max() > SAME_WAVE:
+            return float(wave)
+    return np.inf
+
+
+def window_of(position: Array, waves: Array) -> Array:
+    """The length (k,) of the mean of unit vectors that turn by so many ``waves`` (k,) a turn over positions (n,) in
+    rad: one where these are all alike to them."""
+    indexations, rows = np.unique(np.round(position, 6), return_counts=True)
+    window = np.empty(len(waves))
+    at_once = max(NUMBERS_AT_ONCE // len(indexations), 1)
+    for start in range(0, len(waves), at_once):
+        some = slice(start, start + at_once)
+        window[some] = np.abs(np.exp(1j * waves[some, None] * indexations) @ rows) / len(position)
+    return window
 
 
 def _lengths(fit: Fit, way: Array, position: Array, orders: Array) -> Array:
