@@ -3,7 +3,7 @@ place of a whole search."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -47,10 +47,10 @@ def still_found(scene: ChainScene, near: Found, drivers: Sequence[str], rate: fl
 
 
 def found_in_other_noise(
-    scene: ChainScene, first: ChainScan, earlier: Found, drivers: Sequence[str], rate: float
+    scene: ChainScene, first: Callable[[], ChainScan], earlier: Found, drivers: Sequence[str], rate: float
 ) -> Found | None:
-    """What was found under an ``earlier`` noise without what is noise under this one, of which ``first`` is what the
-    first scan found: steady effects stand by the places that were measured, whatever the noise.
+    """What was found under an ``earlier`` noise without what is noise under this one, of which ``first`` tells what the
+    first scan finds: steady effects stand by the places that were measured, whatever the noise.
 
     None where a scan that begins with them adds to them, where the first scan does not name a drift or the error of
     what has edges, or where something new stands out.
@@ -74,7 +74,10 @@ def found_in_other_noise(
 
 
 def _settled(
-    scene: ChainScene, begin: Sequence[ChainCandidate], first: ChainScan, rules: ChainAcceptance
+    scene: ChainScene,
+    begin: Sequence[ChainCandidate],
+    first: Callable[[], ChainScan],
+    rules: ChainAcceptance,
 ) -> ChainScan | None:
     """What stands of the effects to ``begin`` with, in parts and edges chosen anew, once these stay; None where a scan
     adds to them, or nothing stands."""
@@ -97,31 +100,33 @@ def _only_noise_fell(begin: Sequence[ChainCandidate], standing: Sequence[ChainCa
     return all(is_free(each) or not is_steady(each) for each in fallen)
 
 
-def _is_named_by(first: ChainScan, standing: Sequence[ChainCandidate]) -> bool:
+def _is_named_by(first: Callable[[], ChainScan], standing: Sequence[ChainCandidate]) -> bool:
     """Whether a first scan names the same drifts, and all errors of which edges stand; it may name drifts of an error
-    that stands in a free shape, a table or edges."""
-    errors = {error_of(each) for each in first.candidates}
+    that stands in a free shape, a table or edges. It is not asked where neither stands."""
     with_edges = {error_of(each) for each in standing if _has_edges(each)}
+    drifts = _names_of_drifts(standing)
+    if not with_edges and not drifts:
+        return True
+    candidates = first().candidates
     searched = {error_of(each) for each in standing if _is_searched(each)}
-    named = [each for each in first.candidates if error_of(each) not in searched]
-    return with_edges <= errors and _names_of_drifts(standing) == _names_of_drifts(named)
+    named = [each for each in candidates if error_of(each) not in searched]
+    return with_edges <= {error_of(each) for each in candidates} and drifts == _names_of_drifts(named)
 
 
 def _without_other_shapes(
-    scene: ChainScene, begin: Sequence[ChainCandidate], result: ChainScan, first: ChainScan
+    scene: ChainScene, begin: Sequence[ChainCandidate], result: ChainScan, first: Callable[[], ChainScan]
 ) -> ChainScan:
     """A result without what it adds to those errors that stand as it began with them: parts of a free shape would say
     that at less than their price, and other shapes count that the first scan of all names, too."""
     still = [each for each in begin if _is_among(each, result.candidates)]
     of_begin = {error_of(each) for each in still}
     free = {error_of(each) for each in still if is_free(each)}
-    named = {each.family for each in first.candidates if error_of(each) not in free}
-    standing = [
-        each
-        for each in result.candidates
-        if _is_among(each, begin) or error_of(each) not in of_begin or each.family in named
-    ]
-    return result if len(standing) == len(result.findings) else ScanResult(findings_of(scene, standing))
+    more = [each for each in result.candidates if not _is_among(each, begin) and error_of(each) in of_begin]
+    doubtful = [each for each in more if error_of(each) not in free]
+    named = {each.family for each in first().candidates} if doubtful else set()
+    without = [each for each in more if error_of(each) in free or each.family not in named]
+    standing = [each for each in result.candidates if not _is_among(each, without)]
+    return ScanResult(findings_of(scene, standing)) if without else result
 
 
 def is_steady(candidate: ChainCandidate) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -337,16 +338,16 @@ class _Rounds:
         if self.beside_curves:
             return Found(*search_beside_curves(self._noisy(), self._able, rate)), True
         scene = scene_of(self._noisy(), self._able)
-        first = first_found(scene, drivers, rate)
-        # Sides that the first scan shows are not to be asked for after a whole search.
-        if self._with_new_sides(scene, first.candidates):
-            return search_chain(scene_of(self._noisy(), self._able), drivers, rate), True
+        first = cache(partial(first_found, scene, drivers, rate))
         if earlier := self._earlier_rounds():
             latest = Found(earlier[-1].scene, earlier[-1].result)
             again = found_in_other_noise(scene, first, latest, drivers, rate)
             if again is not None:
                 return again, False
-        return search_chain(scene, drivers, rate, first), True
+        # Sides that the first scan shows are not to be asked for after a whole search.
+        if self._with_new_sides(scene, first().candidates):
+            return search_chain(scene_of(self._noisy(), self._able), drivers, rate), True
+        return search_chain(scene, drivers, rate, first()), True
 
     def _again(self, under: Fit, near: ChainRound) -> Found | None:
         """The findings of a near round under a fit with a scene of all that was searched there; None where they are not

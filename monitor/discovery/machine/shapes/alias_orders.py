@@ -16,6 +16,7 @@ from monitor.discovery.machine.shapes.gears import HIGHEST, LOWEST, WINDOW_STEP,
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context
 from monitor.effects.shapes import Harmonic, parse_shape
+from monitor.effects.shapes.free import HARMONICS
 from monitor.records import Array
 
 # Below this part of a wave another one leaves as much as half of it to see.
@@ -36,7 +37,8 @@ def aliases_of_order(effect: MachineEffect, context: Context) -> list[ChainVaria
     if not isinstance(effect, ChainEffect) or not isinstance(effect.shape, Harmonic):
         return []
     order_found, joint = float(effect.shape.order), effect.joint
-    if order_found < LOWEST or not joint.turns or effect.term.component != 3 + joint.main:
+    is_low = order_found < LOWEST or (order_found <= HARMONICS and order_found.is_integer())
+    if is_low or not joint.turns or effect.term.component != 3 + joint.main:
         return []
     alike: dict[float, float] = {}
     for wave, part in _unseen(context.positions[:, effect.term.joint]):
