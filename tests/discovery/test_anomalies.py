@@ -100,6 +100,7 @@ def test_bad_points_are_found_with_axis_and_size_and_are_no_effect(virtual_campa
         assert told[run, sequence].size * 1e3 == pytest.approx(off[axis], abs=5.0)
 
 
+@pytest.mark.slow
 def test_a_bad_point_does_not_hide_an_effect(virtual_campaigns, explained):
     sim = simulator()
     effect, bad = sim.Effect("EYX:poly2", peak_um=6.0), (5, 20, (80.0, 0.0, 0.0))

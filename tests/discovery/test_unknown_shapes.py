@@ -146,6 +146,7 @@ def test_an_effect_that_cannot_be_fitted_is_left_out_and_named(virtual_campaigns
     assert fitted.problem.added == (good,)
 
 
+@pytest.mark.slow
 def test_explain_names_what_could_not_be_fitted_and_blames_no_file(virtual_campaigns, monkeypatch):
     from monitor.discovery.machine import fit as module
 

@@ -73,7 +73,7 @@ def test_the_bar_of_balls_and_the_length_of_a_ball_bar_are_such_quantities() -> 
         np.testing.assert_allclose(1e6 * np.abs(part[at]), expected, rtol=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_jcgm100_f_1_2_3_two_campaigns_of_one_laser_differ_by_what_is_not_common(
     tmp_path: Path, seeds: Callable[[int, int], range]
 ) -> None:

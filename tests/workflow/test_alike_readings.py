@@ -106,7 +106,7 @@ def test_readings_of_a_robot_without_shared_noise_are_independent() -> None:
     assert (source.neighbours, source.further, source.of_poses) == (None, None, None)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_noise_that_poses_share_is_in_u_once() -> None:
     """Six robots whose joints rest within 40 µrad: 1 is right; as independent readings it was 6, with what is shared
     once more as lack of fit 0.58."""

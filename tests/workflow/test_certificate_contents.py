@@ -121,6 +121,7 @@ def test_jcgm_102_8_the_verdict_of_the_validation_is_printed_beside_the_framewor
     assert result.trials is None  # the numbers are the framework's
 
 
+@pytest.mark.slow
 def test_the_volumetric_error_is_that_of_the_map_and_travels_as_csv(db: Database, tmp_path: Path) -> None:
     made = issue(
         db,

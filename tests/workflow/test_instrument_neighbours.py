@@ -50,7 +50,7 @@ def test_readings_of_a_setup_resemble_their_neighbours_and_none_of_another_setup
     np.testing.assert_allclose(beside, source.neighbours, atol=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_noise_of_instruments_that_follows_itself_is_in_the_covariance(tmp_path) -> None:
     squares = []
     for seed in range(62, 74):

@@ -123,6 +123,7 @@ def test_compare_says_that_instruments_disagree(db: Database, shared: Instrument
     assert compare(db, CompareRequest("four-instruments", "level")).instruments_disagree is None
 
 
+@pytest.mark.slow
 def test_only_the_combination_shows_the_pitch(db: Database) -> None:
     for name in NAMES[1:]:
         assert explain(db, ExplainRequest(name)).explanation.missing == ()

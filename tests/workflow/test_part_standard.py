@@ -170,7 +170,7 @@ def test_two_numbers_a_point_give_the_same_figures(tmp_path: Path) -> None:
     assert figures["circle", "circularity"][0] == pytest.approx(1e3 * np.hypot(GAIN, SQUARE) * 55.0, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_u_of_a_part_is_the_scatter_of_parts_measured_again(tmp_path: Path) -> None:
     """Twenty parts by one machine with 0.2 um of noise; the scatter of twenty is known to 16 %."""
     from monitor.statistics.standards.parts import Element, part_figures

@@ -110,7 +110,8 @@ def _is_named_by(first: Callable[[], ChainScan], standing: Sequence[ChainCandida
     candidates = first().candidates
     searched = {error_of(each) for each in standing if _is_searched(each)}
     named = [each for each in candidates if error_of(each) not in searched]
-    return with_edges <= {error_of(each) for each in candidates} and drifts == _names_of_drifts(named)
+    has_drifts = not drifts or drifts == _names_of_drifts(named)
+    return has_drifts and with_edges <= {error_of(each) for each in candidates}
 
 
 def _without_other_shapes(
