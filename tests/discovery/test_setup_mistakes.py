@@ -93,7 +93,7 @@ def test_a_setup_alone_contradicts_itself_where_no_machine_reads_so(
     assert _contradicts_itself(alone, _of_machine, int(alone.probings.run[0])) is contradicts
 
 
-@pytest.mark.slow
+@pytest.mark.all_seeds
 def test_right_setups_and_errors_of_an_instrument_are_no_mistake(right: Campaign, tmp_path: Path) -> None:
     assert _told(right) == []
     for error, size in (

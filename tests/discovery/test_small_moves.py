@@ -104,7 +104,7 @@ def test_which_effects_follow_moves(tmp_path: Path, text: str, follows: bool) ->
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turned_by_mm", [0.0, 0.1])
+@pytest.mark.parametrize("turned_by_mm", [0.0, pytest.param(0.1, marks=pytest.mark.all_seeds)])
 def test_a_loop_has_its_size_whether_or_not_small_moves_turn_it_over(
     tmp_path: Path, turned_by_mm: float
 ) -> None:

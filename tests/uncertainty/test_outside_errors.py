@@ -43,8 +43,8 @@ MACHINES = [
     ("w b X Y Z t", ""),
     ("w X Y Z b t", ""),
 ]
-#: Those of `make slow`: a head and a table, no rotary axis; `make trials` has the others.
-IN_SLOW = {("w C b X Y Z B t", "CB"), ("w b X Y Z t", "")}
+#: That of `make slow`, without a rotary axis; `make trials` has the others.
+IN_SLOW = {("w b X Y Z t", "")}
 
 
 def _measured(folder: Path, machine: SerialMachine, axes: str, added: tuple[str, ...] = ()) -> Measured:
